@@ -28,7 +28,7 @@ HEIGHT = "differences between texels of a height"
 MATRIX = "matrices are made, transposed and applied only"
 HAIR = "inputs of hair"
 REASONS = {
-    "hextiledimage": CODE, "hextilednormalmap": CODE, "flake2d": CODE, "flake3d": CODE,
+    "flake2d": CODE, "flake3d": CODE,
     "heighttonormal": HEIGHT, "bump": HEIGHT,
     "transformpoint": SPACES, "transformvector": SPACES, "transformnormal": SPACES,
     "determinant": MATRIX, "invertmatrix": MATRIX,
@@ -129,7 +129,7 @@ def test_defaults_of_primitives_are_the_library_s(category):
             kind, text = item.getType(), item.getValueString()
             if kind in WIDTHS and text and not item.getDefaultGeomPropString():
                 full.give(**{item.getName(): text})
-        if identifier in ("ND_image_color4", "ND_image_vector4"):
+        if identifier in ("ND_image_color4", "ND_image_vector4", "ND_hextiledimage_color4"):
             full.give(default="0, 0, 0, 1")  # a file that is missing is drawn opaque
         for output in patterns()[identifier]:
             ours, theirs = bare.value(output), full.value(output)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -12,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.graphs.expressions import Expressions, substituted
-from wavecomb.usd.graphs.node import PRIMVAR, Node, Value, is_constant, numbers
+from wavecomb.usd.graphs.node import (
+    PARAMETERS,
+    PRIMVAR,
+    Node,
+    Value,
+    fit,
+    is_constant,
+    numbers,
+)
 from wavecomb.usd.graphs.surface import graphs_of, plain_use
 from wavecomb.usd.looks.surface import TEXTURED_PARAMETERS, SurfaceGraph
 
@@ -77,6 +86,51 @@ def bound(
     return replace(
         surface, parameters=parameters, textures=textures, graph=graphs_of(left, graph.primvars)
     )
+
+
+def at_other_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
+    """The surface on a mesh whose texture coordinates are not those that it reads.
+
+    Args:
+        surface: As ``bound`` gives it, where its graph reads primvars.
+        sets: By textured parameter, the primvar of its coordinates.
+        own: That of the coordinates in its graph; "": the mesh's.
+    """
+    make = Expressions()
+    mesh = make.input("uv")
+    textures, outputs = dict(surface.textures), {}
+    for parameter, name in sets.items():
+        uv = make.attribute(name, 2, mesh)
+        outputs[parameter] = _texel(make, textures.pop(parameter), uv, PARAMETERS[parameter][1])
+
+    def replaced(node: Node, _operands: tuple[Value, ...]) -> Value | None:
+        return make.attribute(own, 2, mesh) if own and node.name == "uv" else None
+
+    for parameter, value in surface.graph.outputs if surface.graph is not None else ():
+        outputs[parameter] = substituted(make, value, replaced)
+    return replace(
+        surface,
+        textures=textures,
+        texture_uvs={},
+        graph=graphs_of(dict(sorted(outputs.items())), ()),
+    )
+
+
+def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> Value:
+    """What a texture use gives at other coordinates."""
+    m = use["uv"]
+    at = tuple(
+        make.op("add", make.op("dot", uv, numbers(*row[:2])), numbers(row[2]))[0]
+        for row in (m[:3], m[3:])
+    )
+    stretch = math.sqrt(max(m[0] ** 2 + m[1] ** 2, m[3] ** 2 + m[4] ** 2))
+    texel = make.image(use["texture"], at, stretch)
+    channels = range(3) if use["channel"] == "rgb" else ["rgba".index(use["channel"])]
+    value, scale, bias = (
+        tuple(values[i] for i in channels)
+        for values in (texel, numbers(*use["scale"]), numbers(*use["bias"]))
+    )
+    return fit(make.op("add", make.op("multiply", value, scale), bias), width)
 
 
 def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str, Value]:

@@ -18,7 +18,7 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import PrimvarError, as_integers
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
-from wavecomb.usd.graphs.bind import asks_for, bound
+from wavecomb.usd.graphs.bind import asks_for, at_other_sets, bound
 from wavecomb.usd.graphs.node import PARAMETERS, GraphTooLarge
 from wavecomb.usd.looks.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.looks.network import colour, number
@@ -104,11 +104,7 @@ class Assigner:
         for material in (draw.material, *draw.subset_materials):
             if material is not None:
                 names += self.table.surface(material).uv_names
-        unique = tuple(dict.fromkeys(names))
-        if len(unique) > 1:
-            what = "several sets of texture coordinates on a mesh (first used for all)"
-            self.report.missing(what, draw.prim.GetPath())
-        return unique
+        return tuple(dict.fromkeys(names))
 
     def assign(self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None) -> Worn:
         """The materials of a mesh.
@@ -120,9 +116,12 @@ class Assigner:
         """
         surface = None if draw.material is None else self.table.surface(draw.material)
         self._tell_of_hair(draw, mesh)
-        if surface is not None and not draw.subsets and _is_alike(surface):
+        if surface is not None and not draw.subsets and is_alike(surface):
             return Worn(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
+        sets = self.uv_names(draw)
+        if len(sets) > 1:  # the mesh has the first that is there
+            primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
         if surface is None:
             worn = Worn(self._display(primvars, otherwise))
         else:
@@ -166,6 +165,8 @@ class Assigner:
         """The id of a surface, with this gprim's values where it reads constant primvars."""
         if asks_for(surface.graph):
             surface = self._with_graph(primvars, surface)
+        if primvars.own_uv:
+            surface = self._at_other_sets(primvars, surface)
         varying: list[str] = []
         brightest = primvars.highest(surface.emission_attributes())
         for parameter, name in surface.primvars.items():
@@ -211,6 +212,26 @@ class Assigner:
             self._bound_graphs[key] = (surface, made)
         return self._bound_graphs[key][1]
 
+    def _at_other_sets(self, primvars: _Primvars, surface: Surface) -> Surface:
+        """A surface whose textures are at coordinates that the mesh has as primvars."""
+        first = surface.uv_names[0] if surface.uv_names else ""
+        named = {p: surface.texture_uvs.get(p, first) for p in surface.textures}
+        others = {name for name in (first, *named.values()) if name and name != primvars.own_uv}
+        there = {name: found for name in others if (found := primvars.find(name, 2)) is not None}
+        if not there:
+            return surface
+        for found in there.values():
+            primvars.keep(found)
+        key = (id(surface), primvars.own_uv, tuple(sorted(there)))
+        if key not in self._bound_graphs:
+            sets = {p: name for p, name in named.items() if name in there}
+            try:
+                made = at_other_sets(surface, sets, first if first in there else "")
+            except GraphTooLarge:
+                made = surface
+            self._bound_graphs[key] = (surface, made)
+        return self._bound_graphs[key][1]
+
     def _display(self, primvars: _Primvars, otherwise: int | None) -> int:
         """The id for displayColor and displayOpacity."""
         colours = primvars.find("displayColor", 3)
@@ -229,9 +250,10 @@ class Assigner:
         return self.table.plain(shown, opacity, tuple(varying))
 
 
-def _is_alike(surface: Surface) -> bool:
+def is_alike(surface: Surface) -> bool:
     """Whether a surface is the same on all gprims."""
-    return not (surface.primvars or asks_for(surface.graph) or surface.emission_attributes())
+    reads = surface.primvars or asks_for(surface.graph) or surface.emission_attributes()
+    return not (reads or surface.texture_uvs)
 
 
 class _Primvars:
@@ -241,6 +263,7 @@ class _Primvars:
         self, draw: Draw, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
     ) -> None:
         self.read: dict[str, Wanted] = {}
+        self.own_uv = ""  # the mesh's texture coordinates, where materials read other ones, too
         self._draw = draw
         self._mesh = mesh
         self._time = time

@@ -98,6 +98,7 @@ class PreviewReader:
         self.uv_names = self.drivers.networks.uv_names
         self.textured = self.drivers.textured
         self.primvars: dict[str, str] = {}
+        self.texture_uvs: dict[str, str] = {}
 
     def read(self, shader: UsdShade.Shader) -> Surface:
         """The surface of a UsdPreviewSurface shader."""
@@ -142,6 +143,7 @@ class PreviewReader:
             self.primvars,
             displacement,
             self.drivers.graph(),
+            self.texture_uvs,
         )
 
     def _flat_normal(self, value: Any) -> None:
@@ -247,7 +249,7 @@ class PreviewReader:
                 self.report.note(what, shader.GetPath())
         missing = _four(value_of(shader, "fallback", time), (0.0, 0.0, 0.0, 1.0))
         wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
-        matrix = self._coordinates(shader)
+        matrix = self._coordinates(shader, parameter)
         if not any((*matrix[:2], *matrix[3:5])):
             # One texel for all: its border must not be mixed in.
             wraps = ["clamp", "clamp"]
@@ -316,13 +318,15 @@ class PreviewReader:
                 "channel": "rgb",
                 "scale": _ONES,
                 "bias": _ZEROS,
-                "uv": self._coordinates(shader),
+                "uv": self._coordinates(shader, parameter),
             }
             return None
         return default
 
-    def _coordinates(self, shader: UsdShade.Shader) -> tuple[float, ...]:
+    def _coordinates(self, shader: UsdShade.Shader, parameter: str) -> tuple[float, ...]:
         """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``.
+
+        And in ``texture_uvs`` where the parameter's is not the first of them.
 
         Without a connection the coordinates are constant, (0, 0) where nothing is authored.
         """
@@ -339,14 +343,19 @@ class PreviewReader:
                 matrix = _compose(matrix, self._transform_2d(node))
                 key = "in"
             elif identifier.startswith("UsdPrimvarReader_float2"):
-                self.uv_names.append(str(value_of(node, "varname", self.time, "") or "st"))
+                self._note_uv(str(value_of(node, "varname", self.time, "") or "st"), parameter)
                 return matrix
             else:
                 self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
-                self.uv_names.append("st")
+                self._note_uv("st", parameter)
                 return matrix
         self.report.warn("texture coordinates that run in a circle", self.material.GetPath())
         return (0.0,) * 6
+
+    def _note_uv(self, name: str, parameter: str) -> None:
+        self.uv_names.append(name)
+        if name != self.uv_names[0]:
+            self.texture_uvs[parameter] = name
 
     def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
         """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""

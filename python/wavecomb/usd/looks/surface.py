@@ -81,6 +81,8 @@ class Surface:
         parameters: Keyword arguments of ``SceneBuilder.add_material``.
         textures: By parameter, as ``SceneBuilder.add_material`` takes them.
         uv_names: Primvars that hold texture coordinates, first use first.
+        texture_uvs: By textured parameter, the primvar that its texture is read at, where that is
+            not the first of ``uv_names``.
         primvars: By parameter, the primvar of the mesh that it is read from, where there is that.
         displacement: How far points move along their normals: a length, or a texture use; None: not
             at all. Part of the mesh's shape, not of the material's look.
@@ -95,6 +97,7 @@ class Surface:
     primvars: dict[str, str] = field(default_factory=dict)
     displacement: float | dict[str, Any] | None = None
     graph: SurfaceGraph | None = None
+    texture_uvs: dict[str, str] = field(default_factory=dict)
 
     def key(self) -> str:
         """Equal for surfaces that look alike."""

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf
+from pxr import Sdf, UsdShade
 
 from wavecomb.usd.cameras import framing
 from wavecomb.usd.lights.light import Light
@@ -92,6 +92,9 @@ class Scope:
         override: A binding above is stronger than all in the group.
         alias: (prototype, instance): bindings are looked up on the instance's proxies.
         root: Path of the native prototype that the group comes from.
+        worn: The bound material, where what has none of its own wears it itself, as it reads
+            primvars there.
+        brings: Constant primvars of the instances.
     """
 
     inside: bool = False
@@ -99,6 +102,8 @@ class Scope:
     override: bool = False
     alias: tuple[Sdf.Path, Sdf.Path] | None = None
     root: Sdf.Path = Sdf.Path.absoluteRootPath
+    worn: UsdShade.Material | None = None
+    brings: tuple[Any, ...] = ()
 
 
 def middle_of(motion: Matrices) -> Matrices:

@@ -30,6 +30,7 @@ from wavecomb.usd.looks.material import (
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.group import Group, Matrices, Scope
 from wavecomb.usd.stage.identity import LightGroups
+from wavecomb.usd.stage.instance_looks import InstanceLooks, Look
 from wavecomb.usd.stage.instance_materials import InstanceMaterials
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of
@@ -108,6 +109,7 @@ class GroupBuilder:
         self.bindings = BindingScan()
         self.placer = GroupPlacer(builder, self.mesh_lights, report, framed)
         self.worn = InstanceMaterials(traversal, materials, report)
+        self.looks = InstanceLooks(traversal, materials, report)
         reads = VolumeReader(
             stage, builder, self.time, materials.working, report, self.motion is not None
         )
@@ -131,9 +133,13 @@ class GroupBuilder:
         predicate: Any = None,
     ) -> None:
         """Reads prims and all below them into a group."""
-        found = self.traversal.walk(roots, purpose, predicate)
+        found = self.traversal.walk(roots, purpose, predicate, scope.brings)
         group.lights += found.lights
         self._bind(found, scope)
+        if scope.worn is not None:
+            for draw in found.draws:
+                if scope.override or draw.material is None:
+                    draw.material = scope.worn
         for draw in found.volumes:
             self.volumes.add(group, draw, scope)
         group.holds_placed = group.holds_placed or bool(group.lights or group.volumes)
@@ -294,7 +300,7 @@ class GroupBuilder:
 
     def _materials(self, draw: Draw, mesh: MeshArrays | CurveArrays, scope: Scope) -> Worn:
         inherits = draw.material is None and scope.bound and not any(draw.subset_materials)
-        if scope.override or inherits:
+        if (scope.override and scope.worn is None) or inherits:
             return Worn(INHERIT_MATERIAL)
         return self.assigner.assign(draw, mesh, INHERIT_MATERIAL if scope.inside else None)
 
@@ -364,8 +370,9 @@ class GroupBuilder:
             alias = (path, proxy.GetPath())
             exact = self.worn.of_proxies(proxy)
         bound = placed.material is not None or (scope.bound and not override)
-        inner = Scope(True, bound and alias is None, override, alias, path)
-        key = ("native", path, inner.bound, override, placed.purpose, exact)
+        look = self.looks.of_instance(placed, proxy, scope)
+        inner = look.on(Scope(True, bound and alias is None, override, alias, path))
+        key = ("native", path, inner.bound, override, placed.purpose, exact, look.key)
         roots = list(prototype.GetChildren())
         return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
 
@@ -393,28 +400,41 @@ class GroupBuilder:
             if not root:
                 self.report.warn(f"point instancer prototype {target} is not there", path)
                 continue
-            child = self._prototype_group(root, placed, scope)
-            if child is None:
-                continue
-            chosen = order[first:last]
-            transforms = instances.transforms[chosen]
-            if outer is not None:
-                transforms = transforms @ outer
-            numbers = instances.kept[chosen].astype(np.uint32)
-            motion = None if moved is None else np.ascontiguousarray(moved[chosen])
-            self.placer.add(parent, child, transforms, materials[chosen], [prim], numbers, motion)
+            of_root = order[first:last]
+            for which, look in self.looks.of_points(
+                placed, root, instances.kept[of_root], instances.authored, _ANY
+            ):
+                child = self._prototype_group(root, placed, scope, look)
+                if child is None:
+                    continue
+                chosen = of_root[which]
+                transforms = instances.transforms[chosen]
+                if outer is not None:
+                    transforms = transforms @ outer
+                numbers = instances.kept[chosen].astype(np.uint32)
+                motion = None if moved is None else np.ascontiguousarray(moved[chosen])
+                ids = materials[chosen]
+                self.placer.add(parent, child, transforms, ids, [prim], numbers, motion)
         self.report.tally("point instances", len(instances.kept))
 
-    def _prototype_group(self, root: Usd.Prim, placed: Placed, scope: Scope) -> Group | None:
+    def _prototype_group(
+        self, root: Usd.Prim, placed: Placed, scope: Scope, look: Look
+    ) -> Group | None:
         """The group of a point instancer's prototype, wherever it is."""
         path = root.GetPath()
         within = path.HasPrefix(scope.root) and scope.inside
-        inner = Scope(
-            True,
-            scope.bound and within,
-            scope.override and within,
-            scope.alias if within else None,
-            scope.root if within else path,
+        inner = look.on(
+            Scope(
+                True,
+                scope.bound and within,
+                scope.override and within,
+                scope.alias if within else None,
+                scope.root if within else path,
+                scope.worn if within else None,
+            )
         )
-        key = ("point", path, inner.bound, inner.override, placed.purpose, inner.alias)
+        worn = None if inner.worn is None else inner.worn.GetPath()
+        key = (
+            "point", path, inner.bound, inner.override, placed.purpose, inner.alias, look.key, worn,
+        )  # fmt: skip
         return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)

@@ -122,7 +122,11 @@ class Traversal:
         return kind
 
     def walk(
-        self, roots: Sequence[Usd.Prim], purpose: str = "default", predicate: Any = None
+        self,
+        roots: Sequence[Usd.Prim],
+        purpose: str = "default",
+        predicate: Any = None,
+        inherited: Sequence[Any] = (),
     ) -> Gathered:
         """Finds what is at and below some prims, in stage order.
 
@@ -130,6 +134,7 @@ class Traversal:
             roots: Their own transforms count, their parents' do not.
             purpose: Of their parents.
             predicate: Of the children to visit; None: USD's default.
+            inherited: Constant primvars that they inherit.
         """
         found = Gathered()
         time, local = self.time, self.xforms.GetLocalTransformation
@@ -142,7 +147,7 @@ class Traversal:
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]
         stack = [
-            (prim, IDENTITY, None, purpose, (), predicate, None, "default")
+            (prim, IDENTITY, None, purpose, inherited, predicate, None, "default")
             for prim in reversed(roots)
         ]
         kinds, has_instances = self._kinds, bool(roots and roots[0].GetStage().GetPrototypes())

@@ -19,7 +19,7 @@ _WRAPS = {
 }  # fmt: skip
 
 
-def _stretch(uv: Value) -> float:
+def stretch_of(uv: Value) -> float:
     """Lengths in texture coordinates for one in those of the mesh; 1 where that is not constant."""
     m = uv_matrix(uv)
     if m is None:
@@ -27,9 +27,20 @@ def _stretch(uv: Value) -> float:
     return math.sqrt(max(m[0] ** 2 + m[1] ** 2, m[3] ** 2 + m[4] ** 2))
 
 
-def _read(n: NodeCall, uv: Value, wraps: list[str], fallback: str, is_raw: bool) -> Value:
-    """r, g, b, alpha of the node's file; its default where there is none that can be read."""
+def read_image(
+    n: NodeCall,
+    uv: Value,
+    wraps: list[str],
+    fallback: str,
+    is_raw: bool,
+    stretch: float | None = None,
+) -> Value:
+    """r, g, b, alpha of the node's file; its default where there is none that can be read.
+
+    ``stretch``: lengths in ``uv`` for one in the mesh's coordinates, where it is known better.
+    """
     networks = n.networks
+    stretch = stretch_of(uv) if stretch is None else stretch
     file = n.inputs.source("file")
     path = asset_file(file.value, file.attribute) if file is not None and file.is_value else ""
     image = networks.textures.image(path, n.inputs.path) if path else None
@@ -38,21 +49,21 @@ def _read(n: NodeCall, uv: Value, wraps: list[str], fallback: str, is_raw: bool)
         if authored is not None:
             return fit(authored, 4)
         if n.kind == "base" and path:
-            return n.make.image(networks.textures.missing(), uv, _stretch(uv))
+            return n.make.image(networks.textures.missing(), uv, stretch)
         return numbers(0.0, 0.0, 0.0, 1.0)
     is_colour = n.kind in COLOURS and not is_raw
     space = space_of(file.attribute if file else None) or ("auto" if is_colour else "raw")
     if n.kind == NORMAL:
         space = "raw"
     texture = networks.textures.add(path, image, space, *wraps, is_colour=is_colour)
-    r, g, b, a = n.make.image(texture, uv, _stretch(uv))
+    r, g, b, a = n.make.image(texture, uv, stretch)
     return (r, r, r, a) if image.channels < 3 else (r, g, b, a)
 
 
 @_node("image")
 def _image(n: NodeCall) -> Value:
     wraps = [_WRAPS.get(n.text(f"{axis}addressmode", "periodic"), "repeat") for axis in "uv"]
-    return _read(n, n.coordinates(), wraps, "default", "color" not in n.identifier)
+    return read_image(n, n.coordinates(), wraps, "default", "color" not in n.identifier)
 
 
 @_node("UsdUVTexture")
@@ -62,7 +73,7 @@ def _uv_texture(n: NodeCall) -> Value:
     uv = n.coordinates("st")
     wraps = [n.text(name, "periodic").replace("periodic", "repeat") for name in ("wrapS", "wrapT")]
     raw = n.text("sourceColorSpace", "auto") == "raw"
-    texel = _read(n, uv, wraps, "fallback", raw)
+    texel = read_image(n, uv, wraps, "fallback", raw)
     texel = m.op("multiply", texel, n.value("scale", (1.0, 1.0, 1.0, 1.0), 4))
     texel = m.op("add", texel, n.value("bias", (0.0, 0.0, 0.0, 0.0), 4))
     n.width = {"rgba": 4, "rgb": 3}.get(n.output, 1)

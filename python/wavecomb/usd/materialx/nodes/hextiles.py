@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MaterialX nodes that scatter copies of an image over a hexagonal grid.
+
+M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the weights and the hash of
+MaterialX's own code: at each place three copies, turned, scaled and shifted at random, are mixed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.node import Value, fit, is_constant, numbers
+from wavecomb.usd.graphs.surface import NORMAL
+from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
+from wavecomb.usd.materialx.nodes.colours import LUMA
+from wavecomb.usd.materialx.nodes.images import read_image, stretch_of
+
+NODES: dict[str, Handler] = {}
+_node = adder(NODES)
+
+_GRID = 2.0 * math.sqrt(3.0)
+"""Scale of the grid, by which a copy fits what it covers."""
+_SKEW = (-0.57735027, 1.15470054)
+"""What v gives the skewed coordinates: -tan 30 degrees, twice its opposite."""
+_SEED = 0.12345
+"""Added to the numbers of a copy before they are hashed."""
+_PERIODIC = ["repeat", "repeat"]
+
+
+@dataclass(frozen=True)
+class _Copy:
+    """One of the three at a place: where it is read, how far it is turned, how near it is."""
+
+    uv: Value
+    turn: Value
+    weight: Value
+
+
+def _fract(m: Expressions, x: Value) -> Value:
+    return m.op("subtract", x, m.op("floor", x))
+
+
+def _hash(m: Expressions, p: Value) -> Value:
+    """Two numbers of two, in [0, 1)."""
+    a = _fract(m, m.op("multiply", (p[0], p[1], p[0]), numbers(0.1031, 0.1030, 0.0973)))
+    turned = m.op("add", (a[1], a[2], a[0]), numbers(33.33))
+    a = m.op("add", a, m.op("dot", a, turned))
+    return _fract(m, m.op("multiply", m.op("add", (a[0], a[0]), (a[1], a[2])), (a[2], a[1])))
+
+
+def _mix(m: Expressions, ends: Value, at: Value) -> Value:
+    return m.op("mix", (ends[0],), (ends[1],), at)
+
+
+def _turned(m: Expressions, v: Value, sin: Value, cos: Value) -> Value:
+    x = m.op("subtract", m.op("multiply", v[:1], cos), m.op("multiply", v[1:2], sin))
+    y = m.op("add", m.op("multiply", v[:1], sin), m.op("multiply", v[1:2], cos))
+    return x + y
+
+
+class _Grid:
+    """The copies at a place of a node."""
+
+    def __init__(self, n: NodeCall) -> None:
+        m = self.make = n.make
+        self.coord = m.op("multiply", n.coordinates(), n.value("tiling", 1.0, 2))
+        self._rotation = n.value("rotation", 1.0, 1)
+        degrees = n.value("rotationrange", (0.0, 360.0), 2)
+        self._turns = m.op("multiply", degrees, numbers(math.pi / 180))
+        self._scale = n.value("scale", 1.0, 1)
+        self._scales = n.value("scalerange", (0.5, 2.0), 2)
+        self._offset = n.value("offset", 1.0, 1)
+        self._offsets = n.value("offsetrange", (0.0, 1.0), 2)
+        self._falloff = n.value("falloff", 0.5, 1)
+
+    def copies(self) -> list[_Copy]:
+        m = self.make
+        st = m.op("multiply", self.coord, numbers(_GRID))
+        skewed = m.op("add", st[:1], m.op("multiply", st[1:], numbers(_SKEW[0])))
+        skewed += m.op("multiply", st[1:], numbers(_SKEW[1]))
+        base = m.op("floor", skewed)
+        x, y = ((part,) for part in m.op("subtract", skewed, base))
+        z = m.op("subtract", m.op("subtract", numbers(1.0), x), y)
+        # 1 in the upper triangle of a cell: where z is 0 or less.
+        upper = m.op("select", m.op("less", numbers(0.0), z), numbers(0.0), numbers(1.0))
+        lower = m.op("subtract", numbers(1.0), upper)
+        sign = m.op("subtract", m.op("multiply", upper, numbers(2.0)), numbers(1.0))
+        weights = (
+            m.op("subtract", numbers(0.0), m.op("multiply", z, sign)),
+            m.op("subtract", upper, m.op("multiply", y, sign)),
+            m.op("subtract", upper, m.op("multiply", x, sign)),
+        )
+        steps = (upper + upper, upper + lower, lower + upper)
+        cells = (m.op("add", base, step) for step in steps)
+        return [self._copy(cell, w) for cell, w in zip(cells, weights, strict=True)]
+
+    def _copy(self, cell: Value, weight: Value) -> _Copy:
+        m = self.make
+        centre = m.op("add", cell[:1], m.op("multiply", cell[1:], numbers(0.5)))
+        centre += m.op("multiply", cell[1:], numbers(1 / _SKEW[1]))
+        centre = m.op("multiply", centre, numbers(1 / _GRID))
+        chance = _hash(m, m.op("add", cell, numbers(_SEED)))
+        turn = _mix(m, self._turns, m.op("multiply", chance[:1], self._rotation))
+        drawn = _mix(m, self._scales, chance[1:])
+        scale = m.op("mix", numbers(1.0), drawn, self._scale)
+        shift = _mix(m, self._offsets, m.op("multiply", chance[:1], self._offset))
+        shift += _mix(m, self._offsets, m.op("multiply", chance[1:], self._offset))
+        away = m.op("subtract", self.coord, centre)
+        away = _turned(m, away, m.op("sin", turn), m.op("cos", turn))
+        uv = m.op("add", m.op("add", m.op("divide", away, scale), centre), shift)
+        return _Copy(uv, turn, weight)
+
+    def shares(self, copies: list[_Copy], bright: list[Value] | None = None) -> Value:
+        """How much of each copy there is; ``bright``: by which they are weighed, too."""
+        m = self.make
+        grid = tuple(copy.weight[0] for copy in copies)
+        w = m.op("power", m.op("max", grid, numbers(0.0)), numbers(7.0))
+        if bright is not None:
+            w = m.op("multiply", w, tuple(one[0] for one in bright))
+        w = self._normalised(w)
+        r = m.op("clamp", self._falloff, numbers(0.001), numbers(0.999))
+        return self._normalised(self._gain(w, r)) if r != numbers(0.5) else w
+
+    def _normalised(self, w: Value) -> Value:
+        return self.make.op("divide", w, self.make.op("dot", w, numbers(1.0, 1.0, 1.0)))
+
+    def _gain(self, x: Value, r: Value) -> Value:
+        """C. Schlick, "Fast Alternatives to Perlin's Bias and Gain Functions", Gems IV, 1994."""
+        m = self.make
+        steep = m.op("subtract", m.op("divide", numbers(1.0), r), numbers(2.0))
+        twice = m.op("multiply", x, numbers(2.0))
+        a = m.op("multiply", steep, m.op("subtract", numbers(1.0), twice))
+        low = m.op("divide", x, m.op("add", a, numbers(1.0)))
+        high = m.op("divide", m.op("subtract", a, x), m.op("subtract", a, numbers(1.0)))
+        return m.op("select", m.op("less", x, numbers(0.5)), low, high)
+
+
+def _sum(m: Expressions, values: list[Value], shares: Value) -> Value:
+    parts = [m.op("multiply", v, (s,)) for v, s in zip(values, shares, strict=True)]
+    return m.op("add", m.op("add", parts[0], parts[1]), parts[2])
+
+
+def _texels(n: NodeCall, grid: _Grid, copies: list[_Copy], is_raw: bool) -> list[Value]:
+    stretch = stretch_of(grid.coord)
+    return [read_image(n, c.uv, _PERIODIC, "default", is_raw, stretch) for c in copies]
+
+
+@_node("hextiledimage")
+def _hextiled_image(n: NodeCall) -> Value:
+    m, grid = n.make, _Grid(n)
+    copies = grid.copies()
+    texels = _texels(n, grid, copies, is_raw=False)
+    if is_constant(texels[0]):  # no file
+        return texels[0]
+    luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
+    bright = [m.op("mix", numbers(1.0), m.op("dot", t[:3], luma), contrast) for t in texels]
+    colour = _sum(m, [t[:3] for t in texels], grid.shares(copies, bright))
+    if n.width != 4:
+        return colour
+    return colour + _sum(m, [t[3:4] for t in texels], grid.shares(copies))
+
+
+@_node("hextilednormalmap")
+def _hextiled_normal_map(n: NodeCall) -> Value:
+    """In tangent space; gradients are mixed (M. Mikkelsen, JCGT 9(3), 2020)."""
+    m, grid, n.width = n.make, _Grid(n), 3
+    kind, n.kind = n.kind, NORMAL
+    copies = grid.copies()
+    texels = _texels(n, grid, copies, is_raw=True)
+    strength, flips = n.value("strength", 1.0, 1), n.number("flip_g", 0.0) != 0
+    n.kind = kind
+    if is_constant(texels[0]):
+        return numbers(0.0, 0.0, 1.0)
+    slopes = []
+    for copy, texel in zip(copies, texels, strict=True):
+        v = m.op("subtract", m.op("multiply", fit(texel, 3), numbers(2.0)), numbers(1.0))
+        if flips:
+            v = v[:1] + m.op("subtract", numbers(0.0), v[1:2]) + v[2:]
+        # The frame turns by -turn, so that its vectors keep to the copy.
+        back = m.op("subtract", numbers(0.0), copy.turn)
+        across = _turned(m, m.op("multiply", v[:2], strength), m.op("sin", back), m.op("cos", back))
+        steep = m.op("max", m.op("abs", v[2:]), numbers(1e-3))
+        slopes.append(m.op("divide", across, steep))
+    return _sum(m, slopes, grid.shares(copies)) + numbers(1.0)

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Instances that look different: primvars on them that materials read, of what is inside.
+
+A prototype is there once for all instances that look alike. Where materials read primvars that
+instances bring, or those of the meshes inside read by a material that is bound to the instance, the
+prototype is read once for each of these looks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
+
+from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute
+from wavecomb.usd.looks.assign import is_alike
+from wavecomb.usd.looks.material import MaterialTable, bound_materials
+from wavecomb.usd.stage.group import Scope
+from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.traverse import Placed, Traversal
+
+MOST_LOOKS = 256
+"""Of a prototype; of more instances primvars are not read."""
+
+_ARRAYS = {
+    1: (Sdf.ValueTypeNames.FloatArray, Vt.FloatArray),
+    2: (Sdf.ValueTypeNames.Float2Array, Vt.Vec2fArray),
+    3: (Sdf.ValueTypeNames.Float3Array, Vt.Vec3fArray),
+    4: (Sdf.ValueTypeNames.Float4Array, Vt.Vec4fArray),
+}
+_OF_INSTANCES = ("vertex", "varying", "uniform")
+
+
+@dataclass(frozen=True)
+class Look:
+    """What instances bring to a prototype.
+
+    Attributes:
+        key: Equal for those that look alike; None: nothing.
+        inherited: Constant primvars.
+        worn: A material for what has none of its own, which reads primvars of the meshes.
+    """
+
+    key: Hashable = None
+    inherited: tuple[Any, ...] = ()
+    worn: UsdShade.Material | None = None
+
+    def on(self, scope: Scope) -> Scope:
+        """The scope of the prototype with this."""
+        if self.key is None:
+            return scope
+        return replace(scope, worn=self.worn or scope.worn, brings=self.inherited)
+
+
+PLAIN = Look()
+
+
+class InstanceLooks:
+    """Finds what instances bring."""
+
+    def __init__(self, traversal: Traversal, materials: MaterialTable, report: LoadReport) -> None:
+        self._traversal = traversal
+        self._time = traversal.time
+        self._materials = materials
+        self._report = report
+        self._reads: dict[Hashable, frozenset[str]] = {}
+        self._known: dict[Sdf.Path, set[Hashable]] = {}
+        self._made: dict[Hashable, Any] = {}
+        self._values = Usd.Stage.CreateInMemory()
+
+    def of_instance(self, placed: Placed, proxy: Usd.Prim, scope: Scope) -> Look:
+        """What a native instance brings; ``proxy``: where its bindings are looked up."""
+        worn = placed.material or (scope.worn if scope.bound or scope.override else None)
+        if worn is not None and is_alike(self._materials.surface(worn)):
+            worn = None
+        if worn is None and not placed.inherited:
+            return PLAIN
+        prototype = placed.prim.GetPrototype().GetPath()
+        inside = Usd.PrimRange(proxy, Usd.TraverseInstanceProxies())
+        reads = self._read_by((prototype, scope.alias and proxy.GetPath()), inside, worn)
+        return self._look(prototype, reads, placed.inherited, worn)
+
+    def of_points(
+        self, placed: Placed, root: Usd.Prim, chosen: NDArray[np.intp], count: int, predicate: Any
+    ) -> Iterator[tuple[NDArray[np.bool_] | slice, Look]]:
+        """Which of the chosen instances of a prototype bring what.
+
+        Args:
+            placed: The point instancer.
+            root: The prototype.
+            chosen: (k,) its instances, by their place in the authored arrays.
+            count: Of authored instances.
+            predicate: Of prims in prototypes.
+        """
+        inherited = self._traversal.inherit(placed.prim, placed.inherited)
+        varying = [
+            primvar
+            for primvar in UsdGeom.PrimvarsAPI(placed.prim).GetPrimvarsWithAuthoredValues()
+            if primvar.GetInterpolation() in _OF_INSTANCES
+        ]
+        if not inherited and not varying:
+            yield slice(None), PLAIN
+            return
+        reads = self._read_by(root.GetPath(), Usd.PrimRange(root, predicate), None)
+        columns = {}
+        for primvar in varying:
+            name = str(primvar.GetPrimvarName())
+            values = self._each(primvar, name, count) if name in reads else None
+            if values is not None:
+                columns[name] = values[chosen]
+        if not columns:
+            yield slice(None), self._look(root.GetPath(), reads, inherited, None)
+            return
+        rows = np.concatenate(list(columns.values()), axis=1)
+        _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        which = which.reshape(-1)
+        for number, at in enumerate(first):
+            own = tuple(self._constant(name, v[at]) for name, v in columns.items())
+            rest = [p for p in inherited if p.GetPrimvarName() not in columns]
+            yield which == number, self._look(root.GetPath(), reads, (*rest, *own), None)
+
+    def _look(
+        self,
+        prototype: Sdf.Path,
+        reads: frozenset[str],
+        inherited: Sequence[Any],
+        worn: UsdShade.Material | None,
+    ) -> Look:
+        brought = tuple(p for p in inherited if str(p.GetPrimvarName()) in reads)
+        if not brought and worn is None:
+            return PLAIN
+        values = tuple((str(p.GetPrimvarName()), self._bytes(p)) for p in brought)
+        key = (values, None if worn is None else worn.GetPath())
+        known = self._known.setdefault(prototype, set())
+        if key not in known and len(known) >= MOST_LOOKS:
+            what = f"primvars of instances in more than {MOST_LOOKS} ways (left out of the rest)"
+            self._report.missing(what, prototype)
+            return PLAIN
+        known.add(key)
+        return Look(key, brought, worn)
+
+    def _read_by(
+        self, key: Hashable, inside: Any, worn: UsdShade.Material | None
+    ) -> frozenset[str]:
+        """Primvars that materials of prims read, and that the one worn by the rest does."""
+        known = self._reads.get(key)
+        if known is None:
+            prims = [p for p in inside if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)]
+            found = bound_materials(prims, self._traversal.binding_purposes)
+            by_path = {m.GetPath(): m for m in found if m is not None}
+            names = (self._names(m) for m in by_path.values())
+            known = self._reads[key] = frozenset().union(*names)
+        return known if worn is None else known | self._names(worn)
+
+    def _names(self, material: UsdShade.Material) -> frozenset[str]:
+        surface = self._materials.surface(material)
+        graph = () if surface.graph is None else surface.graph.primvars
+        names = (*surface.primvars.values(), *graph, *surface.emission_attributes())
+        return frozenset((*names, *surface.texture_uvs.values()))
+
+    def _bytes(self, primvar: Any) -> bytes:
+        try:
+            value = from_attribute(primvar.GetAttr(), str(primvar.GetPrimvarName()), self._time)
+        except PrimvarError:
+            return b""
+        return b"" if value is None else np.ascontiguousarray(value.values).tobytes()
+
+    def _each(self, primvar: Any, name: str, count: int) -> NDArray[np.float32] | None:
+        """(count, c) A primvar's value for each instance; None, and told, where it does not fit."""
+        path = primvar.GetAttr().GetPrim().GetPath()
+        try:
+            found = from_attribute(primvar.GetAttr(), name, self._time)
+        except PrimvarError as error:
+            self._report.warn(f"{error}: ignored", path)
+            return None
+        if found is None or found.values.dtype.kind not in "fiu" or found.values.shape[1] > 4:
+            return None
+        if len(found.values) != count:
+            self._report.warn(f"primvar {name!r} does not match protoIndices: ignored", path)
+            return None
+        return np.asarray(found.values, np.float32)
+
+    def _constant(self, name: str, value: NDArray[np.float32]) -> Any:
+        """A primvar with one value, as a prim above would have it."""
+        key = (name, value.tobytes())
+        if key not in self._made:
+            prim = self._values.DefinePrim(f"/V{len(self._made)}")
+            type_name, array = _ARRAYS[len(value)]
+            primvar = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(name, type_name, "constant")
+            one = value if len(value) == 1 else value.reshape(1, -1)
+            primvar.Set(array.FromNumpy(np.ascontiguousarray(one)))
+            self._made[key] = primvar
+        return self._made[key]
