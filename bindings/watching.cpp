@@ -61,6 +61,8 @@ nb::dict state_dict(const Snapshot& s) {
   d["pass.counts"] = view(counts.data(), counts.size() * sizeof(uint32_t));
   for (const Film::Block& block : s.film.blocks())
     d[("film." + block.name).c_str()] = view(block.bytes.data(), block.bytes.size());
+  if (const DeepFilm& deep = s.film.aovs().deep(); !deep.empty())
+    d["film.deep"] = owned(deep.packed());
   if (std::vector<std::byte> learned = packed_training(s.training); !learned.empty())
     d["learned.field"] = owned(std::move(learned));
   return d;
@@ -167,6 +169,11 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
     for (const Film::Block& block : film.blocks()) {
       const Bytes bytes = bytes_of(state, "film." + block.name, block.bytes.size());
       std::memcpy(block.bytes.data(), bytes.data(), block.bytes.size());
+    }
+    if (DeepFilm& deep = film.aovs().deep(); !deep.empty()) {
+      if (!state.contains("film.deep"))
+        throw Error("the state to resume from has no 'film.deep'; it is of another build");
+      deep.unpack(span_of(nb::cast<Bytes>(state["film.deep"])));
     }
     pass.target = nb::cast<uint32_t>(state["pass.target"]);
     const auto active = nb::cast<Bytes>(state["pass.active"]);
