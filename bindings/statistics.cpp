@@ -101,6 +101,7 @@ nb::object guiding_dict(const GuideStatistics& s) {
   d["gain"] = s.gain > 0 ? nb::cast(s.gain) : nb::none();
   d["survival"] = s.survival;
   d["used"] = s.used;
+  d["kept"] = s.is_kept;
   return d;
 }
 

@@ -8,11 +8,15 @@
 #include <cstring>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bind.h"
 #include "statistics.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/render/kept_training.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -41,6 +45,14 @@ nb::object view(const void* data, size_t size) {
                   nb::rv_policy::reference);
 }
 
+/// Bytes that the array owns.
+nb::object owned(std::vector<std::byte> bytes) {
+  auto* own = new std::vector<std::byte>(std::move(bytes));
+  const nb::capsule owner(own,
+                          [](void* p) noexcept { delete static_cast<std::vector<std::byte>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, uint8_t>(own->data(), {own->size()}, owner));
+}
+
 nb::dict state_dict(const Snapshot& s) {
   nb::dict d;
   d["pass.target"] = s.pass.target;
@@ -49,6 +61,10 @@ nb::dict state_dict(const Snapshot& s) {
   d["pass.counts"] = view(counts.data(), counts.size() * sizeof(uint32_t));
   for (const Film::Block& block : s.film.blocks())
     d[("film." + block.name).c_str()] = view(block.bytes.data(), block.bytes.size());
+  if (const DeepFilm& deep = s.film.aovs().deep(); !deep.empty())
+    d["film.deep"] = owned(deep.packed());
+  if (std::vector<std::byte> learned = packed_training(s.training); !learned.empty())
+    d["learned.field"] = owned(std::move(learned));
   return d;
 }
 
@@ -117,6 +133,10 @@ Bytes bytes_of(const nb::dict& state, const std::string& key, size_t size) {
   return bytes;
 }
 
+std::span<const std::byte> span_of(const Bytes& bytes) {
+  return {reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()};
+}
+
 }  // namespace
 
 RenderOptions watched_by(const nb::object& progress, const nb::object& watcher,
@@ -143,22 +163,34 @@ RenderOptions watched_by(const nb::object& progress, const nb::object& watcher,
   return options;
 }
 
-std::function<void(Film&, PassState&)> resumed_from(const nb::dict& state) {
+std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::dict& state) {
   return [&state](Film& film, PassState& pass) {
     const nb::gil_scoped_acquire gil;
     for (const Film::Block& block : film.blocks()) {
       const Bytes bytes = bytes_of(state, "film." + block.name, block.bytes.size());
       std::memcpy(block.bytes.data(), bytes.data(), block.bytes.size());
     }
+    if (DeepFilm& deep = film.aovs().deep(); !deep.empty()) {
+      if (!state.contains("film.deep"))
+        throw Error("the state to resume from has no 'film.deep'; it is of another build");
+      deep.unpack(span_of(nb::cast<Bytes>(state["film.deep"])));
+    }
     pass.target = nb::cast<uint32_t>(state["pass.target"]);
     const auto active = nb::cast<Bytes>(state["pass.active"]);
     if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
     pass.active.assign(active.data(), active.data() + active.size());
-    if (!state.contains("pass.counts")) return;  // of a version that allotted nothing
-    const auto counts = nb::cast<Bytes>(state["pass.counts"]);
-    if (counts.size() != 0) bytes_of(state, "pass.counts", film.pixel_count() * sizeof(uint32_t));
-    pass.allotment.counts.resize(counts.size() / sizeof(uint32_t));
-    if (counts.size() != 0) std::memcpy(pass.allotment.counts.data(), counts.data(), counts.size());
+    // Neither is of a version that allotted, or learned, nothing.
+    if (state.contains("pass.counts")) {
+      const auto counts = nb::cast<Bytes>(state["pass.counts"]);
+      if (counts.size() != 0) bytes_of(state, "pass.counts", film.pixel_count() * sizeof(uint32_t));
+      pass.allotment.counts.resize(counts.size() / sizeof(uint32_t));
+      if (counts.size() != 0)
+        std::memcpy(pass.allotment.counts.data(), counts.data(), counts.size());
+    }
+    if (!state.contains("learned.field")) return std::vector<std::byte>();
+    const auto learned = nb::cast<Bytes>(state["learned.field"]);
+    const std::span<const std::byte> bytes = span_of(learned);
+    return std::vector<std::byte>(bytes.begin(), bytes.end());
   };
 }
 

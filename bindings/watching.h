@@ -12,5 +12,5 @@
 wavecomb::RenderOptions watched_by(const nanobind::object& progress,
                                    const nanobind::object& watcher, const nanobind::dict& settings);
 /// What RenderOptions::resume is to be for `state`, a Snapshot.state() of before.
-std::function<void(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
+std::function<std::vector<std::byte>(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
     const nanobind::dict& state);

@@ -241,8 +241,6 @@ def _keeping(
         return (None if shown is None else Watcher(sinks, reporter=reporter)), None
     from wavecomb.run.checkpoint import check_fits, load_checkpoint, make_header
 
-    if aov_names.DEEP in aovs:
-        raise WavecombError("checkpoints do not hold deep pictures: leave one of them out")
     header = make_header(scene, settings, stage=stage, source={}, aovs=aovs)
     before = load_checkpoint(resume) if resume is not None else None
     if before is not None:

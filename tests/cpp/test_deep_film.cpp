@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <random>
 
+#include "wavecomb/core/error.h"
+
 namespace wavecomb {
 namespace {
 
@@ -106,6 +108,43 @@ TEST(DeepFilm, MemoryIsBounded) {
   const DeepFilm film(1000, {16, 0.01f});
   EXPECT_EQ(sizeof(DeepBin), 40u);
   EXPECT_EQ(film.bytes(), 1000u * (1 + 16 * 40));
+}
+
+TEST(DeepFilm, GoesOnFromWhatWasPacked) {
+  std::mt19937 random(4);
+  const auto add = [&](DeepFilm& film, int count) {
+    std::uniform_real_distribution<float> depth(1, 9);
+    for (int i = 0; i < count; ++i) {
+      const float rgb[3] = {depth(random), 1, 2};
+      film.add(random() % 3, depth(random), i % 5 == 0, rgb);
+    }
+  };
+  const DeepLimits limits{4, 0.05f};
+  DeepFilm whole(3, limits), resumed(3, limits);
+  add(whole, 30);
+  resumed.unpack(whole.packed());
+  EXPECT_EQ(resumed.packed(), whole.packed());
+  const std::mt19937 before = random;
+  add(whole, 30);
+  random = before;
+  add(resumed, 30);
+  EXPECT_EQ(resumed.packed(), whole.packed());
+  EXPECT_EQ(resumed.layer({60, 60, 60}).values, whole.layer({60, 60, 60}).values);
+}
+
+TEST(DeepFilm, RefusesWhatIsOfAnotherPicture) {
+  DeepFilm film(2, {4, 0.05f});
+  const float rgb[3] = {1, 1, 1};
+  film.add(0, 1.f, false, rgb);
+  std::vector<std::byte> bytes = film.packed();
+  DeepFilm other(2, {4, 0.05f}), larger(200, {4, 0.05f});
+  EXPECT_THROW(larger.unpack(bytes), Error);
+  EXPECT_THROW(other.unpack({}), Error);
+  bytes[1] = std::byte{1};  // a bin that is not there
+  EXPECT_THROW(other.unpack(bytes), Error);
+  bytes[1] = std::byte{9};  // more than there is room for
+  bytes.resize(bytes.size() + 9 * sizeof(DeepBin));
+  EXPECT_THROW(other.unpack(bytes), Error);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "bsdf_testing.h"
 #include "lane_testing.h"
+#include "wavecomb/core/error.h"
 #include "wavecomb/learn/guide_field.h"
 #include "wavecomb/learn/guide_shares.h"
 #include "wavecomb/learn/guide_table.h"
@@ -225,6 +226,43 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_EQ(better.facts().guided_regions, better.facts().regions);
   EXPECT_LT(better.facts().moment_ratio, 0.2);
   EXPECT_NEAR(better.facts().guided_share, 0.75, 1e-6);
+}
+
+/// A field that is made of its parts again is the same; what would lead kernels astray is refused.
+TEST(Guide, IsMadeOfItsPartsAgain) {
+  const auto records = many_bounces(80000, 11);
+  const GuideField field(kUnitGrid, records, 3, true, true, size_t{64} << 20);
+  const GuideParts& parts = field.parts();
+  const GuideField again(kUnitGrid, parts, field.facts(), 3);
+  EXPECT_EQ(again.bytes(), field.bytes());
+  EXPECT_GT(parts.entries.size(), kGuideTopCells);
+  const Vec3<float> p{0.7f, 0.2f, 0.4f}, w = normalize(Vec3<float>{0.3f, 0.9f, 0.1f});
+  const auto density = [&](const GuideField& f) {
+    const GuideView view = f.view();
+    return guide_pdf<float>(view, find_guide<float>(view, p, 2u, 0u, true), w, true);
+  };
+  EXPECT_EQ(density(again), density(field));
+  const auto expect_refused = [&](const char* what, const auto& damage, size_t materials = 3) {
+    GuideParts bad = parts;
+    damage(bad);
+    EXPECT_THROW(GuideField(kUnitGrid, bad, {}, materials), Error) << what;
+  };
+  const auto entry = [&](uint32_t value) {
+    return [=](GuideParts& bad) { bad.entries[kGuideTopCells] = value; };
+  };
+  expect_refused("materials", [](GuideParts&) {}, 4);
+  expect_refused("a cell", entry(kGuideCell | static_cast<uint32_t>(parts.cells.size())));
+  expect_refused("a brick beyond", entry(static_cast<uint32_t>(parts.entries.size())));
+  expect_refused("a brick of its own", entry(kGuideTopCells));
+  expect_refused("no brick", entry(kGuideTopCells + 1));
+  expect_refused("cut", [](GuideParts& bad) { bad.entries.pop_back(); });
+  expect_refused("none", [](GuideParts& bad) { bad = {}; });
+  expect_refused("a region", [](GuideParts& bad) { bad.cells[0] = 1u << 30; });
+  expect_refused("a table", [](GuideParts& bad) { bad.tables.resize(kGuideWords); });
+  expect_refused("numbers", [](GuideParts& bad) { bad.tables[5] ^= 1u; });
+  expect_refused("a share", [](GuideParts& bad) { bad.bsdf_share[0] = 0; });
+  expect_refused("no number", [](GuideParts& bad) { bad.material_share[0] = NAN; });
+  expect_refused("survival", [](GuideParts& bad) { bad.survival.pop_back(); });
 }
 
 TEST(Guide, FacesTheirLargestComponent) {

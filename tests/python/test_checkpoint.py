@@ -15,6 +15,7 @@ import forks
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from stopping import StopAt
 
 import wavecomb
 from wavecomb.cli import main
@@ -40,24 +41,6 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def cornell(stage: Path) -> Any:
     return wavecomb.load(stage)
-
-
-class StopAt:
-    """Stops a render after so many snapshots, and keeps the state of the last."""
-
-    def __init__(self, snapshots: int) -> None:
-        self._left = snapshots
-        self.state: dict[str, Any] = {}
-
-    def progress(self, status: dict[str, Any]) -> str:
-        return "snapshot" if self._left > 0 else "stop"
-
-    def snapshot(self, snapshot: Any) -> None:
-        self._left -= 1
-        self.state = {
-            name: value.copy() if hasattr(value, "copy") else value
-            for name, value in snapshot.state().items()
-        }
 
 
 @pytest.mark.slow

@@ -11,11 +11,14 @@ import OpenImageIO as oiio
 import pytest
 from click.testing import CliRunner
 from parts import only_where
+from stopping import StopAt
 from usd_recorder import write
 
 import wavecomb
 from wavecomb import vdb
 from wavecomb.cli import main
+
+_core = pytest.importorskip("wavecomb._core")
 
 SIZE, SPP = (40, 30), 16
 CAMERA = """#usda 1.0
@@ -252,7 +255,6 @@ def test_the_command_writes_it(tmp_path: Path) -> None:
     ("options", "says"),
     [
         (["--deep", "a.png"], "--deep a.png: the name must end in .exr"),
-        (["--deep", "a.exr", "--checkpoint", "a.ckpt"], "does not hold the samples of a deep"),
         (["--deep", "a.exr", "--firefly", "reweight"], "give firefly keep"),
         (["--deep", "a.exr", "--transport", "light"], "does not go with the AOV deep"),
         (["--deep", "a.exr", "--film-memory", "0.01"], "--deep needs all of it at once"),
@@ -269,6 +271,58 @@ def test_what_cannot_be_is_refused(options: list[str], says: str, tmp_path: Path
         )
     assert run.exit_code == 2 and says in run.stderr, run.stderr
     assert len(run.stderr.strip().splitlines()) == 1 or "Usage" in run.stderr
+
+
+def test_it_goes_on_from_a_checkpoint(tmp_path: Path) -> None:
+    """Stopped a few times, with other threads and waves: the same bits as in one go."""
+    scene = wavecomb.load(write(tmp_path, CAMERA + LIT + _hair())).scene
+    settings: dict[str, Any] = {
+        **{"width": 48, "height": 40, "spp": 400, "aovs": ["alpha", "deep"], "deep_samples": 5}
+    }
+    whole = _core.render(scene, _core.Settings(**settings))
+    state: dict[str, Any] | None = None
+    for run in range(100):
+        watcher = StopAt(run % 2)
+        how = {"threads": 1 + run % 2, "wave_size": (64, 4096)[run % 2]}
+        part = _core.Settings(**settings, **how)
+        result = _core.render(scene, part, watcher=watcher, state=state, interval=0.02)
+        state = watcher.state
+        if not result.cancelled:
+            break
+    assert run > 0 and not result.cancelled
+    for one, other in zip(whole.deep, result.deep, strict=True):
+        assert np.array_equal(one, other)
+    counts, _ = whole.deep
+    assert state is not None and state["film.deep"].size == counts.size + 40 * counts.sum()
+    for bad in (state["film.deep"][:-1], np.full_like(state["film.deep"], 255)):
+        with pytest.raises(_core.Error, match="start anew"):
+            _core.render(scene, _core.Settings(**settings), state={**state, "film.deep": bad})
+
+
+def test_the_command_goes_on(tmp_path: Path) -> None:
+    stage, state = write(tmp_path, CAMERA + LIT), str(tmp_path / "a.ckpt")
+
+    def run(*options: str) -> Any:
+        words = ["render", str(stage), "-o", str(tmp_path / "a.exr"), "--quiet"]
+        return CliRunner().invoke(main, [*words, *options])
+
+    def deep(name: str, *options: str) -> Any:
+        file = str(tmp_path / name)
+        done = run("--deep", file, *options)
+        assert done.exit_code == 0, done.output
+        return oiio.ImageBuf(file)
+
+    size = ("--size", "32", "24", "--spp")
+    deep("half.exr", *size, "4", "--checkpoint", state)
+    refused = run("--resume", state)
+    assert refused.exit_code == 2 and "give --deep FILE.exr, too" in refused.stderr
+    more = deep("more.exr", "--resume", state, "--spp", "8")
+    whole = deep("whole.exr", *size, "8")
+    assert np.array_equal(_flattened(more), _flattened(whole))
+    plain = str(tmp_path / "b.ckpt")
+    assert run(*size, "4", "--checkpoint", plain).exit_code == 0
+    refused = run("--resume", plain, "--deep", str(tmp_path / "no.exr"))
+    assert refused.exit_code == 2 and "has no deep samples" in refused.stderr
 
 
 def test_farms_refuse_it(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from stopping import StopAt
 
 import wavecomb
 from wavecomb.cli import main
@@ -110,6 +111,93 @@ def test_a_resumed_picture_is_that_which_nothing_stopped(stage: Path, tmp_path: 
     state = str(tmp_path / "state.wcc")
     run("half.exr", "--spp", "64", "--checkpoint", state)
     assert np.array_equal(whole, run("again.exr", "--spp", "64", "--resume", state))
+
+
+def as_settings(**values: Any) -> Any:
+    return _core.Settings(**{"width": SIZE, "height": SIZE, "spp": SPP, **values})
+
+
+@pytest.fixture(scope="module")
+def stopped(cornell: Any) -> dict[str, Any]:
+    """The state of a guided render that was stopped on its way."""
+    stop = StopAt(1)
+    settings = as_settings(guiding="on", spp=128)
+    _core.render(cornell, settings, watcher=stop, interval=0.01)
+    assert 0 < stop.state["film.pixels"].view(np.uint32)[6::8].max() < 128
+    return stop.state
+
+
+def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str, Any]) -> None:
+    """Stopped anywhere, with other threads and lanes, and with nothing learned twice."""
+    way = {"guiding": "on", "spp": 128}
+    whole = _core.render(cornell, as_settings(**way))
+    again = _core.render(
+        cornell, as_settings(**way, threads=1, lanes=1, wave_size=512), state=stopped
+    )
+    assert np.array_equal(again.beauty, whole.beauty)
+    told, before = again.stats["guiding"], whole.stats["guiding"]
+    assert told["kept"] and not before["kept"] and told["seconds"] == 0
+    for fact in before:
+        if fact not in ("seconds", "kept"):
+            assert told[fact] == before[fact], fact
+    field = before["field_bytes"]
+    assert field <= stopped["learned.field"].size <= field + 4096
+    # A checkpoint of an older version has no field: it is learned again.
+    older = {name: value for name, value in stopped.items() if name != "learned.field"}
+    again = _core.render(cornell, as_settings(**way), state=older)
+    assert np.array_equal(again.beauty, whole.beauty) and not again.stats["guiding"]["kept"]
+
+
+def test_more_samples_are_guided_as_those_before(cornell: Any, stopped: dict[str, Any]) -> None:
+    """The longer render would have learned another field; this one goes on with what it has."""
+    more = _core.render(cornell, as_settings(guiding="on", spp=160), state=stopped)
+    learned = more.stats["guiding"]
+    assert learned["kept"] and learned["paths"] == pytest.approx(SIZE * SIZE * 128 / 8, rel=0.08)
+    assert (more.samples == 160).all()
+
+
+def test_a_render_that_finds_it_does_not_pay_keeps_that(cornell: Any) -> None:
+    part = as_settings(guiding="auto", spp=4900, region=(0, 0, 2, 1))
+    stop = StopAt(1)
+    _core.render(cornell, part, watcher=stop, interval=0.01)
+    again = _core.render(cornell, part, state=stop.state).stats["guiding"]
+    assert again["kept"] and not again["used"] and again["gain"] > 0
+
+
+def test_what_is_learned_is_kept_for_the_next_render_of_a_scene(cornell: Any) -> None:
+    renderer = _core.Renderer(cornell)
+    way: dict[str, Any] = {"guiding": "on", "roulette": "efficient"}
+    first = renderer.render(as_settings(**way))
+    assert not first.stats["guiding"]["kept"]
+    for other in ({"seed": 3}, {"region": (3, 4, 40, 50)}, {"aovs": ["depth"], "wave_size": 64}):
+        settings = as_settings(**way, **other)
+        next_one = renderer.render(settings)
+        assert next_one.stats["guiding"]["kept"], other
+        assert np.array_equal(next_one.beauty, _core.render(cornell, settings).beauty), other
+    assert not renderer.render(as_settings(**way, max_depth=3)).stats["guiding"]["kept"]
+    renderer.edit(camera=cornell.camera)
+    assert not renderer.render(as_settings(**way, max_depth=3)).stats["guiding"]["kept"]
+
+
+def test_a_damaged_field_is_refused(cornell: Any, stopped: dict[str, Any]) -> None:
+    settings = as_settings(guiding="on", spp=129, region=(0, 0, 2, 2))
+    good = stopped["learned.field"]
+    rng = np.random.default_rng(6)
+    for cut in (0, 1, 3, 90, good.size - 1):
+        if cut > 0:
+            with pytest.raises(_core.Error, match="start anew"):
+                _core.render(cornell, settings, state={**stopped, "learned.field": good[:cut]})
+    refused = 0
+    for _ in range(30):
+        bad = good.copy()
+        at = rng.integers(0, good.size, 8)
+        bad[at] = rng.integers(0, 256, 8)
+        try:
+            _core.render(cornell, settings, state={**stopped, "learned.field": bad})
+        except _core.Error as error:
+            assert "start anew" in str(error)
+            refused += 1
+    assert refused > 20
 
 
 @pytest.mark.parametrize("name", ["cornell", "mixed"])

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -106,14 +106,26 @@ class Asked:
         return self.purpose.whole or ("" if self.deep is None else "--deep")
 
     def check_deep(self) -> None:
-        """Raises WavecombError where --deep is given with what it does not go with."""
+        """Raises WavecombError where a deep picture is asked for as a layer."""
         if aov_names.DEEP in self.layers.aovs:
             raise WavecombError("--aov deep: is no layer; give --deep FILE.exr")
-        kept = self.purpose.checkpoint_file
-        if self.deep is not None and kept is not None:
+
+    def check_deep_resumed(self, kept: Iterable[str]) -> None:
+        """Raises WavecombError unless --deep is given as it was before.
+
+        Args:
+            kept: AOVs of the render that goes on.
+        """
+        had = aov_names.DEEP in kept
+        if had and self.deep is None:
             raise WavecombError(
-                f"--deep {self.deep}: a checkpoint ({kept}) does not hold the samples of a deep "
-                "picture: leave --checkpoint and --resume out"
+                f"{self.purpose.resume}: is of a render with a deep picture: "
+                "give --deep FILE.exr, too"
+            )
+        if self.deep is not None and not had:
+            raise WavecombError(
+                f"--deep {self.deep}: {self.purpose.resume} has no deep samples: "
+                "leave --deep out, or start anew"
             )
 
 
@@ -178,6 +190,8 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         chosen = {**_without_overscan(resumed.settings), **chosen}
         source = source.completed(resumed.source)
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
+    if resumed is not None:
+        asked.check_deep_resumed(kept)
     before = None if resumed is None else resumed.aovs
     choices, opened = peek(source, asked.stage)
     plans = plan_products(choices, asked.output, beside, purpose, asked.frames, asked.output_dir)

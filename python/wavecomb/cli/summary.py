@@ -82,9 +82,8 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
             line += f"; expected efficiency {allotted['gain']:.2f} of even"
         lines.append(line)
     if learned := stats.get("guiding"):
-        line = (
-            f"learned from {count_text(learned['paths'])} paths in {time_text(learned['seconds'])}"
-        )
+        took = "before" if learned["kept"] else f"in {time_text(learned['seconds'])}"
+        line = f"learned from {count_text(learned['paths'])} paths {took}"
         if learned["gain"]:
             line += f", expected efficiency {learned['gain']:.2f} of without"
         if not learned["used"]:

@@ -29,8 +29,8 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "&Picture",
         (
-            "brighter", "darker", "exposure_0", "-", "next_layer", "last_layer", "beauty", "-",
-            "fit", "full", "zoom_in", "zoom_out",
+            "brighter", "darker", "exposure_0", "-", "next_layer", "last_layer", "beauty",
+            "expression", "-", "fit", "full", "zoom_in", "zoom_out",
         ),
     ),
     (
@@ -130,6 +130,10 @@ def entries(window: Window) -> list[Entry]:
         Entry("next_layer", "&Next layer", lambda: display.step_layer(1), ["."], local=True),
         Entry("last_layer", "&Last layer", lambda: display.step_layer(-1), [","], local=True),
         Entry("beauty", "Bea&uty", lambda: display.choose_layer("beauty"), ["B"], local=True),
+        Entry(
+            "expression", "Light &path expression\u2026", display.ask_expression, [],
+            "Write an expression; the light of the paths that match is a layer",
+        ),
         Entry("fit", "&Fit the picture", lambda: viewport.set_zoom(None), ["Ctrl+0"]),
         Entry("full", "&100 %", lambda: viewport.set_zoom(1.0), ["Ctrl+1"]),
         Entry(

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 REL_MSE_FLOOR = 0.01
 TRIMMED_SHARE = 0.001
-_REC709 = (0.2126, 0.7152, 0.0722)
 
 
 @dataclass(frozen=True)
@@ -175,10 +174,12 @@ def luminance(pixels: NDArray[Any]) -> NDArray[Any]:
     """Rec.709 luminance in float64, (height, width); of fewer than 3 channels the first."""
     import numpy as np
 
+    from wavecomb.picture.working_space import LUMINANCE
+
     values = np.asarray(pixels, dtype=np.float64)
     if values.shape[2] < 3:
         return values[:, :, 0]
-    return values[:, :, :3] @ np.asarray(_REC709)
+    return values[:, :, :3] @ np.asarray(LUMINANCE)
 
 
 def _comparison(

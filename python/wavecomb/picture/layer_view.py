@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wavecomb.picture import image
 from wavecomb.picture.colour_maps import colour_map
+from wavecomb.picture.working_space import LUMINANCE
 
 Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
 """Linear Rec.709, (height, width, 3), to 8-bit codes."""
@@ -127,7 +128,7 @@ def show_layer(
         return Shown(_codes(_stretched(array)))
     if array.ndim == 3:
         with np.errstate(invalid="ignore"):  # an infinite variance: not known yet
-            array = array @ np.array((0.2126, 0.7152, 0.0722), np.float32)
+            array = array @ np.array(LUMINANCE, np.float32)
     return heat(array, name, low, high)
 
 

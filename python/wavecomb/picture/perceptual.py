@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from wavecomb.extras import needed
 from wavecomb.picture.compare import colour_pair
 from wavecomb.picture.image import srgb_from_linear
+from wavecomb.picture.working_space import LUMINANCE
 
 if TYPE_CHECKING:
     from wavecomb.picture.compare import Source
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 Metric = Literal["psnr", "ssim", "flip-ldr", "flip-hdr"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 
-_REC709 = (0.2126, 0.7152, 0.0722)
 _SSIM_SIGMA = 1.5
 _SSIM_RADIUS = 5
 
@@ -66,7 +66,7 @@ def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
     pixels_a, pixels_b = colour_pair(a, b)
     if min(pixels_a.shape[:2]) < 2 * _SSIM_RADIUS + 1:
         raise ValueError("SSIM needs pictures of at least 11 x 11 pixels")
-    x, y = (shown(p, exposure).astype(np.float64) @ _REC709 for p in (pixels_a, pixels_b))
+    x, y = (shown(p, exposure).astype(np.float64) @ LUMINANCE for p in (pixels_a, pixels_b))
 
     def window(values: NDArray[np.float64]) -> NDArray[np.float64]:
         blurred: NDArray[np.float64] = ndimage.gaussian_filter(

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The colour spaces that pictures may be computed in."""
+"""The colour spaces that pictures may be computed in.
+
+Linear Rec.709 (the default), and ACEScg: the primaries AP1 with the white of ACES.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-"""Linear Rec.709 (the default), and ACEScg: the primaries AP1 with the white of ACES."""
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""What red, green and blue of linear Rec.709 weigh in its luminance (ITU-R BT.709)."""
 
 CHROMATICITIES = {
     "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
+from wavecomb.picture.working_space import LUMINANCE
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
@@ -30,7 +31,6 @@ PASSES: tuple[Mapping[str, str], ...] = (
 )
 """How the stage is loaded for the two renders of catchers, in place of its own options."""
 _LAYERS = ("direct", "indirect", LAYER)
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def check(settings: Settings, given: Mapping[str, Any]) -> None:
@@ -83,8 +83,8 @@ def caught(picture: Picture, render: Callable[[Mapping[str, str]], Result]) -> P
 
 def _light_of(result: Result) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What catchers reflect, and their share of each pixel."""
-    light = (result.aovs["direct"].astype(np.float64) + result.aovs["indirect"]) @ _LUMINANCE
-    return light, result.aovs[LAYER].astype(np.float64)
+    light = result.aovs["direct"].astype(np.float64) + result.aovs["indirect"]
+    return light @ np.array(LUMINANCE), result.aovs[LAYER].astype(np.float64)
 
 
 def with_shadows(

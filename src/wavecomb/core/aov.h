@@ -147,6 +147,7 @@ struct AovSet {
   });
 
   uint32_t bits = kUsual;
+  bool operator==(const AovSet&) const = default;
 
   bool has(Aov a) const { return any(static_cast<uint32_t>(a)); }
   bool has(AovKind kind) const { return any(aov_bits(kind)); }

@@ -68,6 +68,7 @@ struct Region {
   uint32_t width() const { return x1 - x0; }
   uint32_t height() const { return y1 - y0; }
   uint64_t pixels() const { return uint64_t{width()} * height(); }
+  bool operator==(const Region&) const = default;
   /// Number of a pixel of it, row by row.
   size_t index(uint32_t x, uint32_t y) const { return size_t{y - y0} * width() + (x - x0); }
 };
@@ -149,6 +150,7 @@ struct Settings {
   bool keeps_error() const { return error || is_adaptive() || allots(); }
   /// Throws Error naming the option and what it may be.
   void check() const;
+  bool operator==(const Settings&) const = default;
 };
 
 /// What of some settings paths from lights do not go with, and what to give in its place; empty:

@@ -102,7 +102,7 @@ class AovFilm {
   /// The deep picture, whose sums are freed; empty where none is kept.
   DeepLayer take_deep(const std::vector<uint32_t>& samples);
   /// Runs block(name, values) for each vector of sums, for checkpoints; those
-  /// of a deep picture are not kept.
+  /// of a deep picture have DeepFilm::packed().
   template <typename Block>
   void for_each_block(const Block& block) {
     for (const AovRow& row : kAovs) {

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <limits>
+#include <numeric>
 
+#include "wavecomb/core/error.h"
 #include "wavecomb/film/storage.h"
 
 namespace wavecomb {
@@ -91,6 +94,36 @@ DeepLayer DeepFilm::layer(const std::vector<uint32_t>& samples) const {
     }
   }
   return out;
+}
+
+std::vector<std::byte> DeepFilm::packed() const {
+  const size_t bins = std::accumulate(used_.begin(), used_.end(), size_t{0});
+  std::vector<std::byte> out(used_.size() + bins * sizeof(DeepBin));
+  if (empty()) return out;
+  std::memcpy(out.data(), used_.data(), used_.size());
+  std::byte* to = out.data() + used_.size();
+  for (size_t pixel = 0; pixel < used_.size(); ++pixel)
+    for (uint32_t i = 0; i < used_[pixel]; ++i, to += sizeof(DeepBin))
+      std::memcpy(to, &bin(pixel, i), sizeof(DeepBin));
+  return out;
+}
+
+void DeepFilm::unpack(std::span<const std::byte> bytes) {
+  const auto check = [](bool is_good) {
+    if (!is_good)
+      throw Error("the state to resume from has deep samples of another picture; start anew");
+  };
+  check(bytes.size() >= used_.size());
+  std::vector<uint8_t> used(used_.size());
+  if (!used.empty()) std::memcpy(used.data(), bytes.data(), used.size());
+  check(std::all_of(used.begin(), used.end(), [&](uint8_t n) { return n <= limits_.most; }));
+  const size_t bins = std::accumulate(used.begin(), used.end(), size_t{0});
+  check(bytes.size() == used.size() + bins * sizeof(DeepBin));
+  const std::byte* from = bytes.data() + used.size();
+  used_ = std::move(used);
+  for (size_t pixel = 0; pixel < used_.size(); ++pixel)
+    for (uint32_t i = 0; i < used_[pixel]; ++i, from += sizeof(DeepBin))
+      std::memcpy(&bin(pixel, i), from, sizeof(DeepBin));
 }
 
 }  // namespace wavecomb

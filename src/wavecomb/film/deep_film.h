@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <new>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -77,6 +78,11 @@ class DeepFilm {
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
   /// The samples of all pixels; `samples` are those that each pixel got.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
+  /// All that it holds, for checkpoints: how many bins each pixel has, a byte each, then the bins
+  /// that are used, pixel by pixel.
+  std::vector<std::byte> packed() const;
+  /// Makes an empty film that of packed() bytes. Throws Error where they are of another picture.
+  void unpack(std::span<const std::byte> bytes);
   /// The most that it can take.
   size_t bytes() const { return used_.size() * (1 + limits_.most * sizeof(DeepBin)); }
 

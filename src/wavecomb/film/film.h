@@ -85,8 +85,8 @@ class Film {
   /// samples. Empty without error sums.
   std::vector<float> variance() const;
 
-  /// All that the film holds, for checkpoints: what is copied out of the blocks of one film and
-  /// into those of another of the same size makes it the same.
+  /// All that the film holds but for deep samples, for checkpoints: what is copied out of the
+  /// blocks of one film and into those of another of the same size makes it the same.
   struct Block {
     std::string name;
     std::span<std::byte> bytes;

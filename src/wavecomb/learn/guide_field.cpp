@@ -52,7 +52,7 @@ class GuideFieldBuilder {
  public:
   GuideFieldBuilder(GuideField& field, std::span<const TrainingRecord> records, size_t materials,
                     bool first, bool guides)
-      : field_(field), first_(first), guides_(guides) {
+      : field_(field), parts_(field.parts_), first_(first), guides_(guides) {
     std::vector<std::pair<uint32_t, uint32_t>> order(records.size());
     for (uint32_t i = 0; i < records.size(); ++i)
       order[i] = {code_of(field.grid_, records[i].p), i};
@@ -72,19 +72,19 @@ class GuideFieldBuilder {
 
   void build(size_t cell_records) {
     cell_records_ = cell_records;
-    field_.entries_.assign(kGuideTopCells, kGuideCell);
-    field_.cells_.clear();
-    field_.tables_.clear();
-    field_.bsdf_share_.clear();
+    parts_.entries.assign(kGuideTopCells, kGuideCell);
+    parts_.cells.clear();
+    parts_.tables.clear();
+    parts_.bsdf_share.clear();
     field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
     bring_ = off_ = on_ = 0;
     guided_ = 0;
     for (RegionPart& part : levels_[0]) part = {};
     divide(0, 0, 0, records_.size());
     GuideFacts& facts = field_.facts_;
-    facts.cells = static_cast<uint32_t>(field_.cells_.size() / kGuideAxes);
-    facts.regions = static_cast<uint32_t>(field_.bsdf_share_.size());
-    for (const float a : field_.bsdf_share_) facts.guided_regions += a < 1 ? 1 : 0;
+    facts.cells = static_cast<uint32_t>(parts_.cells.size() / kGuideAxes);
+    facts.regions = static_cast<uint32_t>(parts_.bsdf_share.size());
+    for (const float a : parts_.bsdf_share) facts.guided_regions += a < 1 ? 1 : 0;
     if (bring_ > 0) facts.guided_share = guided_ / bring_;
     if (off_ > 0) facts.moment_ratio = on_ / off_;
   }
@@ -100,16 +100,16 @@ class GuideFieldBuilder {
   using Cell = std::array<RegionPart, kGuideAxes>;
 
   void weigh_materials(size_t materials) {
-    field_.material_share_.assign(std::max<size_t>(materials, 1), 0.f);
+    parts_.material_share.assign(std::max<size_t>(materials, 1), 0.f);
     if (first_) return;
-    std::vector<ShareMoments> moments(field_.material_share_.size());
+    std::vector<ShareMoments> moments(parts_.material_share.size());
     const double cut = largest(records_);
     for (size_t i = 0; i < records_.size(); ++i)
       if (const TrainingRecord& r = records_[i]; r.material < moments.size())
         moments[r.material].add(ratios_[i], std::min(double{r.value}, cut));
     for (size_t m = 0; m < moments.size(); ++m)
       if (moments[m].count >= kMaterialRecords)
-        field_.material_share_[m] = kBsdfShares[moments[m].best()];
+        parts_.material_share[m] = kBsdfShares[moments[m].best()];
   }
 
   /// No value counts for more: of n, root n means, so that none outweighs all others.
@@ -154,13 +154,13 @@ class GuideFieldBuilder {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kOwnRecords) return depth > 0 ? region_of(depth - 1, axis) : kNoGuideRegion;
     if (part.region != kNoGuideRegion) return part.region;
-    part.region = static_cast<uint32_t>(field_.bsdf_share_.size());
-    const size_t at = field_.tables_.size();
-    field_.tables_.resize(at + kGuideWords);
-    write_guide_table(part.density, std::span(field_.tables_).subspan(at).first<kGuideWords>());
-    field_.bsdf_share_.push_back(!guides_ ? 1.f
-                                 : first_ ? kFirstShare
-                                          : kBsdfShares[part.moments.best()]);
+    part.region = static_cast<uint32_t>(parts_.bsdf_share.size());
+    const size_t at = parts_.tables.size();
+    parts_.tables.resize(at + kGuideWords);
+    write_guide_table(part.density, std::span(parts_.tables).subspan(at).first<kGuideWords>());
+    parts_.bsdf_share.push_back(!guides_ ? 1.f
+                                : first_ ? kFirstShare
+                                         : kBsdfShares[part.moments.best()]);
     return part.region;
   }
 
@@ -187,19 +187,19 @@ class GuideFieldBuilder {
   }
 
   void add_cell(uint32_t depth, uint32_t code, size_t begin, size_t end) {
-    const auto cell = static_cast<uint32_t>(field_.cells_.size() / kGuideAxes);
+    const auto cell = static_cast<uint32_t>(parts_.cells.size() / kGuideAxes);
     for (uint32_t axis = 0; axis < kGuideAxes; ++axis)
-      field_.cells_.push_back(region_of(depth, axis));
+      parts_.cells.push_back(region_of(depth, axis));
     fill(depth, code, kGuideCell | cell);
-    const uint32_t* regions = field_.cells_.data() + size_t{cell} * kGuideAxes;
+    const uint32_t* regions = parts_.cells.data() + size_t{cell} * kGuideAxes;
     for (size_t i = begin; i < end; ++i) {
       const TrainingRecord& r = records_[i];
       const uint32_t region = regions[r.axis];
       float a = 1;
       if (region != kNoGuideRegion)
-        a = std::max(field_.bsdf_share_[region], r.material < field_.material_share_.size()
-                                                     ? field_.material_share_[r.material]
-                                                     : 0.f);
+        a = std::max(parts_.bsdf_share[region], r.material < parts_.material_share.size()
+                                                    ? parts_.material_share[r.material]
+                                                    : 0.f);
       const double brought = double{r.weight} * double{r.value};
       bring_ += brought;
       guided_ += a < 1 ? brought * (1 - double{a}) : 0;
@@ -214,7 +214,7 @@ class GuideFieldBuilder {
   void fill(uint32_t depth, uint32_t code, uint32_t entry) {
     const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
                    z = compact_bits_3(code >> 2);
-    std::vector<uint32_t>& entries = field_.entries_;
+    std::vector<uint32_t>& entries = parts_.entries;
     uint32_t bits = kGuideTopBits, first = 0, width = kGuideTopBits;
     for (;;) {
       const uint32_t shift = kGuideBits - bits, mask = (1u << width) - 1;
@@ -242,6 +242,7 @@ class GuideFieldBuilder {
   }
 
   GuideField& field_;
+  GuideParts& parts_;  ///< of the field
   bool first_, guides_;
   std::vector<TrainingRecord> records_;  ///< in the order of their codes
   std::vector<ShareRatios> ratios_;      ///< of the same; none in the first round
@@ -263,6 +264,12 @@ GuideField::GuideField(const GuideGrid& grid, std::span<const TrainingRecord> re
   weigh_bounces({}, {});
 }
 
+GuideField::GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts,
+                       size_t materials)
+    : grid_(grid), parts_(std::move(parts)), facts_(facts) {
+  check_guide_parts(parts_, materials);
+}
+
 uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis) {
   return uint64_t{code_of(grid, {p.x, p.y, p.z})} << 3 | axis;
 }
@@ -271,16 +278,16 @@ void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const Path
   struct Sums {
     double count = 0, value = 0, squared = 0, cost = 0;
   };
-  const size_t regions = bsdf_share_.size();
+  const size_t regions = parts_.bsdf_share.size();
   std::vector<Sums> sums(regions + 1);  // the last: of all
-  survival_.assign(regions, 0.f);
+  parts_.survival.assign(regions, 0.f);
   const auto for_each = [&, v = view()](const auto& add) {
     for (const BounceLesson& lesson : lessons) {
       if (!v.grid) break;
       const auto code = static_cast<uint32_t>(lesson.place >> 3);
       const uint32_t cell = detail::guide_cell<float>(
           v, compact_bits_3(code), compact_bits_3(code >> 1), compact_bits_3(code >> 2), true);
-      const uint32_t region = cells_[size_t{cell} * kGuideAxes + (lesson.place & 7u)];
+      const uint32_t region = parts_.cells[size_t{cell} * kGuideAxes + (lesson.place & 7u)];
       if (region != kNoGuideRegion) add(sums[region], lesson);
       add(sums[regions], lesson);
     }
@@ -297,7 +304,7 @@ void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const Path
   for (size_t i = 0; i < regions; ++i) {
     const Sums& s = sums[i].count >= kOwnRecords ? sums[i] : sums[regions];
     if (s.cost > 0 && paths.variance > 0)
-      survival_[i] = static_cast<float>(
+      parts_.survival[i] = static_cast<float>(
           std::sqrt(std::max(s.squared, 0.0) / s.cost * paths.cost / paths.variance));
   }
 }
@@ -308,19 +315,18 @@ GuideView GuideField::view() const {
     view.lo[i] = grid_.lo[i];
     view.scale[i] = grid_.scale[i];
   }
-  if (bsdf_share_.empty()) return view;
-  view.grid = entries_.data();
-  view.cells = cells_.data();
-  view.tables = tables_.data();
-  view.bsdf_share = bsdf_share_.data();
-  view.survival = survival_.data();
-  view.material_share = material_share_.data();
+  if (parts_.bsdf_share.empty()) return view;
+  view.grid = parts_.entries.data();
+  view.cells = parts_.cells.data();
+  view.tables = parts_.tables.data();
+  view.bsdf_share = parts_.bsdf_share.data();
+  view.survival = parts_.survival.data();
+  view.material_share = parts_.material_share.data();
   return view;
 }
 
 size_t GuideField::bytes() const {
-  return (entries_.size() + cells_.size() + tables_.size()) * sizeof(uint32_t) +
-         (bsdf_share_.size() + material_share_.size() + survival_.size()) * sizeof(float);
+  return parts_.bytes();
 }
 
 }  // namespace wavecomb

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "wavecomb/core/vec3.h"
+#include "wavecomb/learn/guide_parts.h"
 #include "wavecomb/learn/guide_view.h"
 #include "wavecomb/learn/training_record.h"
 #include "wavecomb/learn/worth.h"
@@ -57,6 +58,8 @@ class GuideField {
   /// stay larger where it would else take more.
   GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records, size_t materials,
              bool first, bool guides, size_t most_bytes);
+  /// A field of before, of a scene with so many materials. Throws Error where `parts` are none.
+  GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts, size_t materials);
 
   /// Tells the regions what their bounces are worth, by bounces with and without light.
   void weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths);
@@ -64,13 +67,13 @@ class GuideField {
   GuideView view() const;
   size_t bytes() const;
   const GuideFacts& facts() const { return facts_; }
+  const GuideParts& parts() const { return parts_; }
 
  private:
   friend class GuideFieldBuilder;
 
   GuideGrid grid_;
-  std::vector<uint32_t> entries_, cells_, tables_;
-  std::vector<float> bsdf_share_, material_share_, survival_;
+  GuideParts parts_;
   GuideFacts facts_;
 };
 

@@ -183,6 +183,11 @@ GuideView view_of(const GuideTraining& training) {
   return view;
 }
 
+GuideGrid grid_of(const Scene& scene) {
+  const Bounds& b = scene.bounds();
+  return {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}};
+}
+
 GuideTraining train_guide(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
                           const std::function<bool()>& stopped) {
   const Clock::time_point start = Clock::now();
@@ -209,8 +214,7 @@ GuideTraining train_guide(const WaveContext& render, const Scene& scene, const T
   context.aovs = nullptr;
   context.recorder = nullptr;
   context.discards = true;
-  const Bounds& b = scene.bounds();
-  const GuideGrid grid({b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z});
+  const GuideGrid grid = grid_of(scene);
   auto field = std::make_unique<const GuideField>(grid);
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
   std::optional<PictureTiles> tiles;

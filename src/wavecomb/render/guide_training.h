@@ -31,17 +31,21 @@ struct GuideStatistics {
   double survival = 1;
   bool used = false;  ///< whether the picture is guided, or its roulette told, by the field
   double seconds = 0;
+  bool is_kept = false;  ///< learned by a render that this one goes on with
 };
 
 /// What came of it.
 struct GuideTraining {
-  std::unique_ptr<const GuideField> field;  ///< null: nothing was learned
+  std::shared_ptr<const GuideField> field;  ///< null: nothing was learned
   std::optional<PictureTiles> tiles;        ///< of the picture, with a field
   GuideStatistics statistics;
 };
 
 /// The field and the tiles as kernels read them. Contract: valid as long as `training`.
 GuideView view_of(const GuideTraining& training);
+
+/// The grid of a scene's field.
+GuideGrid grid_of(const Scene& scene);
 
 /// How training paths are run.
 struct TrainingMeans {

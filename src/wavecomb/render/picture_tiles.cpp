@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "wavecomb/core/error.h"
 
 namespace wavecomb {
 namespace {
@@ -48,6 +51,14 @@ PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> p
     inverse_.push_back(1 / (unit * std::sqrt(m * m + least)));
     table_.push_back(static_cast<float>(inverse_.back()));
   }
+}
+
+PictureTiles::PictureTiles(const Settings& settings, std::vector<double> inverse_scales)
+    : width_(settings.width), height_(settings.height), inverse_(std::move(inverse_scales)) {
+  while (rows_ < kMostRows && rows_ * rows_ < inverse_.size()) ++rows_;
+  if (!inverse_.empty() && inverse_.size() != count())
+    throw Error("the brightness of the picture that was learned before is damaged; start anew");
+  for (const double scale : inverse_) table_.push_back(static_cast<float>(scale));
 }
 
 void PictureTiles::apply(GuideView& view) const {

@@ -18,6 +18,8 @@ class PictureTiles {
   /// Path i is of pixel pixels[i] (x | y << 16) and brought luminance[i].
   PictureTiles(const Settings& settings, std::span<const uint32_t> pixels,
                std::span<const float> luminance);
+  /// Tiles of before: inverse_scales() of a picture of this size. Throws Error for what cannot be.
+  PictureTiles(const Settings& settings, std::vector<double> inverse_scales);
 
   uint32_t count() const { return rows_ * rows_; }
   /// The tile of a pixel.
@@ -27,6 +29,8 @@ class PictureTiles {
   /// One over the scale of the picture at a pixel: of the mean of what paths of its tile bring,
   /// none above 64 medians. Contract: is_lit().
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
+  /// By tile, row by row; empty where no path brought light.
+  const std::vector<double>& inverse_scales() const { return inverse_; }
   /// Lets kernels know it, where any path brought light.
   void apply(GuideView& view) const;
 

@@ -18,6 +18,7 @@
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/render/guide_training.h"
+#include "wavecomb/render/kept_training.h"
 #include "wavecomb/render/light_aiming.h"
 #include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/light_paths.h"
@@ -47,6 +48,7 @@ struct WavefrontRenderer::Impl {
   RenderStatistics statistics;
   CostProfile profile;  ///< after the last render
   LightCalibrationCache light_calibrations, trial_calibrations;
+  GuideTrainingCache trainings;
 
   /// Renders with settings whose transport is chosen.
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
@@ -231,7 +233,8 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   if (settings.firefly == Firefly::kReweight)
     film.keep_cascades(scene_brightness(scene) * kDarkestShare);
   PassState pass;
-  if (options.resume) options.resume(film, pass);
+  std::vector<std::byte> learned_before;
+  if (options.resume) learned_before = options.resume(film, pass);
   const uint64_t pixels = settings.rendered().pixels();
   const uint32_t wave_size = wave_size_for(settings, pixels);
   SceneView scene_view = scene.view();
@@ -280,8 +283,10 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
       aiming = learn_to_aim(context, scene, means, [&] { return watch.stopped(); });
       if (aiming.aim.count > 0) context.scene.lights.aim = &aiming.aim;
     }
-    training = std::make_shared<const GuideTraining>(
-        train_guide(context, scene, means, [&] { return watch.stopped(); }));
+    training = learned_before.empty()
+                   ? trainings.get(this->scene, context, means, [&] { return watch.stopped(); })
+                   : std::make_shared<const GuideTraining>(
+                         unpacked_training(learned_before, scene, settings));
     if (training->field) {
       guide = view_of(*training);
       context.guide = &guide;
@@ -326,7 +331,8 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   const auto snapshot = [&](bool finished) {
     check_textures();
     if (options.snapshot)
-      options.snapshot({film, loop.pass(), loop.status(), finished, aovs.kept_names, taken});
+      options.snapshot(
+          {film, loop.pass(), *training, loop.status(), finished, aovs.kept_names, taken});
   };
   const tbb::global_control parallelism(
       tbb::global_control::max_allowed_parallelism,

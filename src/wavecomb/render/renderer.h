@@ -2,6 +2,7 @@
 /// Renders a scene: passes of waves, progress, cancellation, statistics.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -52,8 +53,9 @@ struct RenderOptions {
   std::function<Request(const RenderStatus&)> progress{};
   /// Called where progress asked for it, and at the end in any case.
   std::function<void(const Snapshot&)> snapshot{};
-  /// Fills the empty film and the pass with what a snapshot of a render with these settings held.
-  std::function<void(Film&, PassState&)> resume{};
+  /// Fills the empty film and the pass with what a snapshot of a render with these settings held,
+  /// and gives the packed_training() of that; empty: it is learned again.
+  std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
   /// Replaces the one that the settings name.
   const SchedulingPolicy* policy = nullptr;
   /// Costs to start from, for the order and for roulette; what it does not know is measured on

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "wavecomb/film/film.h"
+#include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/pass_loop.h"
 #include "wavecomb/render/render_statistics.h"
 
@@ -17,6 +18,7 @@ namespace wavecomb {
 struct Snapshot {
   Film& film;
   const PassState& pass;
+  const GuideTraining& training;  ///< what was learned before the first pass, if anything
   RenderStatus status;
   bool finished;  ///< done, cancelled or out of time: there is no more to come
   const std::vector<std::string>& light_groups;  ///< that the film keeps

@@ -21,14 +21,18 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import theme
 from wavecomb.gui.viewport import display, ocio
+from wavecomb.gui.viewport.expression_dialog import ExpressionDialog
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import caption, choice, named, real, set_quietly
 from wavecomb.run import aovs as aov_names
+from wavecomb.run import expressions
 
 EXPOSURE = 10.0
 """Stops, to both sides."""
+EXPRESSION = expressions.PREFIX
+"""Among the layers: asks for a light path expression."""
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 
 
@@ -38,6 +42,15 @@ def _titles() -> dict[str, str]:
     own = {name: row.title for name, row in aov_names.core_aovs().items() if row.title}
     last = {"samples": "Samples", "error": "Error", "variance": "Variance"}
     return {"beauty": "Beauty", "denoised": "Denoised", **own, **last}
+
+
+def _title(layer: str) -> str:
+    """A layer as the bar calls it."""
+    if layer == EXPRESSION:
+        return "Light path\u2026"
+    if layer.startswith(expressions.LAYER):
+        return layer.removeprefix(expressions.LAYER) + " (light path)"
+    return _titles().get(layer, layer.removeprefix(aov_names.LIGHT) + " (light group)")
 
 
 class DisplayBar(QToolBar):
@@ -54,6 +67,7 @@ class DisplayBar(QToolBar):
         self.setObjectName("display")
         self._session, self._viewport = session, viewport
         self._denoising = session.setup.denoise
+        self._dialog: ExpressionDialog | None = None
         self.layer = choice(
             "display.layer",
             "Layer",
@@ -61,7 +75,7 @@ class DisplayBar(QToolBar):
             [],
             lambda text: self.choose_layer(self.layer.currentData()),
         )
-        self._fill_layers(())
+        self._fill_layers()
         self.exposure = real(
             "display.exposure",
             "Exposure",
@@ -138,31 +152,49 @@ class DisplayBar(QToolBar):
 
     # ---- layers ----------------------------------------------------------------------------------
 
-    def _fill_layers(self, further: tuple[str, ...]) -> None:
-        names = ["beauty", "denoised", *(n for n in _titles() if n not in ("beauty", "denoised"))]
-        names += [name for name in further if name not in names]
+    def _fill_layers(self) -> None:
+        """Those with titles, light groups where there are several, expressions that are kept."""
+        scene, names = self._session.scene, list(_titles())
+        groups = () if scene is None else scene.light_groups
+        further = [aov_names.LIGHT + group for group in groups] if len(groups) > 1 else []
+        kept = filter(expressions.is_expression, self._session.setup.aovs)
+        names += dict.fromkeys([*further, *map(expressions.layer_of, kept), EXPRESSION])
         if [self.layer.itemData(i) for i in range(self.layer.count())] == names:
             return
-        current = self._viewport.look.layer
         self.layer.clear()
         for name in names:
-            title = _titles().get(name, name.removeprefix("light_") + " (light group)")
-            self.layer.addItem(title, name)
-        self.layer.setCurrentIndex(max(self.layer.findData(current), 0))
+            self.layer.addItem(_title(name), name)
+        self._show_current()
+
+    def _show_current(self) -> None:
+        self.layer.setCurrentIndex(max(self.layer.findData(self._viewport.look.layer), 0))
+
+    def ask_expression(self) -> ExpressionDialog:
+        """Asks for a light path expression, whose layer is then shown."""
+        if self._dialog is None:
+            self._dialog = ExpressionDialog(self._session, self.choose_layer, self)
+        self._dialog.show()
+        self._dialog.raise_()
+        return self._dialog
 
     def choose_layer(self, name: str) -> None:
         """Shows a layer; asks the render for it where it is not kept."""
         setup = self._session.setup
-        if not self._ask_for(name, setup):
-            self.layer.setCurrentIndex(max(self.layer.findData(self._viewport.look.layer), 0))
+        if name == EXPRESSION:
+            self._show_current()
+            self.ask_expression()
             return
+        if not self._ask_for(name, setup):
+            self._show_current()
+            return
+        self._fill_layers()
         self.layer.setCurrentIndex(self.layer.findData(name))
         self._apply(layer=name, low=None, high=None)
         self.automatic.setChecked(True)
         self._update_range()
 
     def _ask_for(self, name: str, setup: Setup) -> bool:
-        if name == "beauty" or name in setup.aovs:
+        if name == "beauty" or name in map(expressions.layer_of, setup.aovs):
             return True
         if name == "denoised":
             return setup.denoise or self._session.change(denoise=True)
@@ -188,9 +220,7 @@ class DisplayBar(QToolBar):
         self._denoising = setup.denoise
 
     def _refresh(self, frame: Frame | None) -> None:
-        scene = self._session.scene
-        groups = tuple(aov_names.LIGHT + g for g in scene.light_groups) if scene is not None else ()
-        self._fill_layers(groups if len(groups) > 1 else ())
+        self._fill_layers()
 
     # ---- exposure and view -----------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.gui.setup import Setup
+from wavecomb.run.expressions import layer_of
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Snapshot
@@ -85,7 +86,7 @@ def layers_of_result(result: Result) -> dict[str, Array]:
 def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, Array]:
     """Copies of the layers of a snapshot that are kept and asked for."""
     out: dict[str, Array] = {"samples": snapshot.samples()}
-    for name in names:
+    for name in map(layer_of, names):
         if name not in ("beauty", "samples") and (array := snapshot.layer(name)) is not None:
             out[name] = array
     return out

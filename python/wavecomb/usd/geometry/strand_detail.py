@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf
 
-from wavecomb.picture.output import camera_window
-from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.strands import Strands
+from wavecomb.usd.geometry.view_size import ViewSize
 from wavecomb.usd.stage.report import LoadReport
 
 LEAST_SHARE = 1.0 / 256.0
@@ -27,16 +26,11 @@ class StrandDetail:
     number in the prim: farther away there are always fewer of the same ones.
     """
 
-    def __init__(
-        self, view: View, size: tuple[int, int], pixels: float, report: LoadReport
-    ) -> None:
-        """``size``: of the picture; ``pixels``: no strand is made wider than that."""
-        x0, x1, _, _ = camera_window(view.options, *size)
+    def __init__(self, view: ViewSize, pixels: float, report: LoadReport) -> None:
+        """``pixels``: no strand is made wider than that."""
+        self.view = view
         self.target = pixels
         self.report = report
-        self.projection = str(view.options.get("projection", "perspective"))
-        self.scale = size[0] / (2.0 * np.pi if self.projection == "latlong" else x1 - x0)
-        self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
 
     def thin(
         self,
@@ -75,15 +69,9 @@ class StrandDetail:
         """Widths of strands where they are nearest to the camera."""
         to_world = np.array(matrix)
         size = np.cbrt(abs(np.linalg.det(to_world[:3, :3])))
-        if self.projection == "orthographic":
-            return np.asarray(widths * (size * self.scale), np.float64)
-        to_camera = to_world @ self.to_camera
-        seen = points @ to_camera[:3, :3] + to_camera[3, :3]
-        away = np.linalg.norm(seen, axis=1)
-        if self.projection == "perspective":
-            away = np.where(seen[:, 2] < 0, -seen[:, 2], away)
-        nearest = strands.over_each(np.minimum, away)
-        return np.asarray(widths * (size * self.scale) / np.maximum(nearest, 1e-30), np.float64)
+        nearest = strands.over_each(np.minimum, self.view.distances(points, to_world))
+        wide = widths * (size * self.view.per_length)
+        return np.asarray(wide / np.maximum(nearest, 1e-30), np.float64)
 
 
 def even(numbers: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -18,8 +18,9 @@ from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.attributes import RefinedAttributes
 from wavecomb.usd.geometry.cage import Cage
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
+from wavecomb.usd.geometry.placements import placements
 from wavecomb.usd.geometry.primvar import as_integers, spread
-from wavecomb.usd.geometry.view_size import ViewSize, placements
+from wavecomb.usd.geometry.view_size import ViewSize
 from wavecomb.usd.looks.assign import Draw, Worn
 from wavecomb.usd.stage.report import LoadReport
 

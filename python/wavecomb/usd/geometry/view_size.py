@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How large the edges of meshes are in the picture, over all their instances."""
+"""How large edges of meshes and widths of strands are in the picture."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +12,19 @@ from wavecomb.picture.output import camera_window, pixel_aspect
 from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.cage import Cage
 
-if TYPE_CHECKING:
-    from wavecomb.usd.stage.group import Group
-
 Matrices = NDArray[np.float64]
 
 NEAREST = 16
 """Placements of a mesh that are measured edge by edge; the others look smaller than these."""
 
-_MOST_PLACED = 1 << 20
-"""Placements of a group that are looked at."""
-
 
 class ViewSize:
-    """Measures in pixels of one view."""
+    """Measures in pixels of one view.
+
+    Attributes:
+        pixels: Of a unit of the camera's window.
+        per_length: Of a unit of length where ``distances`` is 1.
+    """
 
     def __init__(self, view: View, size: tuple[int, int]) -> None:
         """``size``: of the picture, width and height."""
@@ -37,7 +36,24 @@ class ViewSize:
         shape = pixel_aspect(view.options, *size)
         self.pixels = size[0] / (2.0 * half[0]) * (shape if shape > 1.0 + 1e-5 else 1.0)
         self.projection = str(view.options.get("projection", "perspective"))
+        all_round = self.projection == "latlong"
+        self.per_length = size[0] / (2.0 * np.pi) if all_round else self.pixels
         self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
+
+    def distances(self, points: NDArray[Any], to_world: Matrices) -> NDArray[np.float64]:
+        """By what lengths at points, (n, 3) of a prim, are divided in the picture: (n,).
+
+        Their depth before a perspective camera, their distance behind it and from a latlong one;
+        1 for an orthographic one.
+        """
+        if self.projection == "orthographic":
+            return np.ones(len(points))
+        to_camera = to_world @ self.to_camera
+        seen = points @ to_camera[:3, :3] + to_camera[3, :3]
+        away = np.linalg.norm(seen, axis=1)
+        if self.projection == "perspective":
+            away = np.where(seen[:, 2] < 0, -seen[:, 2], away)
+        return np.asarray(away, np.float64)
 
     def edges(self, cage: Cage, bounds: NDArray[Any], placed: Matrices) -> float:
         """The largest mean length in pixels of a cage's edges (``_core.edge_pixels``).
@@ -80,31 +96,3 @@ class ViewSize:
         ]
         weight = np.where((depth > 0) & aside[0] & aside[1], 1.0, 0.125)
         return np.argsort(-weight * scale / distance, kind="stable")[:NEAREST]
-
-
-def placements(world: Group) -> dict[int, Matrices]:
-    """Where the groups that hold surfaces are placed: id of a group -> (k, 4, 4).
-
-    Of each group ``_MOST_PLACED`` count: instances in instances may multiply them.
-    """
-    order: list[Group] = []
-    _after_its_users(world, set(), order)
-    found: dict[int, Matrices] = {id(world): np.eye(4)[None]}
-    for group in reversed(order):
-        placed = found[id(group)]
-        for child, transforms in group.surfaced:
-            some = transforms[: max(1, _MOST_PLACED // len(placed))]
-            every = (some[:, None] @ placed[None]).reshape(-1, 4, 4)
-            known = found.get(id(child))
-            both = every if known is None else np.concatenate([known, every])
-            found[id(child)] = both[:_MOST_PLACED]
-    return found
-
-
-def _after_its_users(group: Group, met: set[int], order: list[Group]) -> None:
-    """Groups that hold surfaces: each before those that it is placed in."""
-    met.add(id(group))
-    for child, _ in group.surfaced:
-        if id(child) not in met:
-            _after_its_users(child, met, order)
-    order.append(group)

@@ -19,7 +19,7 @@ from wavecomb.light_table import (
     light_parameters,
     of_kind,
 )
-from wavecomb.picture.working_space import from_rec709
+from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.colour_space import linear_colour, space_of
@@ -72,7 +72,7 @@ def blackbody(kelvin: float) -> tuple[float, float, float]:
     found = Gf.Color(Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709))
     found.SetFromPlanckianLocus(min(max(kelvin, 1000.0), 15000.0), 1.0)
     rgb = found.GetRGB()
-    luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+    luminance = sum(w * c for w, c in zip(LUMINANCE, rgb, strict=True))
     r, g, b = (max(float(c) / luminance, 0.0) for c in rgb)
     return (r, g, b)
 

@@ -355,7 +355,7 @@ def _strand_detail(
     if view is None:
         report.note("strands are not thinned out: there is no camera to say how thin they are")
         return None
-    return StrandDetail(view, options.size, options.strand_pixels, report)
+    return StrandDetail(ViewSize(view, options.size), options.strand_pixels, report)
 
 
 def _hold_out(stage: Usd.Stage, paths: tuple[str, ...], builder: _core.SceneBuilder) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
+from wavecomb.picture.working_space import LUMINANCE
 from wavecomb.usd.graphs.node import Value, fit, is_constant, numbers
 from wavecomb.usd.graphs.surface import Drivers
 from wavecomb.usd.looks.network import colour, number, pair, shader_id, source_of, value_of
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 _LOBES = {"R": (0.1, 0.1), "TT": (0.05, 0.05), "TRT": (0.2, 0.2)}
 """Lobes, with the defaults of their roughnesses."""
-_LUMA = (0.2126, 0.7152, 0.0722)
 
 
 def variance(roughness: float) -> float:
@@ -188,7 +188,7 @@ class HairReader:
         rgb = colour(fit(value, 3), white)
         if max(rgb) - min(rgb) > 1e-4:
             self._missing(f"MaterialX chiang_hair_bsdf input {name} in a colour (its luminance)")
-        return min(max(sum(a * b for a, b in zip(rgb, _LUMA, strict=True)), 0.0), 1.0)
+        return min(max(sum(a * b for a, b in zip(rgb, LUMINANCE, strict=True)), 0.0), 1.0)
 
     def _missing(self, what: str) -> None:
         self.report.missing(what, self.material.GetPath())

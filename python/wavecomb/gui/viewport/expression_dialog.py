@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A light path expression as a layer: typed, checked as it is typed, and shown."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+from PySide6.QtWidgets import (
+    QDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from wavecomb.gui import theme
+from wavecomb.gui.setup import Setup
+from wavecomb.gui.viewport.session import Session
+from wavecomb.gui.widgets import choice, named, set_text_colour
+from wavecomb.run import expressions
+from wavecomb.run.faults import describe
+
+OWN = "of your own"
+"""Stands for no named expression."""
+
+
+def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
+    """The AOVs of a setup and an expression; one of the same name makes way for it."""
+    layer = expressions.LAYER + name
+    others = [aov for aov in setup.aovs if expressions.layer_of(aov) != layer]
+    return (*others, f"{expressions.PREFIX}{name}={text}")
+
+
+def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str:
+    """Why an expression is no layer; empty: it can be one.
+
+    Args:
+        setup: Of the render that is to have it.
+        name: Of the layer, without ``lpe_``.
+        text: The expression.
+        groups: The light groups of the stage.
+    """
+    if not text.strip():
+        return "Write an expression, such as C<RD>L, or choose one that has a name."
+    try:
+        setup.changed(aovs=aovs_with(setup, name, text))
+    except Exception as error:
+        return describe(error).replace(f"light path expression {name}={text}: ", "")
+    unknown = [group for group in re.findall(r"'([^']*)'", text) if group not in groups]
+    if unknown:
+        there = ", ".join(groups) or "none"
+        return f"There is no light group '{unknown[0]}' in the stage; there are: {there}."
+    return ""
+
+
+class ExpressionDialog(QDialog):
+    """Asks for a name and an expression.
+
+    Attributes:
+        known: Named expressions to begin with.
+        name: Of the layer.
+        text: The expression.
+        note: What is wrong with it.
+        show_layer: Adds the layer and shows it.
+    """
+
+    def __init__(
+        self, session: Session, shown: Callable[[str], object], parent: QWidget | None = None
+    ) -> None:
+        """Nothing is asked of the render yet.
+
+        Args:
+            session: Whose render gets the layer.
+            shown: Called with the layer, once the render has been asked for it.
+            parent: Of the dialog.
+        """
+        super().__init__(parent)
+        self.setObjectName("expression")
+        self.setWindowTitle("Light path expression")
+        self._session, self._shown = session, shown
+        self.known = choice(
+            "expression.known", "Known",
+            "Expressions that have names in Arnold and Karma; choosing one fills in the others",
+            [OWN, *expressions.NAMED], self.take,
+        )  # fmt: skip
+        self.name = named(
+            QLineEdit("lpe"), "expression.name", "Name",
+            "Of the layer, which is lpe_NAME: letters, digits and underscores",
+        )  # fmt: skip
+        self.text = named(
+            QLineEdit(), "expression.text", "Expression",
+            "From the camera to the light: C, then what scatters, then what shines. "
+            "C<RD>L is direct diffuse light, C<T.>.* what is seen through glass",
+        )  # fmt: skip
+        self.text.setPlaceholderText("C<RD>L")
+        self.text.setMinimumWidth(theme.em(24))
+        self.note = named(QLabel(), "expression.note", "Note", "What is wrong with the expression")
+        self.note.setWordWrap(True)
+        self.show_layer = named(
+            QPushButton("&Show"), "expression.show", "Show",
+            "Keeps the layer from now on, which starts the render again, and shows it",
+        )  # fmt: skip
+        self.show_layer.setDefault(True)
+        self.show_layer.clicked.connect(self.accept)
+        self.name.textChanged.connect(self._check)
+        self.text.textChanged.connect(self._check)
+        session.setup_changed.connect(self._check)
+        self._lay_out()
+        self._check()
+
+    def _lay_out(self) -> None:
+        form = QFormLayout()
+        for widget in (self.known, self.name, self.text):
+            form.addRow(widget.accessibleName(), widget)
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        buttons.addWidget(self.show_layer)
+        column = QVBoxLayout(self)
+        column.addLayout(form)
+        column.addWidget(self.note)
+        column.addLayout(buttons)
+
+    def take(self, name: str) -> None:
+        """Fills in a named expression."""
+        if name in expressions.NAMED:
+            self.name.setText(name)
+            self.text.setText(expressions.NAMED[name])
+
+    def _check(self) -> None:
+        scene = self._session.scene
+        groups = () if scene is None else tuple(scene.light_groups)
+        name, text = self.name.text(), self.text.text()
+        problem = problem_of(self._session.setup, name, text, groups)
+        self.note.setText(problem or f"The layer {expressions.LAYER}{name} can be made.")
+        set_text_colour(self.note, theme.warning() if problem and text.strip() else theme.dim())
+        self.show_layer.setEnabled(not problem)
+
+    def accept(self) -> None:
+        """Asks the render for the layer and closes."""
+        name = self.name.text()
+        wanted = aovs_with(self._session.setup, name, self.text.text())
+        if self._session.change(aovs=wanted):
+            self._shown(expressions.LAYER + name)
+            super().accept()
