@@ -303,7 +303,9 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     assert 0.5 < learned["gain"] < 1.2 and not learned["used"]
     limited = {**part, "spp": 2**20, "threads": 2}
     assert render(cornell, time_limit=5.0, **limited).stats["guiding"] is None
-    assert render(cornell, time_limit=60.0, **limited).stats["guiding"]["paths"] > 250_000
+    learned = render(cornell, time_limit=60.0, **limited).stats["guiding"]
+    # A machine that has other things to do gives up.
+    assert 30_000 < learned["paths"] <= 240_000 and learned["seconds"] < 4
 
 
 LEARNED_AOVS = ("guided_share", "survival")

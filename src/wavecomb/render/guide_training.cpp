@@ -2,17 +2,14 @@
 #include "wavecomb/render/guide_training.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
+#include <limits>
 #include <optional>
+#include <utility>
 
 #include "wavecomb/core/clock.h"
-#include "wavecomb/learn/guide.h"
 #include "wavecomb/render/bounce_reader.h"
-#include "wavecomb/render/lane_kernels.h"
-#include "wavecomb/render/pass_runner.h"
-#include "wavecomb/render/picture_tiles.h"
+#include "wavecomb/render/guide_trial.h"
 #include "wavecomb/render/pixel_order.h"
 
 namespace wavecomb {
@@ -20,33 +17,29 @@ namespace {
 
 /// Share of a render's samples that training may take, and its most and least paths.
 constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrainingPaths = 16'384;
-/// Of Guiding::kAuto, so that what it costs to find out is a twentieth of the render at most: a
-/// path that teaches costs some three times one of the picture.
+/// Of Guiding::kAuto.
 constexpr uint64_t kAutoShare = 100, kLeastAutoPaths = 200'000;
+/// Paths without which that is not worth it, where their cost leaves fewer.
+constexpr uint64_t kFewestAutoPaths = 120'000;
 /// Paths that a thread teaches in a second, and the shares of a time limit that may go to them.
-constexpr double kTaughtInSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 20;
-/// Of Guiding::kAuto: some pixels are rendered with and without the field, twice each with so many
-/// samples, which Sobol's points and roulette are in as they are in the picture.
+constexpr double kTaughtInSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 25;
+/// Of Guiding::kAuto: the share of a time limit after which it gives up.
+constexpr double kMostTimeShare = 20;
+/// Of Guiding::kAuto: what training may cost, as a share of the picture, where it is counted; and
+/// what a path that teaches costs beside its rays and vertices, which are kept, read and sorted.
+constexpr double kAutoCostShare = 0.05, kTeachingCost = 1.5;
+/// Pixels of a trial.
 constexpr uint64_t kTrialPixels = 4096;
-constexpr uint32_t kTrialSamples = 16;
-constexpr std::array<uint32_t, 2> kTrialSeeds = {0x6c078965u, 0x9908b0dfu};
 /// Share of the paths that teach, of more that tell how samples spread.
 constexpr uint64_t kSpreadShare = 8;
-/// Share of those pixels that differ most and do not count: fireflies tell too little of the
-/// others.
-constexpr double kUncounted = 0.005;
-/// The same of paths that tell of the picture's variance.
+/// Share of the paths that differ most and do not count for the picture's variance.
 constexpr double kUncountedPaths = 0.001;
-/// Efficiency to the same without the field that is worth it.
-constexpr double kWorthwhileGain = 1.2;
+/// Efficiency to the same without the field that is worth it; and that which half of the training
+/// has to promise, so that the other half follows.
+constexpr double kWorthwhileGain = 1.2, kPromisingGain = 1.1;
 constexpr uint32_t kTrainingRounds = 3;
-/// Paths whose vertices are kept at once: some 30 MB.
-constexpr size_t kPathsAtOnce = 65'536;
-/// Of the cost of a vertex, in rays: shading it, and looking up the field there. (Trials; what
-/// materials cost, roulette knows by themselves.)
-constexpr double kShadingRays = 0.7, kGuidedRays = 0.9;
-/// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
-constexpr double kListRay = 0.3;
+/// The round after which half of the training has been.
+constexpr uint32_t kHalfway = 1;
 
 /// Paths that training may take; 0: too few to learn from.
 uint64_t training_paths(const Settings& settings, uint32_t threads) {
@@ -60,35 +53,6 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
     paths = std::min(paths, static_cast<uint64_t>(std::min(taught, 1e9)));
   }
   return paths >= (is_auto ? kLeastAutoPaths : kLeastTrainingPaths) ? paths : 0;
-}
-
-/// `count` of the picture's pixels, evenly spread, in an order that keeps neighbours together.
-std::vector<uint32_t> some_pixels(const std::vector<uint32_t>& order, uint64_t count) {
-  if (count >= order.size()) return order;
-  std::vector<uint32_t> pixels(count);
-  for (uint64_t i = 0; i < count; ++i) pixels[i] = order[i * order.size() / count];
-  return pixels;
-}
-
-/// The mean without the share of values that are largest. Sorts them.
-double mean_without_largest(std::vector<double>& values, double share) {
-  std::sort(values.begin(), values.end());
-  const auto counted =
-      static_cast<std::ptrdiff_t>(static_cast<double>(values.size()) * (1 - share));
-  return std::accumulate(values.begin(), values.begin() + counted, 0.0) /
-         static_cast<double>(std::max<std::ptrdiff_t>(counted, 1));
-}
-
-/// Cost of what an integrator has done, in rays of a hierarchy.
-double cost_of(const Integrator& integrator, const TrainingMeans& means, bool has_list,
-               bool looks_up) {
-  double rays = 0, records = 0;
-  for (uint32_t i = 0; i < means.threads; ++i)
-    if (const Counts* c = integrator.worker(i).counts) {
-      rays += static_cast<double>(c->rays + c->shadow_rays);
-      records += static_cast<double>(c->records);
-    }
-  return (has_list ? kListRay : 1) * rays + (kShadingRays + (looks_up ? kGuidedRays : 0)) * records;
 }
 
 /// Cost and variance of a path: of those of the last round, which are of `pixels`, with what
@@ -114,66 +78,185 @@ PathLesson mean_path(const Lessons& lessons, std::span<const uint32_t> pixels,
   return mean;
 }
 
-/// Runs the paths of `pixels` that `plan` says with the field of `context`, some at a time, and
-/// adds what they taught. Gives what they cost, in rays of a hierarchy.
-double teach(WaveContext context, const TrainingMeans& means, std::span<const uint32_t> pixels,
-             const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped) {
-  // Integrators keep vertices where somebody reads them when they are made.
-  BounceReader nobody({}, plan);
-  context.histories = &nobody;
-  const std::unique_ptr<Integrator> integrator = make_integrator(
-      context.settings->integrator, context, means.lanes, means.threads, means.wave_size);
-  PassRunner runner(*integrator, means.threads, means.wave_size);
-  const size_t step = std::max<size_t>(1, kPathsAtOnce / plan.samples);
-  lessons.bounces.clear();
-  lessons.luminances.clear();
-  lessons.paths.clear();
-  for (size_t at = 0; at < pixels.size() && !stopped(); at += step) {
-    const auto some = pixels.subspan(at, std::min(step, pixels.size() - at));
-    PassPlan pass;
-    pass.pixels.assign(some.begin(), some.end());
-    pass.batches.push_back({0, pass.pixels.size(), plan.first, plan.samples});
-    BounceReader reader(pass.pixels, plan);
-    context.histories = &reader;
-    runner.run(pass, stopped);
-    reader.append_to(lessons);
+/// One training: its rounds, and for Guiding::kAuto whether they pay.
+class Trainer {
+ public:
+  Trainer(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
+          uint64_t budget, const std::function<bool()>& stopped)
+      : trial_settings_(whole_picture(*render.settings)),
+        settings_(trial_settings_),
+        means_(means),
+        scene_(scene),
+        budget_(budget),
+        stopped_(stopped),
+        aovs_(scene, trial_settings_),
+        film_(1, 1, aovs_.layout),
+        context_(render),
+        shading_(model_costs(scene)),
+        costs_{context_.accel->has_list() ? kListRay : 1.0, guides() ? kGuidedRays : 0, &shading_},
+        grid_(grid_of(scene)),
+        order_(morton_pixel_order({0, 0, settings_.width, settings_.height})),
+        trial_pixels_(some_pixels(order_, kTrialPixels)),
+        field_(std::make_shared<const GuideField>(grid_)) {
+    settings_.seed = 0x2545f491u;
+    // A survivor of roulette brings many times what it stands for: noise that hides what aiming
+    // wins.
+    settings_.roulette = RouletteKind::kOff;
+    if (is_auto() && settings_.time_limit > 0)
+      most_s_ = double{settings_.time_limit} / kMostTimeShare;
+    context_.settings = &settings_;
+    context_.film = &film_;
+    context_.aovs = nullptr;
+    context_.recorder = nullptr;
+    context_.discards = true;
   }
-  return cost_of(*integrator, means, context.accel->has_list(), context.guide != nullptr);
-}
 
-/// What pictures of some pixels are like.
-struct Trial {
-  double error = 0;  ///< mean squared difference of two, relative to the picture there
-  double cost = 0;   ///< of both, in rays of a hierarchy
+  GuideTraining train() {
+    Trial without;
+    if (is_auto()) without = trial(nullptr);
+    for (uint32_t round = 0; round < kTrainingRounds && !ended(); ++round) {
+      const double cost = run(round);
+      if (ended()) break;
+      if (!is_auto()) continue;
+      const bool goes_on = round == 0 ? can_afford(cost, without)
+                                      : round != kHalfway || tell_gain(without) >= kPromisingGain;
+      if (!goes_on) return result(false);
+    }
+    if (ended()) return result(false);
+    bool pays = field_->facts().regions > 0;
+    if (is_auto() && pays) pays = tell_gain(without) >= kWorthwhileGain;
+    return result(pays && !ended());
+  }
+
+ private:
+  /// The settings without what makes a render one of a part.
+  static Settings whole_picture(Settings settings) {
+    settings.region.reset();
+    settings.crop = false;
+    settings.aovs = {};
+    return settings;
+  }
+  bool is_auto() const { return trial_settings_.guiding == Guiding::kAuto; }
+  bool guides() const { return trial_settings_.guiding != Guiding::kOff; }
+  /// Whether the render was stopped, or training takes too much of its time.
+  bool ended() const { return stopped_() || seconds_since(start_) > most_s_; }
+
+  GuideTraining result(bool used) {
+    GuideTraining out;
+    if (stopped_()) return out;
+    out.statistics = statistics_;
+    out.statistics.field_bytes = field_->bytes();
+    out.statistics.facts = field_->facts();
+    out.statistics.used = used;
+    out.statistics.seconds = seconds_since(start_);
+    if (!used) return out;
+    out.field = std::move(field_);
+    out.tiles = std::move(tiles_);
+    return out;
+  }
+
+  Trial trial(const GuideView* guide) const {
+    return try_out(context_, trial_settings_, guide, means_, trial_pixels_, grid_,
+                   [this] { return ended(); });
+  }
+
+  GuideView view() const {
+    GuideView view = field_->view();
+    if (tiles_) tiles_->apply(view);
+    return view;
+  }
+
+  /// What the field there is brings, as trials tell it; 0 where they cannot.
+  double tell_gain(const Trial& without) {
+    if (!tiles_->is_lit() || field_->facts().regions == 0) return 0;
+    const GuideView guide = view();
+    const Trial with = trial(&guide);
+    const double spent = error_of(with, trial_pixels_, *tiles_) * with.cost;
+    if (spent > 0 && !ended())
+      statistics_.gain = error_of(without, trial_pixels_, *tiles_) * without.cost / spent;
+    return statistics_.gain;
+  }
+
+  /// Lowers the budget to what the picture's cost allows. `cost`: of the first round's paths.
+  bool can_afford(double cost, const Trial& without) {
+    if (settings_.time_limit > 0) return true;
+    const auto samples = static_cast<double>(settings_.spp * uint64_t{order_.size()});
+    const double picture = samples * without.cost_of_sample();
+    const double path = kTeachingCost * cost / static_cast<double>(statistics_.paths);
+    if (!(path > 0)) return true;
+    budget_ = static_cast<uint64_t>(
+        std::min(static_cast<double>(budget_), kAutoCostShare * picture / path));
+    return budget_ >= kFewestAutoPaths;
+  }
+
+  /// Teaches by the paths of a round, and makes the field of what was taught so far. Gives what
+  /// the paths cost.
+  double run(uint32_t round) {
+    const uint64_t wanted = (budget_ << round) / ((1u << kTrainingRounds) - 1);
+    const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order_.size()));
+    const std::vector<uint32_t> pixels = some_pixels(order_, wanted);
+    const GuideView guide = view();
+    context_.guide = &guide;
+    const LessonPlan plan{first_sample_,
+                          samples,
+                          settings_.max_depth,
+                          grid_,
+                          guide,
+                          tiles_ ? &*tiles_ : nullptr,
+                          costs_,
+                          settings_.roulette_depth};
+    const double cost = teach(context_, means_, pixels, plan, lessons_, [this] { return ended(); });
+    if (ended()) return cost;
+    first_sample_ += samples;
+    statistics_.paths += lessons_.luminances.size();
+    ++statistics_.rounds;
+    std::vector<uint32_t> of_paths;
+    for (const uint32_t pixel : pixels) of_paths.insert(of_paths.end(), samples, pixel);
+    if (!tiles_) tiles_.emplace(settings_, of_paths, lessons_.luminances);
+    auto next =
+        std::make_shared<GuideField>(grid_, lessons_.records, scene_.materials().size(), round == 0,
+                                     guides(), size_t{settings_.learn_memory_mb} << 20);
+    std::optional<double> spread;
+    if (round + 1 == kTrainingRounds && tiles_->is_lit()) spread = spread_with(*next);
+    if (ended()) return cost;
+    const PathLesson mean = mean_path(lessons_, of_paths, *tiles_, spread);
+    if (mean.vertices > 0) statistics_.survival = mean.survivors / mean.vertices;
+    next->weigh_bounces(lessons_.bounces, mean);
+    field_ = std::move(next);
+    return cost;
+  }
+
+  /// The variance of a path by a field, of paths that are as well spread as the picture's.
+  double spread_with(const GuideField& field) const {
+    GuideView taught = field.view();
+    tiles_->apply(taught);
+    const auto few = some_pixels(order_, budget_ / kSpreadShare / (2 * kTrialSamples));
+    const Trial trial =
+        try_out(context_, settings_, &taught, means_, few, grid_, [this] { return ended(); });
+    return 0.5 * kTrialSamples * error_of(trial, few, *tiles_);
+  }
+
+  const Clock::time_point start_ = Clock::now();
+  const Settings trial_settings_;  ///< as the picture is
+  Settings settings_;              ///< as paths that teach are
+  const TrainingMeans means_;
+  const Scene& scene_;
+  uint64_t budget_;
+  const std::function<bool()>& stopped_;
+  const AovTables aovs_;
+  Film film_;
+  WaveContext context_;
+  const CostSnapshot shading_;
+  const PathCosts costs_;
+  const GuideGrid grid_;
+  const std::vector<uint32_t> order_, trial_pixels_;
+  double most_s_ = std::numeric_limits<double>::infinity();
+  Lessons lessons_;
+  uint32_t first_sample_ = 0;
+  std::optional<PictureTiles> tiles_;
+  std::shared_ptr<const GuideField> field_;
+  GuideStatistics statistics_;
 };
-
-/// Renders kTrialSamples of each of `pixels` twice, as `settings` say but for the seed.
-Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const TrainingMeans& means, std::span<const uint32_t> pixels,
-              const PictureTiles& tiles, const GuideGrid& grid,
-              const std::function<bool()>& stopped) {
-  Trial trial;
-  std::vector<double> differences(pixels.size());
-  context.settings = &settings;
-  context.guide = guide;
-  for (const uint32_t seed : kTrialSeeds) {
-    settings.seed = seed;
-    Lessons lessons;
-    const LessonPlan plan{0, kTrialSamples, 0, grid, {}, nullptr, {}, 1};
-    trial.cost += teach(context, means, pixels, plan, lessons, stopped);
-    if (stopped()) return {};
-    const double sign = seed == kTrialSeeds[0] ? 1 : -1;
-    for (size_t i = 0; i < pixels.size(); ++i)
-      for (uint32_t s = 0; s < kTrialSamples; ++s)
-        differences[i] += sign * double{lessons.luminances[i * kTrialSamples + s]};
-  }
-  for (size_t i = 0; i < pixels.size(); ++i) {
-    const double d = differences[i] * tiles.inverse_scale(pixels[i]) / kTrialSamples;
-    differences[i] = std::isfinite(d) ? d * d : 0;
-  }
-  trial.error = mean_without_largest(differences, kUncounted);
-  return trial;
-}
 
 }  // namespace
 
@@ -190,103 +273,12 @@ GuideGrid grid_of(const Scene& scene) {
 
 GuideTraining train_guide(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
                           const std::function<bool()>& stopped) {
-  const Clock::time_point start = Clock::now();
-  GuideTraining out;
-  Settings settings = *render.settings;
+  const Settings& settings = *render.settings;
   const uint64_t budget = training_paths(settings, means.threads);
-  const bool is_auto = settings.guiding == Guiding::kAuto;
-  const bool guides = settings.guiding != Guiding::kOff;
-  const bool learns = guides || settings.roulette == RouletteKind::kEfficient;
-  if (!learns || settings.max_depth == 0 || budget == 0) return out;
-  settings.region.reset();
-  settings.crop = false;
-  settings.aovs = {};
-  const Settings trial_settings = settings;
-  settings.seed = 0x2545f491u;
-  // A survivor of roulette brings many times what it stands for: noise that hides what aiming wins.
-  settings.roulette = RouletteKind::kOff;
-
-  const AovTables aovs(scene, settings);
-  Film film(1, 1, aovs.layout);
-  WaveContext context = render;
-  context.settings = &settings;
-  context.film = &film;
-  context.aovs = nullptr;
-  context.recorder = nullptr;
-  context.discards = true;
-  const GuideGrid grid = grid_of(scene);
-  auto field = std::make_unique<const GuideField>(grid);
-  const std::vector<uint32_t> order = morton_pixel_order({0, 0, settings.width, settings.height});
-  std::optional<PictureTiles> tiles;
-  const CostSnapshot shading = model_costs(scene);
-  const PathCosts costs{context.accel->has_list() ? kListRay : 1.0, guides ? kGuidedRays : 0,
-                        &shading};
-  Lessons lessons;
-  uint32_t first_sample = 0;
-  for (uint32_t round = 0; round < kTrainingRounds; ++round) {
-    const uint64_t wanted = (budget << round) / ((1u << kTrainingRounds) - 1);
-    const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order.size()));
-    const std::vector<uint32_t> pixels = some_pixels(order, wanted);
-    const bool is_first = round == 0;
-    GuideView view = field->view();
-    if (tiles) tiles->apply(view);
-    context.guide = &view;
-    const LessonPlan plan{first_sample,
-                          samples,
-                          settings.max_depth,
-                          grid,
-                          view,
-                          tiles ? &*tiles : nullptr,
-                          costs,
-                          settings.roulette_depth};
-    teach(context, means, pixels, plan, lessons, stopped);
-    if (stopped()) return {};
-    first_sample += samples;
-    out.statistics.paths += lessons.luminances.size();
-    ++out.statistics.rounds;
-    std::vector<uint32_t> of_paths;
-    for (const uint32_t pixel : pixels) of_paths.insert(of_paths.end(), samples, pixel);
-    if (!tiles) tiles.emplace(settings, of_paths, lessons.luminances);
-    auto next =
-        std::make_unique<GuideField>(grid, lessons.records, scene.materials().size(), is_first,
-                                     guides, size_t{settings.learn_memory_mb} << 20);
-    std::optional<double> spread;
-    if (round + 1 == kTrainingRounds && tiles->is_lit()) {
-      GuideView taught = next->view();
-      tiles->apply(taught);
-      const auto few = some_pixels(order, budget / kSpreadShare / (2 * kTrialSamples));
-      spread = 0.5 * kTrialSamples *
-               try_out(context, settings, &taught, means, few, *tiles, grid, stopped).error;
-      if (stopped()) return {};
-    }
-    const PathLesson mean = mean_path(lessons, of_paths, *tiles, spread);
-    if (mean.vertices > 0) out.statistics.survival = mean.survivors / mean.vertices;
-    next->weigh_bounces(lessons.bounces, mean);
-    field = std::move(next);
-  }
-  out.statistics.field_bytes = field->bytes();
-  out.statistics.facts = field->facts();
-  bool pays = field->facts().regions > 0;
-  if (is_auto && pays && tiles->is_lit()) {
-    const std::vector<uint32_t> pixels = some_pixels(order, kTrialPixels);
-    GuideView view = field->view();
-    tiles->apply(view);
-    const auto trial = [&](const GuideView* guide) {
-      return try_out(context, trial_settings, guide, means, pixels, *tiles, grid, stopped);
-    };
-    const Trial without = trial(nullptr), with = trial(&view);
-    if (stopped()) return {};
-    if (with.error * with.cost > 0)
-      out.statistics.gain = without.error * without.cost / (with.error * with.cost);
-    pays = out.statistics.gain >= kWorthwhileGain;
-  }
-  out.statistics.used = pays;
-  if (pays) {
-    out.field = std::move(field);
-    out.tiles = std::move(tiles);
-  }
-  out.statistics.seconds = seconds_since(start);
-  return out;
+  const bool learns =
+      settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
+  if (!learns || settings.max_depth == 0 || budget == 0) return {};
+  return Trainer(render, scene, means, budget, stopped).train();
 }
 
 }  // namespace wavecomb
