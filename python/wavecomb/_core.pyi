@@ -580,7 +580,7 @@ class Settings:
     """The picture is its region alone, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
     """How paths end early. Each is unbiased, but another estimate. Default: auto."""
-    transport: Literal["path", "light", "auto"]
+    transport: Literal["path", "light", "auto", "bdpt"]
     """Where paths begin. Default: path."""
     light_aim: Literal["off", "on"]
     """Where paths from lights are aimed. Default: on."""

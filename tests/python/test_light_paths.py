@@ -111,7 +111,7 @@ def test_a_resumed_picture_is_that_which_nothing_stopped(stages: Any, tmp_path: 
         ({"aovs": ("direct",)}, "AOV direct"),
         ({"aovs": ("light_groups",)}, "AOV light_groups"),
         ({"aovs": ("lpe:diffuse",)}, "AOV lpe, which knows no light of such paths"),
-        ({"transport": "bdpt"}, "must be one of path, light, auto"),
+        ({"transport": "both"}, "must be one of path, light, auto, bdpt"),
     ],
     ids=lambda x: str(x)[:30],
 )

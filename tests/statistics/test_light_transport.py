@@ -119,12 +119,18 @@ KINDS += ("portal", "mesh", "spot", "several")
 
 
 def compare(
-    name: str, stage: Any, beauty: Any, size: int = 32, spp: int = 16, **settings: Any
+    name: str,
+    stage: Any,
+    beauty: Any,
+    size: int = 32,
+    spp: int = 16,
+    transport: str = "light",
+    **settings: Any,
 ) -> None:
     """Pictures with and without paths from lights."""
     plain: dict[str, Any] = {"max_depth": 4, **settings}
     joined = batches(
-        lambda seed: beauty(stage, size, spp, seed=seed, transport="light", **plain), 12
+        lambda seed: beauty(stage, size, spp, seed=seed, transport=transport, **plain), 12
     )
     alone = batches(lambda seed: beauty(stage, size, 2 * spp, seed=seed, **plain), 12, 500)
     assert_agree(name, joined, alone)
@@ -134,6 +140,28 @@ def compare(
 def test_lights_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
     path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)[kind]))
     compare(f"light paths {kind}", wavecomb.load(path), beauty)
+
+
+@pytest.mark.parametrize("kind", ["rect", "point", "sky", "portal", "several"])
+def test_connections_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
+    path = write_stage(tmp_path / "stage.usda", *corner(*lights(tmp_path)[kind]))
+    stage = wavecomb.load(path)
+    compare(f"connections {kind}", stage, beauty, transport="bdpt", max_depth=5)
+
+
+def test_connections_find_light_that_a_shade_hides(tmp_path: Path, beauty: Any) -> None:
+    """A lamp in a box that is open at its top: all light comes by way of a ceiling."""
+    shade = [
+        quad("X0", [(0, 1, 0), (0, 1, 0.6), (0, 1.5, 0.6), (0, 1.5, 0)], "White"),
+        quad("X1", [(0.6, 1, 0), (0.6, 1, 0.6), (0.6, 1.5, 0.6), (0.6, 1.5, 0)], "White"),
+        quad("Z0", [(0, 1, 0), (0.6, 1, 0), (0.6, 1.5, 0), (0, 1.5, 0)], "White"),
+        quad("Z1", [(0, 1, 0.6), (0.6, 1, 0.6), (0.6, 1.5, 0.6), (0, 1.5, 0.6)], "White"),
+        quad("Floor", [(0, 1, 0), (0.6, 1, 0), (0.6, 1, 0.6), (0, 1, 0.6)], "White"),
+        quad("Ceiling", [(-2, 2.4, -2), (2, 2.4, -2), (2, 2.4, 2), (-2, 2.4, 2)], "Gloss"),
+        light("Sphere", colour=(60, 55, 50), transform=moved(0.3, 1.2, 0.3), radius=0.08),
+    ]
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *corner(*shade)))
+    compare("connections shade", stage, beauty, transport="bdpt", max_depth=6)
 
 
 def test_a_tree_of_lights(tmp_path: Path, beauty: Any) -> None:
@@ -159,6 +187,8 @@ def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
     # Not at the clip's edge: filters have tails there that camera paths do not come to.
     wide = {} if lens == "clipped" else {"filter": "blackman-harris", "filter_width": 3.0}
     compare(f"light paths {lens}", stage, beauty, **wide)
+    if lens == "lens":
+        compare(f"connections {lens}", stage, beauty, transport="bdpt", **wide)
 
 
 @pytest.mark.parametrize("ball", ["Frosted", "Clear", "Coated"])
@@ -186,6 +216,7 @@ def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> N
     shape = sphere("Glass", ball, (-0.2, 0.6, 0.9), 0.4, rings=24, smooth=True)
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *corner(*looks, lamp, shape)))
     compare(f"light paths through {ball}", stage, beauty, max_depth=6)
+    compare(f"connections through {ball}", stage, beauty, transport="bdpt", max_depth=6)
 
 
 def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
@@ -221,7 +252,8 @@ def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: A
     compare(f"light paths wide {kind}", stage, beauty, max_depth=6)
 
 
-def test_light_through_a_plate_of_glass(tmp_path: Path, beauty: Any) -> None:
+@pytest.mark.parametrize("transport", ["light", "bdpt"])
+def test_light_through_a_plate_of_glass(transport: str, tmp_path: Path, beauty: Any) -> None:
     """A point over a clear plate over a floor: no path from the camera finds it.
 
     Under the point rays are upright, and a plate of thickness t and index n lifts the point by
@@ -248,13 +280,14 @@ def test_light_through_a_plate_of_glass(tmp_path: Path, beauty: Any) -> None:
     reflected = [(1 - r) ** 2 * r ** (2 * m) / (way + 2 * m * thick / index) ** 2 for m in range(3)]
     expected = albedo / np.pi * power * sum(reflected)
     settings: dict[str, Any] = {"max_depth": 7, "sampler": "sobol"}
-    found = beauty(stage, 48, 512, transport="light", **settings)
+    found = beauty(stage, 48, 512, transport=transport, **settings)
     # Some thousand paths come there; 2 % more light comes by way of floor and plate.
     assert found.mean() == pytest.approx(1.01 * expected, rel=0.06)
     assert beauty(stage, 16, 16, **settings).max() == 0.0
 
 
-def test_a_furnace_stays_white(tmp_path: Path, beauty: Any) -> None:
+@pytest.mark.parametrize("transport", ["light", "bdpt"])
+def test_a_furnace_stays_white(transport: str, tmp_path: Path, beauty: Any) -> None:
     """What reflects all and stands in an even sky is not to be told from it."""
     looks = (
         material("White", "diffuse", diffuseColor=(1, 1, 1)),
@@ -268,7 +301,7 @@ def test_a_furnace_stays_white(tmp_path: Path, beauty: Any) -> None:
         camera((0, 0.4, 3), (0, 0, 0), half=0.4),
     )
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
-    picture = beauty(stage, 24, 256, max_depth=24, transport="light")
+    picture = beauty(stage, 24, 256, max_depth=24, transport=transport)
     # Rough glass loses what bounces twice between facets.
     assert picture[:, :12].mean() == pytest.approx(1.0, abs=0.01)
     alone = beauty(stage, 24, 256, max_depth=24)

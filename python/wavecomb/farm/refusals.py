@@ -42,7 +42,7 @@ def is_better_whole(settings: Mapping[str, Any]) -> bool:
     """Whether each tile costs much beside its own pixels: a border, a field, all light paths."""
     return (
         bool(settings.get("adaptive"))
-        or settings.get("transport") in ("light", "auto")
+        or settings.get("transport") in ("light", "bdpt", "auto")
         or settings.get("guiding", "off") != "off"
         or (settings.get("roulette") == "efficient")
     )

@@ -21,6 +21,11 @@ LightPathRefusal light_path_refusal(const Settings& s) {
   return {};
 }
 
+Error light_path_error(const Settings& s, const LightPathRefusal& refusal) {
+  return Error("transport " + std::string(s.connects() ? "bdpt" : "light") + " does not go with " +
+               refusal.what + "; give " + refusal.instead + ", or transport path or auto");
+}
+
 void Settings::check() const {
   for (const SettingInfo& setting : setting_table()) setting.check(*this);
   if (aovs.has(Aov::kDeep) && firefly != Firefly::kKeep)
@@ -29,8 +34,7 @@ void Settings::check() const {
         "beauty; give firefly keep");
   if (joins_light())
     if (const LightPathRefusal refusal = light_path_refusal(*this); !refusal.what.empty())
-      throw Error("transport light does not go with " + refusal.what + "; give " + refusal.instead +
-                  ", or transport path or auto");
+      throw light_path_error(*this, refusal);
   check_expressions(expressions);
   if (uint64_t{width} * height > kMaxPixels)
     throw Error("width x height is " + std::to_string(uint64_t{width} * height) +

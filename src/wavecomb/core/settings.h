@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "wavecomb/core/aov.h"
+#include "wavecomb/core/error.h"
 #include "wavecomb/core/path_expression.h"
 
 namespace wavecomb {
@@ -24,7 +25,8 @@ constexpr float default_filter_width(FilterKind kind) {
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
 /// Where paths begin: at the camera, or as many at the lights, too, joined by multiple importance
 /// sampling (docs/light-paths.md). kAuto: the second where it pays (render/transport_choice.h).
-enum class Transport : uint8_t { kPath, kLight, kAuto };
+/// kBdpt: the second, whose vertices are connected with each other, too.
+enum class Transport : uint8_t { kPath, kLight, kAuto, kBdpt };
 /// What becomes of samples that are so bright that too few of them are there to be trusted: they
 /// stay, or count as far as they are (film/cascades.h).
 enum class Firefly : uint8_t { kKeep, kReweight };
@@ -135,7 +137,9 @@ struct Settings {
   float cost_weight = 0.3f;  ///< of a pass's measurement in the moving average, 0 to 1
 
   float used_filter_width() const { return filter_width.value_or(default_filter_width(filter)); }
-  bool joins_light() const { return transport == Transport::kLight; }
+  bool joins_light() const { return transport == Transport::kLight || connects(); }
+  /// Whether vertices of camera paths connect to those of paths from lights.
+  bool connects() const { return transport == Transport::kBdpt; }
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Pixels that are rendered.
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }
@@ -153,5 +157,7 @@ struct LightPathRefusal {
   std::string what, instead;
 };
 LightPathRefusal light_path_refusal(const Settings& settings);
+/// What to throw where there is something; `settings` join light.
+Error light_path_error(const Settings& settings, const LightPathRefusal& refusal);
 
 }  // namespace wavecomb

@@ -174,7 +174,10 @@ std::vector<SettingInfo> work_settings() {
                               "caustics of small lights."},
                              {"auto",
                               "From the lights, too, where it pays, as some pixels before the "
-                              "first pass find out."}},
+                              "first pass find out."},
+                             {"bdpt",
+                              "From both, and their vertices are connected: another estimate, "
+                              "not yet found to pay."}},
                             "Where paths begin."),
       choice<&S::light_aim>(
           "light_aim", "Light paths go",

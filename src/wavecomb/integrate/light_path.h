@@ -8,6 +8,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/light/emission.h"
+#include "wavecomb/surface/motion.h"
 
 namespace wavecomb {
 
@@ -66,24 +67,45 @@ struct LightPathSetup {
   float share;  ///< 1 / N, N as many paths as the picture has pixels
 };
 
+/// The time of the path of a pixel and sample: that of the camera's path, where it is connected to
+/// that.
+template <typename F>
+inline F light_path_time(const Settings& settings, const SampleKey<F>& key, const UInt<F>& pixel,
+                         const UInt<F>& sample) {
+  return path_time<F>(settings.sampler,
+                      settings.connects() ? make_sample_key<F>(pixel, sample, settings.seed) : key);
+}
+
 /// What a path from a light carries to the end of its ray of length t. Textures are seen as the
 /// camera sees them: the cone is that of a ray from there.
 template <typename F>
 inline PathState<F> light_path_state(const CameraSetup& camera, const Vec3<F>& d,
                                      const Color<F>& flux, const F& weight, const F& eta_scale,
-                                     const Vec3<F>& o, const UInt<F>& light, const F& t,
-                                     const F& time, const Mask<F>& active) {
+                                     const F& ratio, const Vec3<F>& o, const UInt<F>& light,
+                                     const F& t, const F& time, const Mask<F>& active) {
   F width(kConeShare * camera.step_y);
   if (camera.projection != Projection::kOrthographic)
     width *= length(Vec3<F>(fma(d, t, o) - camera_place<F>(camera, time, active).t));
-  return {d, flux, weight, eta_scale, width, F(0.f), o, light};
+  PathState<F> state{d, flux, weight, eta_scale, width, F(0.f), o, light};
+  state.ratio = ratio;
+  return state;
 }
 
-/// Of the members of `v`, `direct` is what the pixels get and `next.pdf` is S.
+/// Of the members of `v`, `direct` is what the pixels get, `next.pdf` is S and `next.ratio` p<- of
+/// the bounce.
 template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;
-  F x, y;  ///< on the film, where a shadow ray is wanted
+  F x, y;           ///< on the film, where a shadow ray is wanted
+  Vec3<F> p;        ///< where the vertex is
+  Mask<F> offered;  ///< vertices of camera paths may connect to it
+};
+
+/// The vertices of camera paths that vertices from lights are shown to, in place of the camera.
+template <typename F>
+struct ConnectionTarget {
+  ConnectionRow<F> row;
+  Mask<F> is_first;  ///< the vertex from the light is its path's first
 };
 
 }  // namespace wavecomb

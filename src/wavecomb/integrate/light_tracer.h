@@ -3,10 +3,11 @@
 #pragma once
 
 #include "wavecomb/integrate/light_path.h"
-#include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/program_dispatch.h"
+#include "wavecomb/integrate/reference_worker.h"
 #include "wavecomb/integrate/single_rays.h"
 #include "wavecomb/integrate/stages/splat.h"
+#include "wavecomb/integrate/steps/survive.h"
 
 namespace wavecomb {
 
@@ -22,15 +23,20 @@ class LightTracer {
         clock_(worker.clock),
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
-        splats_(worker.splats) {}
+        splats_(worker.splats),
+        vertices_(worker.light_vertices) {}
 
-  void trace(uint32_t pixel, uint32_t sample) {
+  /// `keeps`: one of the path's vertices, for the camera's path of the same pixel and sample.
+  void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
+    if (keeps) vertices_.clear(1);
     const SceneView& scene = context_.scene;
     const LightPath<F> start =
         begin_light_path<F>(scene.lights, *context_.settings, pixel, sample, true);
     const Emission<F>& e = start.emission;
     if (!e.valid) return;
-    rays_.begin(start.key, context_.moves() ? path_time<F>(settings_.sampler, start.key) : 0.f);
+    rays_.begin(start.key, context_.moves()
+                               ? light_path_time<F>(*context_.settings, start.key, pixel, sample)
+                               : 0.f);
     PathState<F> path{e.d, start.flux, start.weight, start.eta_scale, 0.f, 0.f, e.o, e.light};
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
@@ -48,6 +54,7 @@ class LightTracer {
       }
       const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path);
       const VertexResult<F>& v = out.v;
+      if (keeps) keep(start.key, depth, hit, mesh, material, path, out);
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
@@ -66,6 +73,15 @@ class LightTracer {
       add_splat(context_, splats_, out.x, out.y, out.v.direct);
   }
 
+  void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
+            uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
+    const PathRow<F> row{path.o,     path.dir, path.throughput, path.pdf, path.eta_scale, 0.f,
+                         path.ratio, key,      path.receiver};
+    const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
+                                  hit.inst, mesh,  hit.geom, kOnlySlot};
+    keep_light_vertex<F>(vertices_, depth, row, record, material, out.p, out.offered);
+  }
+
   LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
                              uint32_t mesh, uint32_t material, const PathState<F>& path) {
     const SceneView& scene = context_.scene;
@@ -73,10 +89,10 @@ class LightTracer {
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
     const PathState<F> state =
         light_path_state<F>(*context_.camera, path.dir, path.throughput, path.pdf, path.eta_scale,
-                            path.o, path.receiver, hit.t, rays_.time(), true);
+                            path.ratio, path.o, path.receiver, hit.t, rays_.time(), true);
     return kShadeLightVertex<F>[scene.material_program[material]](
         {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, nullptr, true},
-        setup_);
+        setup_, nullptr);
   }
 
   const WaveContext& context_;
@@ -86,7 +102,18 @@ class LightTracer {
   Counts& counts_;
   SingleRays rays_;
   SplatList& splats_;
+  LightVertices& vertices_;
 };
+
+/// Gives the film what the paths of a task have brought.
+inline void end_light_task(const WaveContext& context, ReferenceWorker& worker,
+                           const WaveTask& task) {
+  if (!context.lessons) {
+    context.film->splats().add(worker.splats);
+    worker.splats.clear();
+  }
+  count_light_paths(context, task);
+}
 
 /// Traces the paths of a task.
 inline void trace_light_task(const WaveContext& context, ReferenceWorker& worker,
@@ -98,11 +125,7 @@ inline void trace_light_task(const WaveContext& context, ReferenceWorker& worker
       worker.clock.enter(Phase::kGenerate);
       tracer.trace(task.pixels[p], task.first_sample + s);
     }
-  if (!context.lessons) {
-    context.film->splats().add(worker.splats);
-    worker.splats.clear();
-  }
-  count_light_paths(context, task);
+  end_light_task(context, worker, task);
   worker.clock.stop();
 }
 

@@ -12,6 +12,15 @@
 /// S is 1 / D at the light, and each vertex multiplies in
 ///   S <- S p-> |g w| / (|g l| p<-);   the first one with p-> + p_light in place of p->:
 /// what the camera's techniques (steps/join.h) are as dense over this one.
+///
+/// Where vertices are connected, S is the sum over those and the connections that lie towards the
+/// light, and both have (S p-> + F) in place of S p->, with
+///   F = d^2 / p<-   of the bounce that led here over the distance d, 0 where that was a delta.
+/// Connected to a camera's vertex with throughput T', BSDF f', and R p<- |g l'| / |g w'| of its own
+/// towards this one (JointVertex::towards is r), which bounces would go to with the density p->',
+/// it brings the path
+///   T' f' |cos|  T f(w, l) |cos l|  |g w| / |g l|  v / d^2,
+///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2).
 #pragma once
 
 #include "wavecomb/integrate/camera_connection.h"
@@ -31,6 +40,7 @@ struct LitPlace {
   Vec3<F> l;              ///< to the light, local
   F inverse_cos;          ///< 1 / |g l|
   Color<F> flux;          ///< that arrives
+  F linked;               ///< F
   F sampled;              ///< p_light, of the first vertex
   Mask<F> by_light_only;  ///< bounces do not find the light
   Mask<F> active;
@@ -39,67 +49,125 @@ struct LitPlace {
   F turn(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
   /// p-> + p_light.
   F found(const F& bounce) const { return select(by_light_only, F(0.f), bounce) + sampled; }
+  /// S (p-> + p_light) + F, with S up to here.
+  F others(const F& s, const F& bounce) const { return s * found(bounce) + linked; }
 };
 
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatures>& v,
-                                                         const Interaction& at) {
+                                                         const Interaction& at,
+                                                         const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
   LitPlace<Bsdf, F, Interaction> place{at,
                                        at.unbent_frame(v),
                                        {},
                                        F(1.f / select(cosine > 0.f, cosine, F(1.f))),
-                                       v.depth == 0 ? v.path.throughput : at.throughput,
+                                       select<F>(is_first, v.path.throughput, at.throughput),
+                                       F(0.f),
                                        F(0.f),
                                        Mask<F>(false),
                                        Mask<F>(false)};
   place.l = place.frame.to_local(back);
   place.active = v.active & (cosine > 0.f) & at.is_consistent(back, place.l);
-  if (v.depth == 0) {
+  if (const Mask<F> first = place.active & is_first; any(first)) {
     LightReceiver<F> receiver(at.origin(back));
     if (v.scene.lights.by_tree && !Bsdf::kTransmits)
       receiver.normal = pack_normal<F>(select<F>(place.l.z < 0.f, -place.frame.n, place.frame.n));
     const LightReach<F> reach =
-        light_reach<F>(v.scene.lights, v.path.receiver, receiver, back, v.t, place.active);
+        light_reach<F>(v.scene.lights, v.path.receiver, receiver, back, v.t, first);
     // Where nothing but deltas is, no light is sampled.
-    place.sampled = select(at.bsdf.has_non_delta(), reach.density, F(0.f));
-    place.by_light_only = reach.is_delta;
+    place.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
+    place.by_light_only = first & reach.is_delta;
+  }
+  if (v.settings.connects) {
+    const Mask<F> links = place.active & (v.path.ratio > 0.f);
+    const F linked = F(v.t * v.t) / select(links, v.path.ratio, F(1.f));
+    place.linked = select(links, min(linked, F(kMostRatio)), F(0.f));
   }
   return place;
 }
 
+/// Who looks at a vertex from `to`: the direction there, and whether that is possible.
+template <typename F>
+struct Looker {
+  Vec3<F> w, local;
+  F distance2;
+  Mask<F> sees;
+};
+
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
+WAVECOMB_INLINE Looker<F> looker_at(const Vertex<F, kFeatures>& v, const Place& place,
+                                    const Vec3<F>& to, const Mask<F>& wanted) {
+  const auto& at = place.at;
+  Looker<F> out;
+  const Vec3<F> way = to - at.s.p;
+  out.distance2 = length_squared(way);
+  out.w = way * F(1.f / sqrt(select(out.distance2 > 0.f, out.distance2, F(1.f))));
+  out.local = place.frame.to_local(out.w);
+  out.sees = wanted & (out.distance2 > 0.f) & at.is_consistent(out.w, out.local) &
+             not_(at.bends(v, place.frame, -out.w));
+  if (Bsdf::kAbsorbs) out.sees = out.sees & (dot(at.s.ng, out.w) > 0.f);
+  return out;
+}
+
+/// The shadow ray of `light` towards who looks from `to`.
+template <typename F, typename Place>
+WAVECOMB_INLINE void ask_whether_seen(const Place& place, const Looker<F>& looker,
+                                      const Vec3<F>& to, const Color<F>& light,
+                                      VertexResult<F>& out) {
+  out.direct = clean<F>(light, 0.f);
+  out.has_shadow = looker.sees & (max_component(out.direct) > 0.f);
+  out.shadow_o = place.at.origin(looker.w);
+  const Vec3<F> ray = to - out.shadow_o;
+  const F length2 = length_squared(ray);
+  const F size = sqrt(select(length2 > 0.f, length2, F(1.f)));
+  out.shadow_d = ray * F(1.f / size);
+  out.shadow_tfar = size * kShadowReach;
+}
+
 /// Shows the vertex to the camera.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
-WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
-                             const Place& place, const Sample4<F>& r, LightVertexResult<F>& out) {
+WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+                                    const Place& place, const Sample4<F>& r,
+                                    LightVertexResult<F>& out) {
   const auto& at = place.at;
   const Mask<F> wanted = place.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
+  out.offered = wanted;
+  out.p = at.s.p;
   const CameraConnection<F> c =
       connect_to_camera<F>(setup.camera, at.s.p, r.y, r.z, v.hit.time, wanted);
-  const Vec3<F> way = c.to - at.s.p;
-  const F distance2 = length_squared(way);
-  const Vec3<F> w = way * F(1.f / sqrt(select(distance2 > 0.f, distance2, F(1.f))));
-  const Vec3<F> local = place.frame.to_local(w);
-  Mask<F> shown = wanted & c.valid & (distance2 > 0.f) & setup.filter.reaches(c.x, c.y) &
-                  at.is_consistent(w, local) & not_(at.bends(v, place.frame, -w));
-  if (Bsdf::kAbsorbs) shown = shown & (dot(at.s.ng, w) > 0.f);
-  if (none(shown)) return;
-  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(local), place.l);
-  const F seen = place.turn(w) * c.density;
-  const F others = v.path.pdf * place.found(e.pdf) * F(seen * setup.share);
+  const Looker<F> looker = looker_at<Bsdf, F>(
+      v, place, c.to, Mask<F>(wanted & c.valid & setup.filter.reaches(c.x, c.y)));
+  if (none(looker.sees)) return;
+  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(looker.local), place.l);
+  const F seen = place.turn(looker.w) * c.density;
+  const F others = place.others(v.path.pdf, e.pdf) * F(seen * setup.share);
   const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
-  out.v.direct = clean<F>(place.flux * e.f_cos * brightness, 0.f);
-  out.v.has_shadow = shown & (max_component(out.v.direct) > 0.f);
-  out.v.shadow_o = at.origin(w);
-  const Vec3<F> ray = c.to - out.v.shadow_o;
-  const F length2 = length_squared(ray);
-  const F size = sqrt(select(length2 > 0.f, length2, F(1.f)));
-  out.v.shadow_d = ray * F(1.f / size);
-  out.v.shadow_tfar = size * kShadowReach;
+  ask_whether_seen<F>(place, looker, c.to, Color<F>(place.flux * e.f_cos * brightness), out.v);
   out.x = c.x;
   out.y = c.y;
+}
+
+/// Shows the vertex to that of a camera path.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
+WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
+                             const ConnectionRow<F>& target, VertexResult<F>& out) {
+  const auto& at = place.at;
+  const Mask<F> wanted = place.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || none(wanted)) return;
+  const Looker<F> looker = looker_at<Bsdf, F>(v, place, target.from, wanted);
+  if (none(looker.sees)) return;
+  const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(looker.local), place.l);
+  const F back = at.bsdf.eval(at.bsdf.view(place.l), looker.local).pdf;
+  const F nearness = 1.f / select(looker.sees, looker.distance2, F(1.f));
+  const F turn = place.turn(looker.w) * nearness;
+  const F before = min(F(target.ratio * F(back * nearness)), F(kMostRatio));
+  const F others = min(F(place.others(v.path.pdf, e.pdf) * F(turn * target.pdf)), F(kMostRatio));
+  const F brightness = turn / F(F(1.f + before) + others);
+  ask_whether_seen<F>(place, looker, target.from,
+                      Color<F>(place.flux * e.f_cos * target.light * brightness), out);
 }
 
 /// The bounce, and the ray that goes on.
@@ -113,7 +181,8 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
   const F over_pdf = turn / select(b.pdf > 0.f, b.pdf, F(1.f));
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(b.wi), place.l);
   Color<F> weight = e.f_cos * over_pdf;
-  F ratio = place.found(e.pdf) * over_pdf;
+  F s = v.path.pdf * F(place.found(e.pdf) * over_pdf);
+  if (v.settings.connects) s = fma(place.linked, over_pdf, s);
   Mask<F> goes = v.active;
   if (any(b.is_delta)) {
     const F eta2 = b.eta * b.eta;
@@ -121,12 +190,18 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
     const F angles = turn * F(abs(place.l.z) / select(z > 0.f, z, F(1.f)));
     weight = select<F>(b.is_delta, b.weight * F(angles * eta2), weight);
     const F by_angle = select(place.by_light_only, F(0.f), F(angles / eta2));
-    ratio = select(b.is_delta, by_angle, ratio);
+    s = select(b.is_delta, F(v.path.pdf * by_angle), s);
     goes = not_(b.is_delta & passes_one_way<Bsdf, F>(at.bsdf, place.l, b.wi));
   }
   out.next.dir = d;
   out.next.throughput = place.flux * weight;
-  out.next.pdf = min(F(v.path.pdf * ratio), F(kMostRatio));
+  out.next.pdf = min(s, F(kMostRatio));
+  out.next.ratio = F(0.f);
+  if (v.settings.connects) {
+    Mask<F> may_look = not_(b.is_delta);
+    if (Bsdf::kAbsorbs) may_look = may_look & (dot(at.s.ng, d) > 0.f);
+    out.next.ratio = select(may_look, b.pdf, F(0.f));
+  }
   out.next.eta_scale = v.path.eta_scale;
   out.next.receiver = v.path.receiver;
   out.next.cone_width = out.next.cone_spread = F(0.f);
@@ -140,20 +215,29 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
 
 /// The steps of a vertex of the active lanes' paths from lights, with program `Bsdf`. `v.hit.time`
 /// is the path's, and `v.path.cone_width` the camera's.
+/// `target` null: it is shown to the camera and the path goes on; else to the vertices of camera
+/// paths there, and `v.depth` says nothing.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>& v,
-                                                      const LightPathSetup& setup) {
+                                                      const LightPathSetup& setup,
+                                                      const ConnectionTarget<F>* target) {
   LightVertexResult<F> out;
   out.x = out.y = F(0.f);
   out.v.direct = Color<F>(F(0.f));
   out.v.has_shadow = Mask<F>(false);
   out.v.alive = Mask<F>(false);
+  out.offered = Mask<F>(false);
   if constexpr (Bsdf::kOnFibre) return out;
   const auto at = interact<Bsdf, F>(v);
-  const auto place = detail::lit_place<Bsdf, F>(v, at);
+  const auto place =
+      detail::lit_place<Bsdf, F>(v, at, target ? target->is_first : Mask<F>(v.depth == 0));
+  if (target) [[unlikely]] {
+    detail::connect<Bsdf, F>(v, place, target->row, out.v);
+    return out;
+  }
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
-  detail::connect<Bsdf, F>(v, setup, place, r_light, out);
+  detail::show_to_camera<Bsdf, F>(v, setup, place, r_light, out);
   if (v.depth + 1 >= v.settings.max_depth) return out;
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
@@ -164,9 +248,9 @@ WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>
 
 /// The same as a function of its own: the reference integrator's.
 template <typename Bsdf, typename F, uint32_t kFeatures>
-LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v,
-                                        const LightPathSetup& setup) {
-  return take_light_steps<Bsdf, F>(v, setup);
+LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+                                        const ConnectionTarget<F>* target) {
+  return take_light_steps<Bsdf, F>(v, setup, target);
 }
 
 }  // namespace wavecomb

@@ -24,7 +24,8 @@ struct PathRow {
   F pdf;                      ///< density of the bounce that made the ray; 0: delta or camera; less
                               ///< than that: below a surface, to walk there
   F eta_scale;                ///< product of eta^2 of the interfaces crossed, for roulette
-  F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians
+  F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, angle in radians;
+                              ///< of a path from a light the latter is PathState::ratio
   SampleKey<F> key;
   UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray; below a surface,
                      ///< object_of what it is below

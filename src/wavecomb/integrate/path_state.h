@@ -8,6 +8,7 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/integrate/features.h"
+#include "wavecomb/integrate/light_vertices.h"
 #include "wavecomb/learn/guide_view.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/hit.h"
@@ -27,6 +28,7 @@ struct ShadeSettings {
   bool schlick_fresnel;
   bool cosine_sampling;
   bool filters_textures_whole;
+  bool connects;  ///< vertices of camera paths and of paths from lights, where those are joined
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -38,7 +40,8 @@ struct ShadeSettings {
         clamp_indirect(s.clamp_indirect),
         schlick_fresnel(s.schlick_fresnel),
         cosine_sampling(s.cosine_sampling),
-        filters_textures_whole(s.texture_filter == TextureFilter::kWhole) {}
+        filters_textures_whole(s.texture_filter == TextureFilter::kWhole),
+        connects(s.connects()) {}
 
   /// For paths from lights, whose every vertex the camera looks at.
   ShadeSettings of_light_paths() const {
@@ -61,7 +64,8 @@ struct PathState {
   UInt<F> receiver;   ///< LightReceiver::normal of the vertex before
   UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
   F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
-  F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one
+  F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one. Of a path from
+                      ///< a light: density of the bounce before, 0 where it was none to connect to
   // Where paths know what they are inside of (InsideRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< what collides, by material
@@ -140,6 +144,28 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
           v.normal};
 }
 
+/// A vertex of a camera path that may connect to one of a path from a light.
+template <typename F>
+struct ConnectionOffer {
+  Vec3<F> to;            ///< the vertex from the light
+  F vertices;            ///< LightVertexRow::vertices
+  Mask<F> wanted;        ///< there is one, and it is not too far from the camera
+  ConnectionRow<F> row;  ///< to be filled in; black where `wanted` is false
+};
+
+/// The offer of the vertex at `depth` of paths in `slot` to the vertices kept there: black so far.
+template <typename F>
+inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
+                                    uint32_t max_depth, const Mask<F>& active) {
+  const auto chosen = load_row<LightVertexRow, F>(from.chosen, slot, active);
+  const Vec3<F> none(F(0.f));
+  return {chosen.p,
+          F(Int<F>(chosen.vertices)),
+          Mask<F>(active & Mask<F>(chosen.vertices != UInt<F>(0u)) &
+                  Mask<F>(chosen.depth + (depth + 2) <= UInt<F>(max_depth))),
+          {none, F(0.f), none, F(0.f)}};
+}
+
 /// What all steps of a vertex are told of it. `depth` 0 is the first one; `t` is the length of the
 /// ray that led there. `hit` and `geom` (geometry within the instance's group) are of a surface;
 /// where the vertex is on none, `hit.inst` is kNoSurface. `kFeatures` is what the kernel knows of.
@@ -156,7 +182,8 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null where none are wanted
   const Mask<F>& active;
-  const GuideView* guide = nullptr;  ///< the field that guides bounces, or is to be learned
+  const GuideView* guide = nullptr;     ///< the field that guides bounces, or is to be learned
+  ConnectionOffer<F>* offer = nullptr;  ///< null where nothing is connected; of joint kernels
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// What AOVs are to be given; null where nothing is.

@@ -2,9 +2,11 @@
 /// Path tracing by the reference integrator: one path after the other, in scalars.
 #pragma once
 
+#include <optional>
 #include <utility>
 
 #include "wavecomb/integrate/camera_connection.h"
+#include "wavecomb/integrate/light_tracer.h"
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
@@ -20,26 +22,6 @@
 
 namespace wavecomb {
 
-/// Buffers of a worker of the reference integrator.
-///
-/// Contract: one thread at a time.
-struct ReferenceWorker {
-  explicit ReferenceWorker(const WaveContext& context)
-      : aovs(1, context.film->aovs().layout(), context.aovs),
-        history(1, context.kept_vertices()),
-        splats(context.joins_light() ? Wave::kSplats : 0),
-        walks(context.scene.walks.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()),
-        interiors(context.knows_inside() ? 1 : 0) {}
-  PhaseClock clock;
-  Counts counts;
-  // Of the path that is traced, in slot 0.
-  PathAovs aovs;
-  PathHistory history;
-  SplatList splats;  ///< of paths from lights
-  SoaBlock walks;    ///< below surfaces
-  InteriorBuffers interiors;
-};
-
 /// Traces paths one after the other, each depth first, through what lies between surfaces.
 template <typename Media>
 class PathTracer {
@@ -54,7 +36,8 @@ class PathTracer {
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),
-        history_(worker.history) {}
+        history_(worker.history),
+        vertices_(worker.light_vertices) {}
 
   /// Radiance of the path of a task of one, as the camera's exposure shows it; what else it found
   /// is in the AOVs' slot 0.
@@ -189,6 +172,8 @@ class PathTracer {
                                   links ? &v.shadow_set : nullptr);
         if (is_free) add_direct(key, depth, v, aovs_.group_of<F>(aovs.lit_by, true));
       }
+      if constexpr (!Media::kAny)
+        if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
         note_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
@@ -264,25 +249,60 @@ class PathTracer {
     if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
     if constexpr (!Media::kAny)
-      if (context_.joins_light())
+      if (context_.joins_light()) {
+        if (vertices_) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
         return kShadeJointVertex<F>[scene.material_program[material]](
             {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
-             context_.guide});
+             context_.guide, vertices_ ? &offer_ : nullptr});
+      }
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     return kernels[scene.material_program[material]]({scene, settings_, key, depth, mesh_hit,
                                                       hit.geom, hit.t, material, path, &aovs, true,
                                                       context_.guide});
   }
 
+  /// Connects the vertex at `depth` to that of the path from the light.
+  void connect(uint32_t depth) {
+    clock_.enter(Phase::kShade);
+    const SceneView& scene = context_.scene;
+    const auto at = load_row<LightVertexRow, F>(vertices_.chosen, kSlot, true);
+    const auto from = load_row<PathRow, F>(vertices_.paths, kSlot, true);
+    const auto hit = load_row<ShadingRecord, F>(vertices_.records, kSlot, true);
+    counts_.add_records(depth, 1);
+    if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(at.material));
+    const ConnectionTarget<F> target{offer_.row, at.depth == 0};
+    const MeshHit<F> mesh_hit{hit.inst, hit.mesh, hit.prim, hit.u, hit.v, rays_.time()};
+    const PathState<F> state =
+        light_path_state<F>(*context_.camera, from.d, from.throughput, from.pdf, from.eta_scale,
+                            from.cone_spread, from.o, from.receiver, hit.t, rays_.time(), true);
+    const LightPathSetup setup{*context_.camera, *context_.splat_filter,
+                               context_.light_path_share()};
+    const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](
+                                  {scene, light_settings_, from.key, depth, mesh_hit, hit.geom,
+                                   hit.t, at.material, state, nullptr, true},
+                                  setup, & target)
+                                  .v;
+    if (!v.has_shadow) return;
+    clock_.enter(Phase::kShadow);
+    const uint32_t no_set = 0;
+    const bool links = scene.lights.links.members != nullptr;
+    if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
+      return;
+    radiance_.sum += v.direct;
+    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, v.direct, true);
+  }
+
   static constexpr uint32_t kSlot = kOnlySlot;
   const WaveContext& context_;
   [[maybe_unused]] const Media& media_;
-  const ShadeSettings settings_;
+  const ShadeSettings settings_, light_settings_ = settings_.of_light_paths();
   PhaseClock& clock_;
   Counts& counts_;
   SingleRays rays_;
   PathAovs& aovs_;
   PathHistory& history_;
+  LightVertices& vertices_;   ///< that of the path from the light, where it is connected
+  ConnectionOffer<F> offer_;  ///< of the vertex, with it
   RadianceRow<F> radiance_;
   InsideRow<F> inside_{};         ///< where paths know what they are inside of
   std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
@@ -294,6 +314,8 @@ template <typename Media>
 void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveTask& task,
                 const Media& media) {
   PathTracer tracer(context, worker, media);
+  std::optional<LightTracer> from_light;
+  if (context.connects()) from_light.emplace(context, worker);
   Film& film = *context.film;
   worker.clock.start(Phase::kGenerate);
   for (uint32_t p = 0; p < task.pixel_count; ++p) {
@@ -306,6 +328,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
     Film::Pixel sum = film.pixel(x, y);
     for (uint32_t s = 0; s < task.samples; ++s) {
       worker.clock.enter(Phase::kGenerate);
+      if (from_light) from_light->trace(pixel, task.first_sample + s, true);
       const auto start = worker.aovs.start_time();
       const Color<float> radiance =
           tracer.exposed_path({task.pixels + p, 1, task.first_sample + s, 1});
@@ -322,6 +345,7 @@ void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveT
     }
     film.pixel(x, y) = sum;
   }
+  if (from_light) end_light_task(context, worker, task);
   worker.clock.stop();
 }
 

@@ -23,11 +23,14 @@ VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v);
 struct LightPathSetup;
 template <typename F>
 struct LightVertexResult;
+template <typename F>
+struct ConnectionTarget;
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                        uint32_t depth, size_t begin, size_t end);
 template <typename Bsdf, typename F, uint32_t kFeatures>
-LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup);
+LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+                                        const ConnectionTarget<F>* target);
 
 namespace detail {
 template <typename F>

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/integrate/stages/collect.h"
+#include "wavecomb/integrate/stages/connect.h"
 #include "wavecomb/integrate/stages/generate.h"
 #include "wavecomb/integrate/stages/generate_light.h"
 #include "wavecomb/integrate/stages/order.h"
@@ -40,6 +41,10 @@ struct CameraPaths {
   }
   void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
     wavecomb::shadow<F>(wave, context, depth, media);
+  }
+  static void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
+    if constexpr (!Media::kAny)
+      if (wave.light_vertices) wavecomb::connect<F>(wave, context, depth);
   }
   static void end_depth(Wave& wave, const WaveTask& task, uint32_t depth) {
     wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
@@ -79,6 +84,7 @@ struct LightPaths {
   void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
     splat<F>(wave, context, *task, depth);
   }
+  static void connect(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
   static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
   static void resolve(Wave& /*wave*/, const WaveContext& context, const WaveTask& its_task,
                       uint32_t /*depth*/) {
@@ -127,18 +133,30 @@ void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Pa
     compact<F>(wave);
     paths.end_depth(wave, task, depth);
 
-    if (wave.shadows.size == 0) continue;
-    const RayOrderChoice shadow_order = order_rays<F>(
-        wave, context, depth, s.shadow_order, wave.shadow_chooser, wave.pool.shadows, wave.shadows);
-    clock.enter(Phase::kShadow);
-    fetch_shadows<F>(wave);
-    start = Clock::now();
-    paths.shadow(wave, context, depth);
-    learn_order(wave.shadow_chooser, depth, shadow_order, start);
+    if (wave.shadows.size > 0) {
+      const RayOrderChoice shadow_order =
+          order_rays<F>(wave, context, depth, s.shadow_order, wave.shadow_chooser,
+                        wave.pool.shadows, wave.shadows);
+      clock.enter(Phase::kShadow);
+      fetch_shadows<F>(wave);
+      start = Clock::now();
+      paths.shadow(wave, context, depth);
+      learn_order(wave.shadow_chooser, depth, shadow_order, start);
+    }
+    paths.connect(wave, context, depth);
   }
   clock.enter(Phase::kResolve);
   paths.resolve(wave, context, task, depth);
   clock.stop();
+}
+
+/// Paths from lights whose vertices those of the camera's paths of the task connect to.
+template <typename F>
+void run_connected_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
+  wave.light_vertices.clear(task.path_count());
+  wave.light_use = Wave::LightUse::kKeep;
+  run_stages<F>(wave, context, task, LightPaths<F>());
+  wave.light_use = Wave::LightUse::kShow;
 }
 
 /// Paths from the camera, in lanes of type F.

@@ -68,6 +68,9 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
   sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, place, joint, receiver, out);
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+    if (v.offer) [[unlikely]]
+      offer_connection<Bsdf, F>(v, at, frame, wo, seen, joint);
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
   scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, joint, receiver, out);

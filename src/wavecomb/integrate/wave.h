@@ -16,6 +16,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/integrator.h"
 #include "wavecomb/integrate/interior_buffers.h"
+#include "wavecomb/integrate/light_vertices.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/path_pool.h"
@@ -63,6 +64,8 @@ struct WaveContext {
 
   /// Whether paths start at lights, too.
   bool joins_light() const { return splat_filter != nullptr; }
+  /// Whether vertices of camera paths connect to theirs.
+  bool connects() const { return joins_light() && settings->connects(); }
   /// One over how many start there for each of a pixel's.
   float light_path_share() const {
     return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
@@ -114,7 +117,8 @@ struct Wave {
         splats(context.joins_light() ? kSplats : 0),
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
-        shadow_chooser(kRayOrders) {}
+        shadow_chooser(kRayOrders),
+        light_vertices(context.connects() ? capacity : 0) {}
   static constexpr size_t kWayColumns = 14, kWalkColumns = 28;
   static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
@@ -141,11 +145,15 @@ struct Wave {
   uint32_t queues = 0;  ///< shading queues so far; coherence is measured on some
   PhaseClock clock;
   Counts counts;
+  LightVertices light_vertices;
+  /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
+  /// connected to the vertices of camera paths in their slots.
+  enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
-           ways.bytes() + interiors.bytes() + splats.bytes();
+           ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes();
   }
 };
 

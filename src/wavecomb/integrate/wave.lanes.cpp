@@ -13,6 +13,7 @@ WAVECOMB_SHARED_KERNELS(extern, Lanes<WAVECOMB_LANES>);
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   if (task.from_lights) return run_stages<Lanes<W>>(wave, context, task, LightPaths<Lanes<W>>());
+  if (wave.light_vertices) run_connected_light<Lanes<W>>(wave, context, task);
   run_wave_through<Lanes<W>>(wave, context, task, NoMedia());
 }
 

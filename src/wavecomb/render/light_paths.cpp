@@ -55,10 +55,9 @@ LightPathRefusal light_path_refusal(const Scene& scene) {
   return {};
 }
 
-void check_light_paths(const Scene& scene) {
+void check_light_paths(const Scene& scene, const Settings& settings) {
   if (const LightPathRefusal refusal = light_path_refusal(scene); !refusal.what.empty())
-    throw Error("transport light does not go with " + refusal.what + "; give " + refusal.instead +
-                ", or transport path or auto");
+    throw light_path_error(settings, refusal);
 }
 
 float scene_brightness(const Scene& scene) {

@@ -29,7 +29,7 @@ struct LightPathShare {
 /// What of the scene such paths do not go with; empty: nothing.
 LightPathRefusal light_path_refusal(const Scene& scene);
 /// Throws Error where there is anything.
-void check_light_paths(const Scene& scene);
+void check_light_paths(const Scene& scene, const Settings& settings);
 
 /// The brightness, a power of two, that the scene as a whole would have of its lights' power.
 float scene_brightness(const Scene& scene);

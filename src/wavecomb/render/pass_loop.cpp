@@ -33,6 +33,11 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
   // The light of a region, too, comes of the paths of the whole picture.
   if (settings.joins_light())
     light_order_ = morton_pixel_order({0, 0, settings.width, settings.height});
+  // Those that camera paths connect to are traced with them.
+  if (settings.connects())
+    std::erase_if(light_order_, [region = settings.rendered()](uint32_t pixel) {
+      return region.contains(pixel & 0xffffu, pixel >> 16);
+    });
   pass_.allotment.pilot = rules_.pilot;
   pass_.allotment.spp = rules_.spp;
   const std::vector<uint32_t> samples = film.samples();

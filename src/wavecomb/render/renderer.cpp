@@ -224,7 +224,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   Film film(window, aovs.layout, settings.keeps_error());
   const SplatFilter splat_filter(filter, settings.rendered());
   if (settings.joins_light()) {
-    check_light_paths(scene);
+    check_light_paths(scene, settings);
     film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
                      double{light_share.paths()});
   }

@@ -29,7 +29,7 @@ void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task
         begin_light_path<F>(context.scene.lights, settings, pixel, sample, active);
     if (context.moves())
       scatter_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot,
-                       path_time<F>(settings.sampler, path.key), active);
+                       light_path_time<F>(settings, path.key, pixel, sample), active);
     const Emission<F>& e = path.emission;
     store_row<PathRow, F>(
         wave.pool.paths, slot,

@@ -98,22 +98,37 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   }
 }
 
+/// Appends to a list of `n` rays those of the outcome `what`, of the records from `i` on.
+template <typename F, typename List>
+WAVECOMB_INLINE void keep_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
+                               ShadingQueue::Outcome what, uint32_t shift) {
+  using U = UInt<F>;
+  const Mask<U> active(first_lanes<F>(queue.size - i));
+  const U outcome = load<U>(queue.outcome + i), slot = load<U>(queue.slot + i);
+  const Mask<U> wanted = active & Mask<U>((outcome & uint32_t{what}) != U(0u));
+  compress_store<U>(list.direction + n, (outcome >> shift) & (kDirectionKeys - 1), wanted);
+  n += compress_store<U>(list.slot + n, slot, wanted);
+}
+
+/// Lists the shadow rays alone, in arrival order.
+template <typename F>
+void compact_shadows(Wave& wave) {
+  size_t shadows = 0;
+  for (size_t i = 0; i < wave.shading.size; i += kWidth<F>)
+    keep_rays<F>(wave.shading, i, wave.shadows, shadows, ShadingQueue::kShadowRay,
+                 ShadingQueue::kShadowKeyShift);
+  wave.shadows.size = shadows;
+}
+
 /// Lists the paths that go on and the shadow rays, both in arrival order.
 template <typename F>
 void compact(Wave& wave) {
-  using U = UInt<F>;
   const ShadingQueue& queue = wave.shading;
   size_t rays = 0, shadows = 0;
   for (size_t i = 0; i < queue.size; i += kWidth<F>) {
-    const Mask<U> active(first_lanes<F>(queue.size - i));
-    const U outcome = load<U>(queue.outcome + i), slot = load<U>(queue.slot + i);
-    const auto keep = [&](auto& list, size_t& n, ShadingQueue::Outcome what, uint32_t shift) {
-      const Mask<U> wanted = active & Mask<U>((outcome & uint32_t{what}) != U(0u));
-      compress_store<U>(list.direction + n, (outcome >> shift) & (kDirectionKeys - 1), wanted);
-      n += compress_store<U>(list.slot + n, slot, wanted);
-    };
-    keep(wave.rays, rays, ShadingQueue::kAlive, ShadingQueue::kRayKeyShift);
-    keep(wave.shadows, shadows, ShadingQueue::kShadowRay, ShadingQueue::kShadowKeyShift);
+    keep_rays<F>(queue, i, wave.rays, rays, ShadingQueue::kAlive, ShadingQueue::kRayKeyShift);
+    keep_rays<F>(queue, i, wave.shadows, shadows, ShadingQueue::kShadowRay,
+                 ShadingQueue::kShadowKeyShift);
   }
   wave.rays.size = rays;
   wave.shadows.size = shadows;

@@ -49,9 +49,17 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       state.outer = gather_field<F>(pool.inside, &InsideRow<float>::outer, slot, active);
       state.medium = gather_field<F>(pool.inside, &InsideRow<float>::medium, slot, active);
     }
-    const VertexResult<F> v =
-        take_steps<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
-                              state, wants_aovs ? &aovs : nullptr, active, context.guide});
+    ConnectionOffer<F> offer;
+    const bool connects = (kFeatures & kJoined) != 0 && wave.light_vertices;
+    if constexpr ((kFeatures & kJoined) != 0)
+      if (connects) [[unlikely]]
+        offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
+    const VertexResult<F> v = take_steps<Bsdf, F>(
+        V{context.scene, settings, path.key, depth, hit, r.geom, t, material, state,
+          wants_aovs ? &aovs : nullptr, active, context.guide, connects ? &offer : nullptr});
+    if constexpr ((kFeatures & kJoined) != 0)
+      if (connects) [[unlikely]]
+        store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);

@@ -7,14 +7,18 @@
 
 namespace wavecomb {
 
-/// Shades records [begin, end) of the queue's order, as shade_batch does those of camera paths. The
-/// words of a shadow ray's row that say whose light it brings hold its place on the film.
+/// Shades records [begin, end) of the queue's order, as shade_batch does those of camera paths, for
+/// what Wave::light_use says. The words of a shadow ray's row that say whose light it brings hold
+/// its place on the film.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                        uint32_t depth, size_t begin, size_t end) {
   const ShadingQueue& queue = wave.shading;
+  using U = UInt<F>;
   const PathPool& pool = wave.pool;
   const CameraSetup& camera = *context.camera;
+  const LightVertices& vertices = wave.light_vertices;
+  const bool connects = wave.light_use == Wave::LightUse::kConnect;
   const LightPathSetup setup{camera, *context.splat_filter, context.light_path_share()};
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const RecordPacket<F> packet(queue, i, end);
@@ -23,25 +27,33 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
     MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
     if (context.moves()) [[unlikely]]
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, r.slot, active);
-    const auto path = load_row<PathRow, F>(pool.paths, r.slot, active);
+    const auto path = load_row<PathRow, F>(connects ? vertices.paths : pool.paths, r.slot, active);
     const PathState<F> state =
-        light_path_state<F>(camera, path.d, path.throughput, path.pdf, path.eta_scale, path.o,
-                            path.receiver, r.t, hit.time, active);
+        light_path_state<F>(camera, path.d, path.throughput, path.pdf, path.eta_scale,
+                            path.cone_spread, path.o, path.receiver, r.t, hit.time, active);
+    ConnectionTarget<F> target;
+    if (connects)
+      target = {
+          load_row<ConnectionRow, F>(vertices.connections, r.slot, active),
+          Mask<F>(load_row<LightVertexRow, F>(vertices.chosen, r.slot, active).depth == U(0u))};
     const LightVertexResult<F> out = take_light_steps<Bsdf, F>(
         Vertex<F, kFeatures>{context.scene, settings, path.key, depth, hit, r.geom, r.t,
                              packet.material, state, nullptr, active},
-        setup);
+        setup, connects ? &target : nullptr);
     const VertexResult<F>& v = out.v;
+    if (wave.light_use == Wave::LightUse::kKeep)
+      keep_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.offered);
     packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
-      store_row<ShadowRow, F>(pool.shadows, r.slot,
-                              {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct,
-                               float_bits<F>(out.x), float_bits<F>(out.y)},
-                              v.has_shadow);
+      store_row<ShadowRow, F>(
+          pool.shadows, r.slot,
+          {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, connects ? U(0u) : float_bits<F>(out.x),
+           connects ? U(0u) : float_bits<F>(out.y)},
+          v.has_shadow);
     if (any(v.alive))
       store_row<PathRow, F>(pool.paths, r.slot,
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
-                             F(0.f), F(0.f), path.key, v.next.receiver},
+                             F(0.f), v.next.ratio, path.key, v.next.receiver},
                             v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;

@@ -14,6 +14,13 @@
 ///   p<- / p-> = |w z| / (|l z| eta^2),   z the shading normal, eta that of w -> l.
 /// R is 0 where paths from lights do not go: x_1 a mirror, a normal that is bent towards who looks,
 /// a fibre.
+///
+/// Where vertices are connected, R is the sum over that technique and the connections of x_i to
+/// x_i+1, of which each has, beside what it shares with R,
+///   E_i = d^2 / p->_i   (d their distance)   in place of   p<-_i+1  and all that R has before:
+///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
+/// E is 0 where either of the two scatters as a delta, where x_i+1 is none that paths from lights
+/// go to, and where it is looked at out of what absorbs.
 #pragma once
 
 #include "wavecomb/integrate/steps/interact.h"
@@ -36,31 +43,62 @@ template <typename F>
 struct JointVertex {
   F ratio;
   F inverse_cos;  ///< 1 / |g w|
+  F linked;       ///< E of the vertex before and this one
 
   /// R with this vertex for a direction `world` to the light, `local` in the frame, which light
   /// samples or bounces take with density 1: p<- |g l| / |g w|.
   template <typename Bsdf, uint32_t kFeatures, typename Interaction>
   WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
                             const Vec3<F>& world, const Vec3<F>& local) const {
-    F r = ratio * F(abs(dot(at.s.ng, world)) * inverse_cos);
+    const F turn = abs(dot(at.s.ng, world)) * inverse_cos;
+    F r = ratio * turn;
     if (v.depth > 0) r *= at.bsdf.eval(at.bsdf.view(local), wo).pdf;
-    return r;
+    return v.settings.connects ? fma(linked, turn, r) : r;
   }
 };
 
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const Interaction& at,
                                             const Frame<F>& frame) {
-  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f)};
+  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f), F(0.f)};
   const Vec3<F>& dir = v.path.dir;
   const F seen = dot(at.s.ng, dir);
   const Frame<F> unbent = at.unbent_frame(v);
   Mask<F> reached = not_(at.bends(v, unbent, dir)) & (seen != 0.f);
   reached = reached & Mask<F>(frame.n.x == unbent.n.x) & Mask<F>(frame.n.y == unbent.n.y) &
             Mask<F>(frame.n.z == unbent.n.z);
+  F linked(0.f);
+  if (v.settings.connects && v.depth > 0) {
+    Mask<F> links = reached & (v.path.pdf > 0.f);
+    if (Bsdf::kAbsorbs) links = links & (seen < 0.f);
+    linked = select(links, F(F(v.t * v.t) / select(links, v.path.pdf, F(1.f))), F(0.f));
+  }
   // Who looks out of what absorbs: paths from lights do not know how far it is.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
-  return {select(reached, v.path.ratio, F(0.f)), F(1.f / select(seen != 0.f, abs(seen), F(1.f)))};
+  return {select(reached, v.path.ratio, F(0.f)), F(1.f / select(seen != 0.f, abs(seen), F(1.f))),
+          min(linked, F(kMostRatio))};
+}
+
+/// What the vertex offers to one of a path from a light: with w its direction there, all that
+///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
+/// and its weight v (light_vertex.h) have of this side. Nothing is drawn.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
+WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                      const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
+                                      const JointVertex<F>& joint) {
+  ConnectionOffer<F>& offer = *v.offer;
+  const Mask<F> wanted = offer.wanted & v.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || none(wanted)) return;
+  // From where light samples are taken.
+  const Vec3<F> way = offer.to - at.origin(-v.path.dir);
+  const F distance2 = length_squared(way);
+  const Vec3<F> w = way * F(1.f / sqrt(select(distance2 > 0.f, distance2, F(1.f))));
+  const Vec3<F> wi = frame.to_local(w);
+  const BsdfEval<F> e = at.bsdf.eval(seen, wi);
+  const Mask<F> shown = wanted & (distance2 > 0.f) & at.is_consistent(w, wi);
+  const Color<F> light = at.throughput * e.f_cos * offer.vertices;
+  offer.row = {at.origin(w), e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
+               joint.template towards<Bsdf>(v, at, wo, w, wi)};
 }
 
 /// R after the bounce `b`, along `world`.
