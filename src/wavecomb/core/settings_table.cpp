@@ -176,8 +176,8 @@ std::vector<SettingInfo> work_settings() {
                               "From the lights, too, where it pays, as some pixels before the "
                               "first pass find out."},
                              {"bdpt",
-                              "From both, and their vertices are connected: for rooms whose "
-                              "lamps are hidden behind shades and corners."}},
+                              "From both, and their vertices are connected: another estimate, "
+                              "not yet found to pay."}},
                             "Where paths begin."),
       choice<&S::light_aim>(
           "light_aim", "Light paths go",
