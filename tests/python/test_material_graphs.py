@@ -283,7 +283,7 @@ def test_nodes_of_numbers(tmp_path, identifier, inputs, formula):
 def test_unknown_nodes_are_named_and_pass_an_input_on(tmp_path):
     nodes = node(
         "Odd",
-        "ND_hextiledimage_color3",
+        "ND_flake3d_color3",
         'string inputs:note = "x"\ncolor3f inputs:in = (0.25, 0.5, 1)',
     )
     scene, loaded = load(
@@ -296,7 +296,7 @@ def test_unknown_nodes_are_named_and_pass_an_input_on(tmp_path):
     )
     assert scene.material_of("M")["base_color"] == (0.25, 0.5, 1)
     told = said(loaded)
-    assert "ND_hextiledimage_color3 (its input in in its place)" in told and "/Mat/Odd" in told
+    assert "ND_flake3d_color3 (its input in in its place)" in told and "/Mat/Odd" in told
 
 
 def test_networks_in_circles_end(tmp_path):
