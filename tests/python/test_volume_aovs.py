@@ -86,7 +86,15 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def _render(loaded: Any, **options: Any) -> wavecomb.Picture:
-    aovs = ["transmittance", "half_depth", "crypto", "depth", "light_groups", "material_id"]
+    aovs = [
+        "transmittance",
+        "half_depth",
+        "samples",
+        "crypto",
+        "depth",
+        "light_groups",
+        "material_id",
+    ]
     asked = [f"lpe:{name}={text}" for name, text in LAYERS.items()]
     return wavecomb.render(
         loaded, **{"size": SIZE, "spp": SPP, "max_depth": 3, "aovs": [*aovs, *asked], **options}
