@@ -172,9 +172,10 @@ nb::object deep_pair(nb::handle owner) {
 
 /// The rows of WAVECOMB_AOVS.
 nb::list aov_table() {
-  static constexpr const char* kKinds[] = {"mean",   "mean_of_hits", "nearest", "coverage",
-                                           "groups", "expressions",  "sum",     "deep"};
-  static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kDeep) + 1);
+  static constexpr const char* kKinds[] = {"mean",     "mean_of_hits", "nearest",
+                                           "coverage", "groups",       "expressions",
+                                           "sum",      "deep",         "median"};
+  static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kMedian) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
     // These have names of their own, or files.

@@ -592,6 +592,8 @@ class Settings:
     """How a light is chosen to sample: for the place that it lights, or by power. Default: auto."""
     light_weights: Literal["calibrated", "power"]
     """How often each light is chosen. Default: calibrated."""
+    equiangular: Literal["off", "on"]
+    """How distances in even volumes are chosen. Default: off."""
     guiding: Literal["auto", "on", "off"]
     """How bounces choose directions: by materials, or also by where light comes from. Default:
     off."""

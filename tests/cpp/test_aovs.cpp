@@ -96,7 +96,7 @@ TEST(AovFilm, MemoryOfEveryAov) {
   const Film film(16, 9, all);
   EXPECT_EQ(film.bytes(), 16u * 9 *
                               (32 + 2 * 24 + 12 + 4 + 28 + 3 * 64 + 3 * 24 + 4 * 24 + 8 + 5 * 24 +
-                               8 + 2 * 8 + 16));
+                               8 + 2 * 8 + 16 + 24 + 88));
   const auto bytes = [](uint32_t bits) { return Film(8, 8, {AovSet{bits}}).bytes() / 64; };
   EXPECT_EQ(bytes(0), 32u);
   EXPECT_EQ(bytes(AovSet::kUsual), 92u);

@@ -13,8 +13,8 @@ namespace wavecomb {
 namespace {
 
 const std::vector<std::string> kKeys{"other", "key"};
-/// A letter for each event, and for each end by key: lights, domes, objects.
-constexpr std::string_view kEventLetters = "abcdefv", kEndLetters = "lgoLGO";
+/// A letter for each event, and for each end by key: lights, domes, objects, volumes.
+constexpr std::string_view kEventLetters = "abcdefvw", kEndLetters = "lgoeLGOE";
 
 /// An expression, and the same as a regular expression over those letters.
 struct Pair {
@@ -23,13 +23,15 @@ struct Pair {
 constexpr Pair kPairs[] = {
     {"C.*", ".*"},
     {"C<RD>.*", "a.*"},
-    {"C[LO]", "[lgoLGO]"},
+    {"C[LO]", "[lgoeLGOE]"},
     {"CB", "[gG]"},
     {"C.*<L.'key'>", ".*[LG]"},
     {"C.*[^<L.'key'>]", ".*[^LG]"},
-    {"C[^D]*D+[LO]", "[^ad]*[ad]+[lgoLGO]"},
+    {"C[^D]*D+[LO]", "[^ad]*[ad]+[lgoeLGOE]"},
     {"C<R[GS]>(<T.><T.>)*.", "[bc]([def][def])*."},
-    {"C.{1,2}O", ".{1,2}[oO]"},
+    {"C.{1,2}O", ".{1,2}[oeOE]"},
+    {"C(V.*|E)", "v.*|[eE]"},
+    {"C.*<E.'key'>", ".*E"},
     {"CV?<.S>{2,}.", "v?[cf]{2,}."},
     {"C(D|S|V)+L", "([ad]|[cf]|v)+[lgLG]"},
     {"C < T D > . *", "d.*"},

@@ -200,47 +200,85 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
   }
 }
 
+/// One beside the ways of the cases, and one beyond their end.
+std::shared_ptr<const Scene> two_lamps() {
+  SceneBuilder b;
+  for (const float x : {0.6f, 2.5f}) {
+    Light lamp = make_light(LightKind::kSphere, {1, 1, 1}, translate(x, 0.3f, 0.6f));
+    lamp.radius = x < 1 ? 0.1f : 0.f;
+    b.add_light(lamp);
+  }
+  b.set_camera(make_camera({0, 0, 9}, {0, 0, 0}));
+  return b.build();
+}
+
+TEST(Equiangular, DrawsByItsDensity) {
+  const auto scene = two_lamps();
+  const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
+  for (const float u : {0.1f, 0.9f}) {
+    const auto way =
+        lamp_way<float>(scene->view().lights, o, d, 1, 2.4f, 0.5f, {u, 0.3f, 0.8f, 0.f}, true);
+    ASSERT_GT(way.share, 0.f);
+    double sum = 0;
+    for (int i = 0; i < 4000; ++i)
+      sum += double{way.density(1 + 1.4f * (static_cast<float>(i) + 0.5f) / 4000)} * 1.4 / 4000;
+    EXPECT_NEAR(sum, 1, 1e-3);
+    for (const float v : {0.f, 0.2f, 0.5f, 0.99f}) EXPECT_NEAR(way.before(way.draw(v)), v, 1e-4f);
+    EXPECT_NEAR(way.draw(0), 1, 1e-4f);
+  }
+  const auto none = lamp_way<float>(scene->view().lights, o, d, 2, 1, 0.5f, {}, true);
+  EXPECT_EQ(none.share, 0.f);
+  // Where the medium swallows what the lamp sends, distances go by density.
+  const auto thick =
+      lamp_way<float>(scene->view().lights, o, d, 1, 2.4f, 50.f, {0.9f, 0.3f, 0.8f, 0.f}, true);
+  EXPECT_EQ(thick.share, 0.f);
+}
+
 TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
   const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
-  for (const Case& c : cases()) {
-    const Records r(c.volumes);
-    const auto flight = [&](const SampleKey<float>& key, float t) {
-      return fly_through<float>(r.view, Passage<float>{SamplerKind::kIndependent, key, 1, o, d, t},
-                                {0.5f, 0.2f, 0.3f}, true, counts);
-    };
-    for (const float t : {1.7f, 2.2f, kInf}) {
-      const auto depth = c.depth(std::min(double{t}, 10.0));
-      const auto pass = [&](size_t k) { return std::exp(-depth[k]); };
-      expect_means(means_of(40000,
+  const auto lamps = two_lamps();
+  for (const LightView* lights : {static_cast<const LightView*>(nullptr), &lamps->view().lights})
+    for (Case c : cases()) {
+      if (lights) c.name += " by lamps";
+      const Records r(c.volumes);
+      const auto flight = [&](const SampleKey<float>& key, float t) {
+        return fly_through<float>(r.view,
+                                  Passage<float>{SamplerKind::kIndependent, key, 1, o, d, t},
+                                  {0.5f, 0.2f, 0.3f}, true, lights, counts);
+      };
+      for (const float t : {1.7f, 2.2f, kInf}) {
+        const auto depth = c.depth(std::min(double{t}, 10.0));
+        const auto pass = [&](size_t k) { return std::exp(-depth[k]); };
+        expect_means(means_of(40000,
+                              [&](const SampleKey<float>& key) {
+                                const Flight<float> f = flight(key, t);
+                                return f.stopped ? Color<float>(0.f) : f.weight;
+                              }),
+                     {pass(0), pass(1), pass(2)}, c.name + ", passes");
+        expect_means(means_of(40000,
+                              [&](const SampleKey<float>& key) {
+                                const Flight<float> f = flight(key, t);
+                                EXPECT_FALSE(f.stopped && !(f.t <= t));
+                                return f.stopped ? f.weight : Color<float>(0.f);
+                              }),
+                     {1 - pass(0), 1 - pass(1), 1 - pass(2)}, c.name + ", stops");
+      }
+      // Where: the mean of exp(-x), as an integral by parts on a fine mesh.
+      std::array<double, 3> expected{};
+      constexpr int n = 20000;
+      for (int i = 0; i < n; ++i) {
+        const double a = 3.0 * i / n, b = 3.0 * (i + 1) / n;
+        for (size_t k = 0; k < 3; ++k)
+          expected[k] +=
+              std::exp(-(a + b) / 2) * (std::exp(-c.depth(a)[k]) - std::exp(-c.depth(b)[k]));
+      }
+      expect_means(means_of(80000,
                             [&](const SampleKey<float>& key) {
-                              const Flight<float> f = flight(key, t);
-                              return f.stopped ? Color<float>(0.f) : f.weight;
+                              const Flight<float> f = flight(key, kInf);
+                              return f.stopped ? f.weight * std::exp(-f.t) : Color<float>(0.f);
                             }),
-                   {pass(0), pass(1), pass(2)}, c.name + ", passes");
-      expect_means(means_of(40000,
-                            [&](const SampleKey<float>& key) {
-                              const Flight<float> f = flight(key, t);
-                              EXPECT_FALSE(f.stopped && !(f.t <= t));
-                              return f.stopped ? f.weight : Color<float>(0.f);
-                            }),
-                   {1 - pass(0), 1 - pass(1), 1 - pass(2)}, c.name + ", stops");
+                   expected, c.name + ", where");
     }
-    // Where: the mean of exp(-x), as an integral by parts on a fine mesh.
-    std::array<double, 3> expected{};
-    constexpr int n = 20000;
-    for (int i = 0; i < n; ++i) {
-      const double a = 3.0 * i / n, b = 3.0 * (i + 1) / n;
-      for (size_t k = 0; k < 3; ++k)
-        expected[k] +=
-            std::exp(-(a + b) / 2) * (std::exp(-c.depth(a)[k]) - std::exp(-c.depth(b)[k]));
-    }
-    expect_means(means_of(80000,
-                          [&](const SampleKey<float>& key) {
-                            const Flight<float> f = flight(key, kInf);
-                            return f.stopped ? f.weight * std::exp(-f.t) : Color<float>(0.f);
-                          }),
-                 expected, c.name + ", where");
-  }
 }
 
 TEST(VolumeTracking, EmissionIsTheIntegral) {

@@ -62,7 +62,8 @@ TEST(Volumes, AreOnePicture) {
   const auto scene = smoky();
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 1u);
   Settings s = volume_settings(13, 9, 5, 6);
-  s.aovs.bits |= static_cast<uint32_t>(Aov::kDirect) | static_cast<uint32_t>(Aov::kIndirect);
+  s.aovs.bits |= Aov::kDirect | Aov::kIndirect | Aov::kTransmittance | Aov::kHalfDepth |
+                 Aov::kCryptoObject | Aov::kMaterialId;
   WaveRun reference(scene, {s}, accel);
   reference.all(64);
   const Picture expected = reference.picture();

@@ -38,6 +38,8 @@ _SUFFIXES = {
     "guide_albedo": "RGB",
     "guide_normal": "XYZ",
     "depth_nearest": "Z",
+    "transmittance": "RGB",
+    "half_depth": "Z",
     "motion": "UV",
 }
 _COLOURS = (
@@ -51,6 +53,7 @@ _COLOURS = (
     "guide_albedo",
     "guide_normal",
     "unbiased",
+    "transmittance",
     "by_bounces",
     "by_light_samples",
     "by_light_paths",

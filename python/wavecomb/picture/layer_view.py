@@ -23,7 +23,7 @@ RADIANCE = (
     *("by_bounces", "by_light_samples", "by_light_paths"),
 )
 """Shown with exposure and tone mapping, as are light groups."""
-_COLOURS = ("albedo", "guide_albedo")
+_COLOURS = ("albedo", "guide_albedo", "transmittance")
 _NORMALS = ("normal", "guide_normal")
 _IDS = ("material_id", "instance_id")
 _CRYPTO = ("crypto_", "Crypto")
@@ -33,6 +33,7 @@ _UNITS = {
     "error": "error of the pixel",
     "variance": "variance, luminance",
     "depth": "depth, scene units",
+    "half_depth": "depth to half opacity, scene units",
     "guided_share": "share of bounces that are guided",
     "survival": "probability that roulette lets go on",
 }

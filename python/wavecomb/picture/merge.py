@@ -44,6 +44,11 @@ def _sums() -> tuple[str, ...]:
     return ("samples", *of_kind("sum"))
 
 
+def _counted() -> tuple[str, ...]:
+    """Layers whose pixels count where they are finite."""
+    return (*of_kind("mean_of_hits"), *of_kind("median"))
+
+
 @dataclass(frozen=True)
 class Merged:
     """Several pictures as one.
@@ -244,7 +249,7 @@ def _add(
             values = values * samples**2
         elif name in SPREAD:
             values = (values * samples) ** 2
-        elif name in of_kind("mean_of_hits"):
+        elif name in _counted():
             hit = np.isfinite(values)
             values = np.where(hit, values, 0) * samples
             hits = _HITS + name
@@ -267,7 +272,7 @@ def _means(
             values = values * weight**2
         elif name in SPREAD:
             values = np.sqrt(values) * weight
-        elif name in of_kind("mean_of_hits"):
+        elif name in _counted():
             hits = sums[_HITS + name]
             values = np.where(hits > 0, values / np.maximum(hits, 1.0), np.inf)
         elif name not in _sums() and name not in of_kind("nearest"):

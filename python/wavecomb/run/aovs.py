@@ -31,8 +31,8 @@ class Aov:
     Attributes:
         name: Of ``--aov`` and of the layer.
         channels: Of its layer; 0 where that is none of numbers, or there are several.
-        kind: How samples become a pixel: "mean", "mean_of_hits", "nearest", "coverage", "groups" or
-            "sum".
+        kind: How samples become a pixel: "mean", "mean_of_hits", "nearest", "coverage", "groups",
+            "sum" or "median".
         title: In the window; "" where it does not offer the layer.
     """
 
@@ -121,7 +121,10 @@ def for_core(aovs: Iterable[str]) -> list[str]:
     ]
 
 
-_SUM_BYTES = {"mean": 8, "mean_of_hits": 8, "nearest": 4, "coverage": 0, "groups": 0, "sum": 8}
+_SUM_BYTES = {
+    **{"mean": 8, "mean_of_hits": 8, "nearest": 4, "coverage": 0, "groups": 0, "sum": 8},
+    "median": 88,
+}
 """A channel in the film; what has none is counted apart."""
 
 

@@ -33,6 +33,8 @@ NAMED = MappingProxyType(
         "volume": "CV.*",
         "volume_direct": f"CV{_ANY_LIGHT}",
         "volume_indirect": f"CV.+{_ANY_LIGHT}",
+        "volume_emission": "CE",
+        "volume_beauty": "C(V.*|E)",
         "background": "CB",
         # Karma
         "directdiffuse": f"C<RD>{_ANY_LIGHT}",

@@ -24,6 +24,7 @@ enum class AovKind : uint8_t {
   kExpressions,  ///< a layer of means for each light path expression
   kSum,          ///< the sum over its samples
   kDeep,         ///< samples by depth, which go to a file of their own (film/deep_film.h)
+  kMedian,       ///< about the median of its samples (film/median.h), which may be infinite
 };
 
 /// Who finds the value of a path.
@@ -69,7 +70,9 @@ enum class AovSource : uint8_t {
   X(DepthNearest, "depth_nearest", 1, kNearest, kHit, "Depth, unfiltered")                    \
   X(Distance, "distance", 1, kNearest, kHit, "Distance, unfiltered")                          \
   X(Motion, "motion", 2, kNearest, kHit, "Motion in the picture")                             \
-  X(Deep, "deep", 0, kDeep, kHit, "")
+  X(Deep, "deep", 0, kDeep, kHit, "")                                                         \
+  X(Transmittance, "transmittance", 3, kMean, kHit, "Transmittance of volumes")               \
+  X(HalfDepth, "half_depth", 1, kMedian, kHit, "Depth to half opacity")
 // clang-format on
 
 namespace detail {

@@ -29,9 +29,10 @@ inline constexpr uint32_t kPathEvents = 8;
 /// To be added to a reflection or a transmission.
 inline constexpr uint32_t kDiffuseEvent = 0, kGlossyEvent = 1, kSingularEvent = 2;
 
-/// What brings light: a light, a dome (which is a light, too), or an object that shines.
-enum class PathEnd : uint32_t { kLight, kBackground, kObject };
-inline constexpr uint32_t kPathEnds = 3;
+/// What brings light: a light, a dome (which is a light, too), or an object or a volume that
+/// shines.
+enum class PathEnd : uint32_t { kLight, kBackground, kObject, kVolume };
+inline constexpr uint32_t kPathEnds = 4;
 /// The number of an end whose light is of group `key`.
 constexpr uint32_t path_end(PathEnd end, uint32_t key) {
   return kPathEnds * key + static_cast<uint32_t>(end);

@@ -54,7 +54,10 @@ PathSymbols symbols_of_letter(char letter) {
       ends({PathEnd::kBackground});
       break;
     case 'O':
-      ends({PathEnd::kObject});
+      ends({PathEnd::kObject, PathEnd::kVolume});
+      break;
+    case 'E':
+      ends({PathEnd::kVolume});
       break;
     default:
       break;
@@ -167,7 +170,7 @@ class ExpressionParser {
   /// A letter, '.', <...> or [...].
   PathSymbols symbol() {
     if (take('<')) return event();
-    if (!take('[')) return letter(".CLOBRTVWDGS");
+    if (!take('[')) return letter(".CLOBERTVWDGS");
     const bool is_negated = take('^');
     PathSymbols s;
     while (!take(']')) {
@@ -202,7 +205,7 @@ class ExpressionParser {
 
   /// What follows '<': what it is, how it scatters, and the group of a light.
   PathSymbols event() {
-    PathSymbols s = place(".CLOBRTVW");
+    PathSymbols s = place(".CLOBERTVW");
     // What ends a path scatters not: <L.> is L.
     if (peek() != '>' && peek() != '\'') {
       const PathSymbols scattered = place(".DGS");

@@ -93,6 +93,8 @@ struct Settings {
   LightSelection light_selection = LightSelection::kAuto;
   LightWeights light_weights = LightWeights::kCalibrated;
   Guiding guiding = Guiding::kOff;
+  /// Distances in even volumes are chosen by lamps, too (medium/equiangular.h).
+  bool equiangular = false;
   uint32_t learn_memory_mb = 64;  ///< that what is learned may take
   /// Sample every non-delta bounce by cosine (the dissertation's way).
   bool cosine_sampling = false;

@@ -205,6 +205,12 @@ std::vector<SettingInfo> work_settings() {
             "By what it brings to the picture, as some paths before the first pass find out."},
            {"power", "By its power, wherever it is."}},
           "How often each light is chosen."),
+      choice<&S::equiangular>(
+          "equiangular", "Lamps in fog",
+          {{"off", "Light is scattered where it is by density alone."},
+           {"on",
+            "And where lamps are near, in volumes that are even, as often as they are near."}},
+          "How distances in even volumes are chosen."),
       choice<&S::guiding>(
           "guiding", "Guiding",
           {{"auto", "By the field where it pays, as some paths before the first pass find out."},

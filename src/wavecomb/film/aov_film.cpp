@@ -39,6 +39,7 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixe
       case AovKind::kGroups:
       case AovKind::kExpressions:
       case AovKind::kSum:
+      case AovKind::kMedian:
         sums_[place_of(row.aov)].resize(pixels * words_of(row));
         break;
       case AovKind::kNearest:
@@ -109,6 +110,10 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
       return {row.name, row.channels, nearest_[place_of(aov)]};
     case AovKind::kCoverage:
       return crypto_layer(aov, samples);
+    case AovKind::kMedian:
+      return make_layer(row.name, row.channels, pixels_, [&](size_t i, float* out) {
+        *out = static_cast<float>(median_of(sums.data() + i * MedianSketch::kWords));
+      });
     case AovKind::kGroups:
     case AovKind::kExpressions:
     case AovKind::kDeep:

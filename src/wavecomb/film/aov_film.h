@@ -11,6 +11,7 @@
 #include "wavecomb/core/aov.h"
 #include "wavecomb/film/cryptomatte.h"
 #include "wavecomb/film/deep_film.h"
+#include "wavecomb/film/median.h"
 
 namespace wavecomb {
 
@@ -45,8 +46,8 @@ class AovFilm {
 
   // ---- one sample's values ----------------------------------------------------------------------
 
-  /// Sums of an AOV that is a mean or a sum, by channel; null where it is not kept. Those of light
-  /// groups stand side by side, and those of expressions.
+  /// Sums of an AOV that is a mean, a sum or a median, by channel; null where it is not kept. Those
+  /// of light groups stand side by side, and those of expressions.
   double* sums(Aov aov, size_t pixel) {
     std::vector<double>& all = sums_[place_of(aov)];
     return all.empty() ? nullptr : all.data() + pixel * words_of(row_of(aov));
@@ -55,6 +56,10 @@ class AovFilm {
   void add(Aov aov, size_t pixel, const float* values) {
     double* to = sums(aov, pixel);
     for (uint32_t c = 0; c < row_of(aov).channels; ++c) to[c] += double{values[c]};
+  }
+  /// Adds a number, infinite where there is none, to an AOV that is a median.
+  void add_to_median(Aov aov, size_t pixel, float value) {
+    MedianSketch(sums(aov, pixel)).add(double{value});
   }
   /// A sample has hit something: counts for means of hits.
   void count_hit(size_t pixel) { ++hits_[pixel]; }
@@ -120,6 +125,7 @@ class AovFilm {
   /// Sums of a pixel.
   size_t words_of(const AovRow& row) const {
     if (row.kind == AovKind::kGroups) return 3 * layout_.light_groups;
+    if (row.kind == AovKind::kMedian) return MedianSketch::kWords;
     return row.kind == AovKind::kExpressions ? 3 * layout_.expressions : row.channels;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;

@@ -41,6 +41,7 @@ CryptoTables::CryptoTables(const Scene& scene, AovSet aovs) {
   const ObjectNames names(scene);
   first_object = names.first_object();
   first_light = names.first_light();
+  first_volume = names.first_volume();
   const auto fill = [&](std::vector<uint32_t>& ids, const auto& name) {
     ids.resize(names.count());
     constexpr size_t kChunk = 4096;

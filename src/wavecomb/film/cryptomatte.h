@@ -60,6 +60,7 @@ struct CryptoPixel {
 struct CryptoTables {
   std::vector<uint32_t> first_object;  ///< of each instance: object = first_object[inst] + geom
   uint32_t first_light = 0;            ///< object of light record 0
+  uint32_t first_volume = 0;           ///< object of volume 0
   std::vector<uint32_t> object_id, asset_id;  ///< by object
   std::vector<uint32_t> material_id;
 

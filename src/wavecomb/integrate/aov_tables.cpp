@@ -52,6 +52,7 @@ void AovTables::keep_groups(const Scene& scene, const Settings& settings) {
   }
   kept_group = scene.groups_of_lights();
   for (uint32_t& group : kept_group) group = place[group];
+  group_of_rest = place.front();
   layout.light_groups = static_cast<uint32_t>(kept_names.size());
 }
 
@@ -71,6 +72,7 @@ void AovTables::keep_expressions(const Scene& scene, const Settings& settings) {
     end_of_light.push_back(path_end(end, groups[i]));
   }
   end_of_light.push_back(path_end(PathEnd::kObject, 0));
+  end_of_light.push_back(path_end(PathEnd::kVolume, 0));
 }
 
 }  // namespace wavecomb

@@ -24,6 +24,7 @@ struct AovTables {
   CryptoTables crypto;
   /// By light: where its group is kept among the film's, or kNoGroup.
   std::vector<uint32_t> kept_group;
+  uint32_t group_of_rest = kNoGroup;  ///< where that of what is no light is kept
   /// Of the film's groups, then of its expressions.
   std::vector<std::string> kept_names;
   PathAutomaton automaton;             ///< of the expressions
@@ -42,6 +43,12 @@ struct AovTables {
   template <typename U>
   U light_object(const U& light) const {
     return crypto.first_object.empty() ? U(kNothingHit) : U(light + crypto.first_light);
+  }
+
+  /// And volume `volume`.
+  template <typename U>
+  U volume_object(const U& volume) const {
+    return crypto.first_object.empty() ? U(kNothingHit) : U(volume + crypto.first_volume);
   }
 
   /// Throws Error for a light group that the scene does not have.

@@ -49,6 +49,7 @@ struct Flight {
   UInt<F> material;  ///< and what: its program shades the vertex
   Color<F> weight;   ///< of the throughput: transmittance over the probability of this outcome,
                      ///< or over the density of t, times the extinction there
+  Mask<F> walked{false};  ///< it is elsewhere now, by collisions that are no vertices
 };
 
 /// Nothing between surfaces.

@@ -19,12 +19,21 @@ struct FirstHitRow {
   WAVECOMB_FIELDS(position, object, material, instance, depth, distance)
 };
 
-/// What a deep picture has of a path.
+/// What paths meet in a volume: its number, or, in a mesh, placed_geometry of the mesh; and the
+/// material.
 template <typename F>
-struct DeepRow {
-  F depth;      ///< infinite where the camera's ray has met nothing
-  F in_volume;  ///< 1 where a volume has stopped it, else 0
-  WAVECOMB_FIELDS(depth, in_volume)
+struct VolumeSeen {
+  UInt<F> volume, place, material;
+  Mask<F> in_mesh;
+};
+
+/// How the camera's ray went.
+template <typename F>
+struct RayEndRow {
+  F depth;           ///< infinite where the camera's ray has met nothing
+  F in_volume;       ///< 1 where a volume has stopped it, else 0
+  Color<F> through;  ///< what volumes let through of what it has met, 0 where they have stopped it
+  WAVECOMB_FIELDS(depth, in_volume, through)
 };
 
 /// Values that AOVs of the nearest sample have of it: a line for each such row whose source is

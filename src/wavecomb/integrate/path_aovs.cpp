@@ -31,7 +31,8 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
   };
   const auto for_each_vertex_aov = [&](AovKind kind, const auto& one) {
     for (const AovRow& row : kAovs)
-      if (row.kind == kind && vertex_at_[place_of(row.aov)] != kNotKept)
+      if (row.kind == kind && row.source == AovSource::kVertex &&
+          vertex_at_[place_of(row.aov)] != kNotKept)
         one(row.aov, vertex_.rows + vertex_at_[place_of(row.aov)]);
   };
   for_each_vertex_aov(AovKind::kMean, [&](Aov aov, const float* rows) {
@@ -43,12 +44,13 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       film.add(Aov::kDepth, pixel, depth_.rows + slot);
       film.count_hit(pixel);
     });
-  if (deep_)
-    for_each_slot([&](uint32_t slot) {
-      const auto row = load_row<DeepRow, float>(deep_.rows, slot, true);
-      if (std::isfinite(row.depth))
-        film.deep().add(pixel, row.depth, row.in_volume > 0, radiance + slot * kRadianceWords);
-    });
+  for (auto slot = static_cast<uint32_t>(begin); end_ && slot < end; ++slot) {
+    const auto row = load_row<RayEndRow, float>(end_.rows, slot, true);
+    if (layout_.set.has(Aov::kTransmittance)) film.add(Aov::kTransmittance, pixel, &row.through.x);
+    if (layout_.set.has(Aov::kHalfDepth)) film.add_to_median(Aov::kHalfDepth, pixel, row.depth);
+    if (layout_.set.has(Aov::kDeep) && std::isfinite(row.depth))
+      film.deep().add(pixel, row.depth, row.in_volume > 0, radiance + slot * kRadianceWords);
+  }
   if (hits_) {
     for_each_slot([&](uint32_t slot) {
       const auto hit = load_row<FirstHitRow, float>(hits_.rows, slot, true);

@@ -65,7 +65,7 @@ class PathAovs {
     }
     rows(vertex_, words > 0, words);
     rows(depth_, set.has(Aov::kDepth), 1);
-    rows(deep_, set.has(Aov::kDeep), kRowWords<DeepRow>);
+    rows(end_, set.any(Aov::kDeep | Aov::kHalfDepth | Aov::kTransmittance), kRowWords<RayEndRow>);
     rows(hits_, set.has(AovKind::kNearest) || set.has(AovKind::kCoverage), kRowWords<FirstHitRow>);
     rows(centre_, set.has(AovKind::kNearest), 1);
     rows(motion_, set.has(Aov::kMotion), 2);
@@ -96,8 +96,8 @@ class PathAovs {
     expressions_.clear(slots);
     constexpr float kFar = std::numeric_limits<float>::infinity();
     if (depth_) std::fill_n(depth_.rows, slots, kFar);
-    for (uint32_t i = 0; deep_ && i < slots; ++i)
-      store_row<DeepRow, float>(deep_.rows, i, {kFar, 0.f}, true);
+    for (uint32_t i = 0; end_ && i < slots; ++i)
+      store_row<RayEndRow, float>(end_.rows, i, {kFar, 0.f, Color<float>(1.f)}, true);
     const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit,
                                   kNothingHit,      kFar,        kFar};
     for (uint32_t i = 0; hits_ && i < slots; ++i)
@@ -113,7 +113,7 @@ class PathAovs {
 
   // ---- first hits -------------------------------------------------------------------------------
 
-  bool wants_hits() const { return hits_ || depth_ || deep_; }
+  bool wants_hits() const { return hits_ || depth_ || end_; }
   bool wants_alpha() const { return bool(alpha_); }
   /// The camera's rays of the active lanes have met something that covers what is behind.
   template <typename F>
@@ -156,13 +156,28 @@ class PathAovs {
     scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
   }
 
-  /// A volume has stopped the camera's ray at `p`.
+  /// A volume has stopped the camera's ray at `p`: `seen`. There is no surface whose place, depth
+  /// and instance could be told.
   template <typename F>
-  void hit_volume(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
-                  const Mask<F>& active) const {
-    if (!deep_) return;
-    const F depth = camera_depth<F>(camera, p, time, active);
-    store_row<DeepRow, F>(deep_.rows, slot, {depth, F(1.f)}, active);
+  [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
+                                               const Vec3<F>& p, const F& time,
+                                               const VolumeSeen<F>& seen,
+                                               const Mask<F>& active) const {
+    if (end_) scatter_ray_end<F>(slot, camera_depth<F>(camera, p, time, active), F(1.f), active);
+    if (!hits_) return;
+    const F far(std::numeric_limits<float>::infinity());
+    const UInt<F> object =
+        select(Mask<UInt<F>>(seen.in_mesh), seen.place, tables_->volume_object(seen.volume));
+    store_row<FirstHitRow, F>(
+        hits_.rows, slot, {Vec3<F>(F(0.f)), object, seen.material, UInt<F>(kNothingHit), far, far},
+        active);
+  }
+  bool wants_transmittance() const { return layout_.set.has(Aov::kTransmittance); }
+  /// So much of what is behind comes through volumes along the camera's ray, if only what comes
+  /// through counts.
+  template <typename F>
+  void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
+    scatter_words<F>(end_.rows, through, slot * uint32_t{kRowWords<RayEndRow>} + 2u, active);
   }
 
   // ---- vertices ---------------------------------------------------------------------------------
@@ -223,6 +238,12 @@ class PathAovs {
                  const Mask<F>& active) const {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (expressions_) expressions_.add<F>(slot, light, c, active);
+  }
+  /// A volume that shines has.
+  template <typename F>
+  void add_glow(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+    if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
+    if (expressions_) expressions_.add_glow<F>(slot, c, active);
   }
   /// The light samples of the last vertices have brought `c`, of a light of `group`.
   template <typename F>
@@ -316,7 +337,7 @@ class PathAovs {
   using Block = SlotRows;
 
   std::array<const Block*, 14> blocks() const {
-    return {&vertex_, &depth_,   &deep_,   &hits_,  &centre_,        &parts_[0], &parts_[1],
+    return {&vertex_, &depth_,   &end_,    &hits_,  &centre_,        &parts_[0], &parts_[1],
             &groups_, &cost_ns_, &guides_, &alpha_, &light_samples_, &bounces_,  &motion_};
   }
 
@@ -328,11 +349,18 @@ class PathAovs {
     return at;
   }
 
+  /// How deep the camera's ray went, and whether a volume has stopped it: the head of RayEndRow.
+  template <typename F>
+  void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
+                       const Mask<F>& active) const {
+    const UInt<F> at = slot * uint32_t{kRowWords<RayEndRow>};
+    scatter_words<F>(end_.rows, Vec2<F>{depth, in_volume}, at, active);
+  }
   /// Distance along the camera's axis, of a surface.
   template <typename F>
   void store_depth(const UInt<F>& slot, const F& depth, const Mask<F>& active) const {
     if (depth_) scatter<F>(depth_.rows, depth, slot, active);
-    if (deep_) store_row<DeepRow, F>(deep_.rows, slot, {depth, F(0.f)}, active);
+    if (end_) scatter_ray_end<F>(slot, depth, F(0.f), active);
   }
 
   /// What guides a denoiser, of paths that have met clear surfaces only so far.
@@ -361,7 +389,7 @@ class PathAovs {
 
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
-  Block vertex_, depth_, deep_, hits_;
+  Block vertex_, depth_, end_, hits_;
   /// By an AOV's place: its words in a row of vertex_, or kNotKept.
   std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
   Block motion_;                ///< pixels, x and y

@@ -38,12 +38,13 @@ static_assert(PathAutomaton::kMostStates <= 1024);
 class PathExpressions {
  public:
   PathExpressions() = default;
-  /// `end_of_light`: path_end of each light, and at the end that of what is no light.
+  /// `end_of_light`: path_end of each light, and at the end those of what is no light: surfaces,
+  /// then volumes.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
                   const std::vector<uint32_t>& end_of_light)
       : automaton_(&automaton),
         end_of_light_(end_of_light.data()),
-        lights_(static_cast<uint32_t>(end_of_light.size() - 1)),
+        lights_(static_cast<uint32_t>(end_of_light.size() - 2)),
         words_(3 * automaton.expressions),
         rows_(1, capacity * kRowWords<ExpressionRow>),
         sums_(1, capacity * words_) {}
@@ -72,6 +73,15 @@ class PathExpressions {
     add_to<F>(slot, states, end_of<F>(light, active), c, active);
   }
 
+  /// Volumes that shine have.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void add_glow(const UInt<F>& slot, const Color<F>& c,
+                                             const Mask<F>& active) const {
+    if (none(active)) return;
+    const UInt<F> states = load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
+    add_to<F>(slot, states, UInt<F>(end_of_light_[lights_ + 1]), c, active);
+  }
+
   /// A vertex was shaded: `v` says how it scatters. `has_shadow`: where a light sample is under
   /// way.
   template <typename F>
@@ -98,6 +108,16 @@ class PathExpressions {
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
 
+  /// The paths have walked through what scatters within a mesh.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void walk(const UInt<F>& slot, const Mask<F>& active) const {
+    using U = UInt<F>;
+    ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
+    row.states =
+        next_of_all<F>(row.states, U(static_cast<uint32_t>(PathEvent::kVolume)), U(0u), active);
+    store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
+  }
+
   /// The light sample under way has brought `c`.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void add_lit(const UInt<F>& slot, const Color<F>& c,
@@ -107,11 +127,8 @@ class PathExpressions {
     const ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
     const Color<F> diffuse = c * row.lit_diffuse;
     const auto add_part = [&](uint32_t lobe, const Color<F>& part) {
-      U states(0u);
-      for (uint32_t i = 0; i < 3; ++i)
-        states = states | (next<F>(state_of<F>(row.lit_states, i), row.lit_event, U(lobe), active)
-                           << (kStateBits * i));
-      add_to<F>(slot, states, row.lit_end, part, active);
+      add_to<F>(slot, next_of_all<F>(row.lit_states, row.lit_event, U(lobe), active), row.lit_end,
+                part, active);
     };
     add_part(kDiffuseEvent, diffuse);
     add_part(kGlossyEvent, c - diffuse);
@@ -139,6 +156,15 @@ class PathExpressions {
     const U at =
         state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
     return gather<U>(automaton_->next.data(), at, Mask<U>(active));
+  }
+  /// The same of the states of all colours.
+  template <typename F>
+  UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
+                      const Mask<F>& active) const {
+    UInt<F> all(0u);
+    for (uint32_t i = 0; i < 3; ++i)
+      all = all | (next<F>(state_of<F>(states, i), event, lobe, active) << (kStateBits * i));
+    return all;
   }
   template <typename F>
   UInt<F> end_of(const UInt<F>& light, const Mask<F>& active) const {

@@ -100,12 +100,13 @@ class PathTracer {
         const Flight<F> flight = fly(key, depth, path, hit);
         if constexpr (Media::kShines)
           if (media_.shines())
-            add(kNoLight,
+            add_glow(
                 clean<F>(path.throughput *
                              media_.template emission<F>(
                                  {settings_.sampler, key, depth, path.o, path.dir, hit.t}, true),
                          clamp_limit(settings_, depth)));
         path.throughput = path.throughput * flight.weight;
+        note_way(depth, flight, path.throughput);
         if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
       }
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
@@ -141,7 +142,8 @@ class PathTracer {
             screen_motion_of_hit<F>(scene, *context_.camera,
                                     {hit.inst, mesh, hit.prim, hit.u, hit.v, 0.f}, path.dir, true),
             true);
-      if (depth == 0 && !on_surface) aovs_.hit_volume<F>(*context_.camera, kSlot, p, time, true);
+      if (depth == 0 && !on_surface)
+        aovs_.hit_volume<F>(*context_.camera, kSlot, p, time, volume_seen(material), true);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
         aovs_.survive<F>(depth, kSlot, q, true);
@@ -223,6 +225,26 @@ class PathTracer {
   void add(uint32_t light, const Color<F>& c) {
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_light<F>(kSlot, light, c, true);
+  }
+
+  /// A volume that shines has.
+  void add_glow(const Color<F>& c) {
+    radiance_.sum += c;
+    if (aovs_.wants_lights()) aovs_.add_glow<F>(kSlot, c, true);
+  }
+  /// Tells AOVs how the path, whose throughput is now `throughput`, has come.
+  void note_way(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
+    const bool straight = !flight.stopped && !flight.walked;
+    if (depth == 0 && aovs_.wants_transmittance())
+      aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
+    if (aovs_.expressions() && flight.walked) aovs_.expressions().walk<F>(kSlot, true);
+  }
+  /// What has stopped the path.
+  VolumeSeen<F> volume_seen(uint32_t material) const {
+    const SceneView& scene = context_.scene;
+    if (context_.knows_inside() && material == scene.interiors.event_material)
+      return {0, inside_.place, inside_.medium, true};
+    return {material - scene.volumes.first_material, 0, material, false};
   }
 
   /// What the free shadow ray of `v` brings, of a light of `group`, as much as comes through.

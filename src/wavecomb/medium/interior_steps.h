@@ -127,7 +127,7 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
   if (any(done)) {
     InsideRow<F> row;
     inside.store_in(row);
-    row.place = met.object;
+    row.place = select(Mask<U>(event), now.place, met.object);
     row.crossed = U(0u);
     row.outer = met.outer;
     row.medium = now.material;
@@ -164,9 +164,7 @@ inline void Interiors::finish(const InteriorRays& all, const HitSpan& hits,
   const auto number = [&](uint32_t* to, const U& x) { scatter<U>(to, x, r.who, Mask<U>(done)); };
   real(events.t, r.s.start);
   number(events.material, material);
-  const bool marks = events.limited && any(walked);
-  number(events.hero,
-         marks ? select(Mask<U>(walked), U(uint32_t{Flights::kNoHero}), r.s.hero) : r.s.hero);
+  number(events.hero, select(Mask<U>(walked), U(uint32_t{Flights::kNoHero}), r.s.hero));
   const Color<F>&ratio = r.l.ratio, &absorbed = r.l.absorbed;
   const F* const from[6] = {&ratio.x, &ratio.y, &ratio.z, &absorbed.x, &absorbed.y, &absorbed.z};
   for (size_t k = 0; k < 3; ++k) {

@@ -12,6 +12,7 @@
 /// no schedule changes.
 #pragma once
 
+#include "wavecomb/medium/even_flights.h"
 #include "wavecomb/medium/ways.h"
 
 namespace wavecomb {
@@ -37,39 +38,6 @@ struct Way {
 
 // ---- flights -----------------------------------------------------------------------------------
 
-/// What becomes of flights, side by side. Before: `t` is how far they may go, `material` kNoEvent,
-/// `ratio` 1.
-struct Flights {
-  static constexpr uint32_t kNoEvent = 0xffffffffu;
-  static constexpr uint32_t kNoHero = 4;  ///< of a flight that is none of volumes any more
-
-  float* t;
-  uint32_t* material;  ///< of the volume that stopped a flight
-  float* ratio[3];     ///< by channel: probability of what happened, over that by the channel that
-                       ///< decided
-  const uint32_t* hero;  ///< the channel that decides
-};
-
-/// The channel that decides: each as often as it has of the throughput.
-template <typename F>
-inline UInt<F> hero_of(const F& u, const Color<F>& throughput) {
-  using U = UInt<F>;
-  const F at = u * (throughput.x + throughput.y + throughput.z);
-  return select(at < throughput.x, U(0u),
-                select(at < F(throughput.x + throughput.y), U(1u), U(2u)));
-}
-
-/// Each channel decides in so many flights as it has of the path's throughput T (hero wavelengths,
-/// Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). So the weight of a flight is, with
-/// the probabilities p_c of what happened,
-///   p_c sum(T) / sum over channels k of T_k p_k
-/// which leaves sum(T) as it was, however often the path is scattered.
-template <typename F>
-inline Color<F> flight_weight(const Color<F>& ratio, const Color<F>& throughput) {
-  const F sum = throughput.x + throughput.y + throughput.z, shares = dot(ratio, throughput);
-  return ratio * F(sum / select(shares > 0.f, shares, F(1.f)));
-}
-
 namespace detail {
 
 /// Flights through one volume.
@@ -78,8 +46,7 @@ class FlightVisitor {
   using U = UInt<F>;
 
  public:
-  enum Keeps { kStops, kRatios, kBoth };
-  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, Keeps keeps)
+  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightKeeps keeps)
       : v_(v), material_(material), flights_(flights), keeps_(keeps) {}
 
   void start(const U& way, const Mask<F>& lanes) {
@@ -110,12 +77,12 @@ class FlightVisitor {
   }
   void finish(const U& way, const Mask<F>& lanes) {
     if (none(lanes)) return;
-    if (keeps_ != kRatios) {
+    if (keeps_ != FlightKeeps::kRatios) {
       const Mask<F> stops = lanes & stopped_;
       scatter<F>(flights_.t, x_, way, stops);
       scatter<U>(flights_.material, U(material_), way, Mask<U>(stops));
     }
-    if (keeps_ == kStops || v_.is_grey) return;
+    if (keeps_ == FlightKeeps::kStops || v_.is_grey) return;
     const F* const ratio[3] = {&ratio_.x, &ratio_.y, &ratio_.z};
     for (int k = 0; k < 3; ++k)
       scatter<F>(flights_.ratio[k], F(gather<F>(flights_.ratio[k], way, lanes) * *ratio[k]), way,
@@ -126,7 +93,7 @@ class FlightVisitor {
   const VolumeRecord& v_;
   uint32_t material_;
   const Flights& flights_;
-  Keeps keeps_;
+  FlightKeeps keeps_;
   F of_hero_{0.f}, x_{0.f};
   Color<F> ratio_{F(1.f)};
   Mask<F> stopped_{false};
@@ -139,7 +106,7 @@ namespace detail {
 /// Flies through one volume.
 template <typename F>
 inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, const Flights& flights,
-                   typename FlightVisitor<F>::Keeps keeps, VolumeCounts& counts) {
+                   FlightKeeps keeps, VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[i];
   FlightVisitor<F> visitor(v, volumes.first_material + i, flights, keeps);
   each_collision<F>(v.density, v.most_extinction, i, ways, counts, visitor);
@@ -152,57 +119,70 @@ inline bool are_grey(const VolumeView& volumes) {
   return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
                      [](const VolumeRecord& v) { return v.is_grey; });
 }
+/// Whether flights weigh anything. `lamps`: the lights by which distances are drawn, too, in
+/// volumes that are even; or null.
+inline bool weigh_anything(const VolumeView& volumes, const LightView* lamps) {
+  return lamps || !are_grey(volumes);
+}
 
 /// Flies through all volumes, and finds what stops flights alone. `scratch` gets how far they might
 /// go, which is `ways.most` and `flights.t`.
 template <typename F>
 inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                         float* scratch, VolumeCounts& counts) {
+                         float* scratch, const LightView* lamps, VolumeCounts& counts) {
   std::copy_n(flights.t, ways.count, scratch);
   for (uint32_t i = 0; i < volumes.count; ++i)
-    detail::fly_in<F>(volumes, i, ways, flights, detail::FlightVisitor<F>::kStops, counts);
+    if (lamps && is_drawn_by_lamps(volumes.volumes[i]))
+      fly_evenly<F>(volumes, i, ways, scratch, flights, FlightKeeps::kStops, *lamps, counts);
+    else
+      detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kStops, counts);
 }
 
 /// And the ratios, once all know where they stop: flights through the first volumes went further
 /// than that, so once more, with the same numbers, to there. A flight to its own end is itself.
 template <typename F>
 inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                          float* scratch, VolumeCounts& counts) {
+                          float* scratch, const LightView* lamps, VolumeCounts& counts) {
   Ways once_more = ways;
   once_more.most = scratch + ways.count;
   for (uint32_t i = 0; i < volumes.count; ++i) {
+    if (lamps && is_drawn_by_lamps(volumes.volumes[i])) {
+      fly_evenly<F>(volumes, i, ways, scratch, flights, FlightKeeps::kRatios, *lamps, counts);
+      continue;
+    }
+    if (volumes.volumes[i].is_grey) continue;
     for (size_t k = 0; k < ways.count; ++k) {
       scratch[ways.count + k] =
           flights.material[k] == volumes.first_material + i ? scratch[k] : flights.t[k];
       if (flights.hero[k] == Flights::kNoHero) scratch[ways.count + k] = 0;
     }
-    detail::fly_in<F>(volumes, i, once_more, flights, detail::FlightVisitor<F>::kRatios, counts);
+    detail::fly_in<F>(volumes, i, once_more, flights, FlightKeeps::kRatios, counts);
   }
 }
 
 /// Both. `ways.most` is `flights.t`; `scratch` has room for twice as many numbers.
 template <typename F>
 inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
-                        float* scratch, VolumeCounts& counts) {
-  if (volumes.count > 1 && !are_grey(volumes)) {
-    stop_flights<F>(volumes, ways, flights, scratch, counts);
-    weigh_flights<F>(volumes, ways, flights, scratch, counts);
+                        float* scratch, const LightView* lamps, VolumeCounts& counts) {
+  if (lamps || (volumes.count > 1 && !are_grey(volumes))) {
+    stop_flights<F>(volumes, ways, flights, scratch, lamps, counts);
+    weigh_flights<F>(volumes, ways, flights, scratch, lamps, counts);
     return;
   }
   for (uint32_t i = 0; i < volumes.count; ++i)
-    detail::fly_in<F>(volumes, i, ways, flights, detail::FlightVisitor<F>::kBoth, counts);
+    detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kBoth, counts);
 }
 
 /// One flight of each lane.
 template <typename F>
 inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
                              const Color<F>& throughput, const Mask<F>& active,
-                             VolumeCounts& counts) {
+                             const LightView* lamps, VolumeCounts& counts) {
   using U = UInt<F>;
   constexpr size_t kLanes = kWidth<F>;
   const Way<F> way(p, VertexSet::kFlight);
   const PacketWays<F> packet(p.o, p.d, p.t, way.seed, way.r.z, active);
-  alignas(64) float t[kLanes], ratio[3][kLanes], scratch[2 * kLanes];
+  alignas(64) float t[kLanes], ratio[3][kLanes], scale[3][kLanes], scratch[2 * kLanes];
   alignas(64) uint32_t material[kLanes], hero[kLanes];
   Ways ways = packet.ways();
   std::copy_n(ways.most, kLanes, t);
@@ -210,12 +190,17 @@ inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
   store(material, U(uint32_t{Flights::kNoEvent}));
   store(hero, hero_of<F>(way.r.y, throughput));
   for (auto& one : ratio) store(one, F(1.f));
-  fly_through<F>(volumes, ways, {t, material, {ratio[0], ratio[1], ratio[2]}, hero}, scratch,
-                 counts);
+  for (auto& one : scale) store(one, F(1.f));
+  fly_through<F>(
+      volumes, ways,
+      {t, material, {ratio[0], ratio[1], ratio[2]}, hero, {scale[0], scale[1], scale[2]}}, scratch,
+      lamps, counts);
   const U stopped_by = load<U>(material);
-  const Color<F> by_channel{load<F>(ratio[0]), load<F>(ratio[1]), load<F>(ratio[2])};
+  const auto three = [](const float (&columns)[3][kLanes]) {
+    return Color<F>(load<F>(columns[0]), load<F>(columns[1]), load<F>(columns[2]));
+  };
   return {Mask<F>(stopped_by != U(uint32_t{Flights::kNoEvent})), load<F>(t), stopped_by,
-          flight_weight<F>(by_channel, throughput)};
+          flight_weight<F>(three(ratio), throughput) * three(scale)};
 }
 
 // ---- transmittance -----------------------------------------------------------------------------
@@ -261,13 +246,18 @@ class TransmittanceVisitor {
 
 }  // namespace detail
 
-/// Multiplies each `product` by the transmittance of a way, by ratio tracking (Novak, Selle and
-/// Jarosz, "Residual Ratio Tracking", 2014, eq. 9), which ends at random where little is left.
+/// Multiplies each `product` by the transmittance of a way: where a volume is even, as it is, else
+/// by ratio tracking (Novak, Selle and Jarosz, "Residual Ratio Tracking", 2014, eq. 9), which ends
+/// at random where little is left.
 template <typename F>
 inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
                                   float* const (&product)[3], VolumeCounts& counts) {
   for (uint32_t i = 0; i < volumes.count; ++i) {
     const VolumeRecord& v = volumes.volumes[i];
+    if (is_even(v)) {
+      pass_evenly<F>(v, ways, product, counts);
+      continue;
+    }
     detail::TransmittanceVisitor<F> visitor(v, product);
     each_collision<F>(v.density, v.most_extinction, i, ways, counts, visitor);
   }

@@ -36,6 +36,11 @@ class Volumes {
         volumes_(context.scene.volumes),
         counts_(counts),
         walks_(walks),
+        lamps_(context.settings->equiangular && has_lamps(context.scene.lights) &&
+                       std::any_of(volumes_.volumes, volumes_.volumes + volumes_.count,
+                                   is_drawn_by_lamps)
+                   ? &context.scene.lights
+                   : nullptr),
         interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts) {}
 
   /// Whether light walks below surfaces.
@@ -90,7 +95,7 @@ class Volumes {
 
   template <typename F>
   Flight<F> fly(const Passage<F>& p, const Color<F>& throughput, const Mask<F>& active) const {
-    return fly_through<F>(volumes_, p, throughput, active, counts_.volumes);
+    return fly_through<F>(volumes_, p, throughput, active, lamps_, counts_.volumes);
   }
   template <typename F>
   Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
@@ -123,7 +128,10 @@ class Volumes {
       put_numbers<F>(wave, i, way);
       store(flights.t + i, knows_inside ? F(kInfinity) : load<F>(wave.hits.t + i));
       store(flights.material + i, UInt<F>(uint32_t{Flights::kNoEvent}));
-      for (float* ratio : flights.ratio) store(ratio + i, F(1.f));
+      for (size_t c = 0; c < 3; ++c) {
+        store(flights.ratio[c] + i, F(1.f));
+        store(flights.scale[c] + i, F(1.f));
+      }
       store(wave.ways.uints(kHero) + i, hero_of<F>(way.r.y, path.throughput));
     }
     const Ways ways{q.ox,
@@ -137,24 +145,25 @@ class Volumes {
                     wave.ways.floats(kFirst),
                     q.size};
     float* const scratch = wave.ways.floats(kScratch);
-    if (!knows_inside) return fly_through<F>(volumes_, ways, flights, scratch, counts_.volumes);
-    stop_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+    if (!knows_inside)
+      return fly_through<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
+    stop_flights<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
     fly_inside_all<F>(wave, depth, sampler);
-    if (!are_grey(volumes_)) weigh_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+    if (weigh_anything(volumes_, lamps_))
+      weigh_flights<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
   }
   /// Of the rays from `i` on, whose paths have this throughput.
   template <typename F>
   Flight<F> flight(const Wave& wave, size_t i, const Color<F>& throughput) const {
     const Flights f = flights_of(wave);
     const UInt<F> material = load<UInt<F>>(f.material + i);
-    const Color<F> ratio{load<F>(f.ratio[0] + i), load<F>(f.ratio[1] + i), load<F>(f.ratio[2] + i)};
-    Color<F> weight = flight_weight<F>(ratio, throughput);
-    if (context_.knows_inside()) {
-      const auto left = [&](size_t k) { return load<F>(wave.ways.floats(kAbsorbed + k) + i); };
-      weight = weight * Color<F>(left(0), left(1), left(2));
-    }
+    const auto three = [&](float* const(&columns)[3]) {
+      return Color<F>(load<F>(columns[0] + i), load<F>(columns[1] + i), load<F>(columns[2] + i));
+    };
+    const Color<F> weight = flight_weight<F>(three(f.ratio), throughput) * three(f.scale);
+    const Mask<F> walked(load<UInt<F>>(f.hero + i) == UInt<F>(uint32_t{Flights::kNoHero}));
     return {Mask<F>(material != UInt<F>(uint32_t{Flights::kNoEvent})), load<F>(f.t + i), material,
-            weight};
+            weight, walked};
   }
 
   template <typename F>
@@ -408,7 +417,8 @@ class Volumes {
     return {c.floats(kDistance),
             c.uints(kMaterial),
             {c.floats(kRatio), c.floats(kRatio + 1), c.floats(kRatio + 2)},
-            c.uints(kHero)};
+            c.uints(kHero),
+            {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)}};
   }
   template <typename F>
   static PathRow<F> path_at(const Wave& wave, const uint32_t* slots, size_t i, size_t size) {
@@ -425,6 +435,7 @@ class Volumes {
   const VolumeView volumes_;
   Counts& counts_;
   const SoaBlock& walks_;
+  const LightView* const lamps_;  ///< by which distances are drawn; null: not so
   const Interiors interiors_;
 };
 
@@ -448,8 +459,12 @@ Flight<float> Volumes::fly_inside(const SampleKey<float>& key, uint32_t depth, S
   const Way<F> way(sampler, key, depth, VertexSet::kFlight);
   uint32_t material = Flights::kNoEvent, hero = begin.hero;
   const Ways ways{&o[0], &o[1], &o[2], &d[0], &d[1], &d[2], &t, &way.seed, &way.r.z, 1};
-  const Flights flights{&t, &material, {&ratio[0], &ratio[1], &ratio[2]}, &hero};
-  stop_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+  const Flights flights{&t,
+                        &material,
+                        {&ratio[0], &ratio[1], &ratio[2]},
+                        &hero,
+                        {&absorbed[0], &absorbed[1], &absorbed[2]}};
+  stop_flights<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
   interiors_.fly<F>({{&o[0], &o[1], &o[2]}, {&d[0], &d[1], &d[2]}, &slot, 1, &time, row, place},
                     {&hit.t, &hit.u, &hit.v, &hit.prim, &hit.geom, &hit.inst},
                     {volumes_.count > 0,
@@ -467,10 +482,12 @@ Flight<float> Volumes::fly_inside(const SampleKey<float>& key, uint32_t depth, S
   path.pdf = walked.pdf;
   path.receiver = walked.receiver;
   inside = load_row<InsideRow, F>(place, 0u, true);
-  if (!are_grey(volumes_)) weigh_flights<F>(volumes_, ways, flights, scratch, counts_.volumes);
+  if (weigh_anything(volumes_, lamps_))
+    weigh_flights<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
   const Color<F> left{absorbed[0], absorbed[1], absorbed[2]};
   return {material != Flights::kNoEvent, t, material,
-          flight_weight<F>({ratio[0], ratio[1], ratio[2]}, path.throughput) * left};
+          flight_weight<F>({ratio[0], ratio[1], ratio[2]}, path.throughput) * left,
+          hero == Flights::kNoHero};
 }
 
 inline Color<float> Volumes::pass_inside(const PresenceKeys& keys, float time,

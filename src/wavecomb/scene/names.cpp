@@ -57,7 +57,8 @@ ObjectNames::ObjectNames(const Scene& scene) : scene_(scene) {
   for (const Instance& instance : scene.instances()) add(instance.group);
   const LightSet& set = scene.light_set();
   light_count_ = set.first_triangle();
-  if (next + light_count_ >= kNoName)
+  volume_count_ = static_cast<uint32_t>(scene.volumes().size());
+  if (next + light_count_ + volume_count_ >= kNoName)
     throw Error("more than 4 thousand million objects: ids of objects cannot be told apart");
   first_light_ = static_cast<uint32_t>(next);
   light_of_record_.resize(light_count_);
@@ -88,6 +89,7 @@ std::string_view ObjectNames::parent_root(const Placement& p) const {
 }
 
 std::string ObjectNames::object(uint32_t index) const {
+  if (index >= first_volume()) return scene_.volumes()[index - first_volume()].name;
   if (index >= first_light_) return scene_.lights()[light_of_record_[index - first_light_]].name;
   const Found found = find(index);
   const std::string& mesh = scene_.meshes()[found.mesh].name;

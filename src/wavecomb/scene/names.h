@@ -49,7 +49,7 @@ struct Placement {
   uint32_t number = kNoName;  ///< among those that share the name
 };
 
-/// What is known by a name: meshes, each placement of one apart, then lights.
+/// What is known by a name: meshes, each placement of one apart, then lights, then volumes.
 ///
 /// An object's name is its prim path as seen through its instances: "/World/Tree_7/Leaves", and
 /// "/World/Forest[12]/Leaves" for a point instance. Its asset is the nearest model of kind
@@ -60,12 +60,14 @@ class ObjectNames {
   explicit ObjectNames(const Scene& scene);
 
   /// Objects are numbered instance by instance, mesh by mesh of the group, the world first; light
-  /// records follow.
-  uint32_t count() const { return first_light_ + light_count_; }
+  /// records follow, then volumes.
+  uint32_t count() const { return first_volume() + volume_count_; }
   /// First object of each instance of SceneView::instances.
   const std::vector<uint32_t>& first_object() const { return first_object_; }
   /// Object of light record 0.
   uint32_t first_light() const { return first_light_; }
+  /// Object of volume 0.
+  uint32_t first_volume() const { return first_light_ + light_count_; }
 
   std::string object(uint32_t index) const;
   std::string asset(uint32_t index) const;
@@ -82,7 +84,7 @@ class ObjectNames {
   const Scene& scene_;
   std::vector<uint32_t> first_object_;
   std::vector<uint32_t> light_of_record_;
-  uint32_t first_light_ = 0, light_count_ = 0;
+  uint32_t first_light_ = 0, light_count_ = 0, volume_count_ = 0;
 };
 
 }  // namespace wavecomb

@@ -32,6 +32,37 @@ template <typename F>
       slot, active);
 }
 
+/// What has stopped the paths of a packet's flights.
+template <typename F>
+VolumeSeen<F> volume_seen(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
+                          const Flight<F>& flight) {
+  using U = UInt<F>;
+  const SceneView& scene = context.scene;
+  VolumeSeen<F> seen{flight.material - scene.volumes.first_material, U(0u), flight.material,
+                     Mask<F>(false)};
+  if (!context.knows_inside()) return seen;
+  seen.in_mesh = flight.stopped & Mask<F>(flight.material == U(scene.interiors.event_material));
+  const auto of_path = [&](auto member) {
+    return gather_field<F>(wave.pool.inside, member, slot, seen.in_mesh);
+  };
+  seen.place = of_path(&InsideRow<float>::place);
+  seen.material = select(Mask<U>(seen.in_mesh), of_path(&InsideRow<float>::medium), seen.material);
+  return seen;
+}
+
+/// Tells AOVs how paths, whose throughput is now `throughput`, have come through what lies between
+/// surfaces.
+template <typename F>
+void note_way(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
+              const Color<F>& throughput, const Mask<F>& active) {
+  if (depth == 0 && wave.aovs.wants_transmittance())
+    wave.aovs.pass<F>(slot, select<F>(flight.stopped | flight.walked, Color<F>(F(0.f)), throughput),
+                      active);
+  const Mask<F> walked = active & flight.walked;
+  if (wave.aovs.expressions() && any(walked))
+    wave.aovs.expressions().template walk<F>(slot, walked);
+}
+
 /// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order. Paths from
 /// lights (`kFromLights`) bring nothing where they end.
 template <typename F, typename Media, bool kFromLights = false>
@@ -71,7 +102,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
                 clamp_limit(settings, depth));
             const Mask<F> bright = active & not_(is_black(c));
             add_radiance<F>(wave.pool.radiance, slot, c, bright);
-            if (wave.aovs.wants_lights()) wave.aovs.add_light<F>(slot, U(kNoLight), c, bright);
+            if (wave.aovs.wants_lights()) wave.aovs.add_glow<F>(slot, c, bright);
           }
         if constexpr (Media::kStreams)
           flight = media.template flight<F>(wave, i, path.throughput);
@@ -83,6 +114,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         path.throughput = path.throughput * flight.weight;
         store_row<PathRow, F>(wave.pool.paths, slot, path, active);
         const Mask<F> through = not_(flight.stopped);
+        note_way<F>(wave, depth, slot, flight, path.throughput, active);
         missed = missed & through;
         shape = shape & through;
         surface = surface & through;
@@ -134,7 +166,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       wave.aovs.cover<F>(slot, shape | recorded());
     if constexpr (Media::kAny)
       if (notes_hits)
-        wave.aovs.hit_volume<F>(*context.camera, slot, fma(d, t, o), time(), flight.stopped);
+        wave.aovs.hit_volume<F>(*context.camera, slot, fma(d, t, o), time(),
+                                volume_seen<F>(wave, context, slot, flight), flight.stopped);
     if (none(recorded())) continue;
 
     const U prim = load<U>(hits.prim + i);
