@@ -31,7 +31,8 @@ constexpr std::array<const char*, kGraphCodeCount> kCodes{
     "sin",    "cos",        "acos",  "dot",   "cross",    "rgbtohsv", "hsvtorgb", "noise2",
     "noise3", "fractal3",   "cell2", "cell3", "worley2",  "worley3",  "attribute"};
 constexpr std::array<const char*, kGraphInputCount> kInputs{
-    "uv", "position", "local_position", "normal", "local_normal", "tangent", "bitangent", "view"};
+    "uv",        "position", "local_position", "normal",   "local_normal", "tangent",
+    "bitangent", "view",     "normal_x",       "normal_y", "normal_z"};
 
 Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, const Images& images,
                  const Pairs& outputs, const Names& attributes) {
@@ -47,7 +48,7 @@ Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, cons
   return graph;
 }
 
-using Points = nb::ndarray<const float, nb::shape<-1, 21>, nb::c_contig, nb::device::cpu>;
+using Points = nb::ndarray<const float, nb::shape<-1, 30>, nb::c_contig, nb::device::cpu>;
 
 /// Runs a program at points, `F` wide; the last ones are repeated to fill lanes.
 template <typename F>
@@ -73,6 +74,9 @@ void run(const GraphSet& set, const TextureView* textures, const Points& points,
                            vec3(15),
                            F(1.f),
                            vec3(18),
+                           vec3(21),
+                           vec3(24),
+                           vec3(27),
                            {}};
     run_graph<F>(view, program, textures, at, first_lanes<F>(count - i), registers);
     for (size_t o = 0; o < program.output_count; ++o) {

@@ -178,6 +178,29 @@ uint32_t add_mesh_light(SceneBuilder& builder, const Transform& transform,
   return builder.add_mesh_light(std::move(light));
 }
 
+uint32_t add_light_filter(SceneBuilder& builder, const Transform& transform, float distance,
+                          const std::array<std::array<float, 3>, 4>& sides,
+                          const std::array<float, 3>& picture_u,
+                          const std::array<float, 3>& picture_v, std::optional<uint32_t> texture,
+                          const std::array<float, 4>& decay, float density,
+                          std::optional<uint32_t> next) {
+  const auto line = [](const std::array<float, 3>& l) { return Vec3<float>{l[0], l[1], l[2]}; };
+  LightFilter filter;
+  filter.to_world = affine(transform);
+  filter.distance = distance;
+  for (size_t i = 0; i < sides.size(); ++i) filter.sides[i] = line(sides[i]);
+  filter.picture_u = line(picture_u);
+  filter.picture_v = line(picture_v);
+  filter.texture = texture.value_or(kNoTexture);
+  filter.near_start = decay[0];
+  filter.near_end = decay[1];
+  filter.far_start = decay[2];
+  filter.far_end = decay[3];
+  filter.density = density;
+  filter.next = next.value_or(kNoFilter);
+  return builder.add_light_filter(filter);
+}
+
 nb::dict light_dict(const Scene& scene, uint32_t light) {
   check_index("light", light, scene.lights().size());
   const Light& l = scene.lights()[light];

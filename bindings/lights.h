@@ -5,6 +5,8 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <array>
+#include <optional>
 #include <string>
 
 #include "wavecomb/scene/scene.h"
@@ -18,6 +20,14 @@ uint32_t add_light(wavecomb::SceneBuilder& builder, const std::string& kind,
                    const Transform& transform, const nanobind::kwargs& values);
 uint32_t add_mesh_light(wavecomb::SceneBuilder& builder, const Transform& transform,
                         const std::string& material_sync, const nanobind::kwargs& values);
+
+/// SceneBuilder.add_light_filter: `sides` (4, 3), `decay` near_start, near_end, far_start, far_end.
+uint32_t add_light_filter(wavecomb::SceneBuilder& builder, const Transform& transform,
+                          float distance, const std::array<std::array<float, 3>, 4>& sides,
+                          const std::array<float, 3>& picture_u,
+                          const std::array<float, 3>& picture_v, std::optional<uint32_t> texture,
+                          const std::array<float, 4>& decay, float density,
+                          std::optional<uint32_t> next);
 
 /// Parameters by name, what refers to sets and places apart. Throws Error for an index that is not
 /// there.

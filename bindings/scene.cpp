@@ -168,6 +168,9 @@ void bind_scene(nb::module_& m) {
       .def("add_geometry_set", &add_geometry_set, "rules"_a)
       .def("add_visibility", &add_visibility, "path"_a, "rays"_a)
       .def("add_ies", &add_ies, "vertical"_a, "horizontal"_a, "candela"_a)
+      .def("add_light_filter", &add_light_filter, "transform"_a, "distance"_a, "sides"_a,
+           "picture_u"_a, "picture_v"_a, "texture"_a.none(), "decay"_a, "density"_a,
+           "next"_a.none())
       .def("set_camera", &set_camera, "transform"_a, "values"_a)
       .def("build", &SceneBuilder::build, nb::call_guard<nb::gil_scoped_release>());
   def_materials(builder);

@@ -385,6 +385,11 @@ class SceneBuilder:
         ies_normalize: bool = False,
         light_link: int | None = None,
         shadow_link: int | None = None,
+        shadow_color: tuple[float, float, float] = (0, 0, 0),
+        shadow_distance: float = -1,
+        shadow_falloff: float = -1,
+        shadow_falloff_gamma: float = 1,
+        filter: int | None = None,
         visible: bool = True,
         portals: NDArray[np.float64] | None = None,
         # ---- to here ----
@@ -411,6 +416,10 @@ class SceneBuilder:
         ies_normalize: bool = False,
         light_link: int | None = None,
         shadow_link: int | None = None,
+        shadow_color: tuple[float, float, float] = (0, 0, 0),
+        shadow_distance: float = -1,
+        shadow_falloff: float = -1,
+        shadow_falloff_gamma: float = 1,
         visible: bool = True,
         # ---- to here ----
     ) -> int:
@@ -449,6 +458,23 @@ class SceneBuilder:
     ) -> int:
         """A profile for add_light. Angles in degrees, ascending: vertical within [0, 180],
         horizontal from 0 to 360 or a single one; candela (horizontal, vertical). Raises Error."""
+    def add_light_filter(
+        self,
+        transform: NDArray[Any],
+        distance: float,
+        sides: Sequence[Sequence[float]],
+        picture_u: Sequence[float],
+        picture_v: Sequence[float],
+        texture: int | None,
+        decay: Sequence[float],
+        density: float,
+        next: int | None,
+    ) -> int:
+        """A filter for add_light: what light passes that crosses z = -distance of its own space at
+        (x, y); 0 or less: no such window. sides: four (a, b, c), each of which lets smoothstep(a x
+        + b y + c) by. The texture is at u = picture_u . (x, y, 1), v likewise. decay: where light
+        begins to arrive and is whole, where it begins to fade and is gone. density: how much of
+        all that there is. next: another filter. Raises Error."""
     def set_camera(
         self,
         transform: NDArray[Any],

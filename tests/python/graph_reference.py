@@ -8,7 +8,8 @@ import numpy as np
 from wavecomb.usd.graphs.node import INPUTS, nodes_of
 
 COLUMNS = {"uv": 0, "position": 3, "local_position": 6, "normal": 9, "local_normal": 12,
-           "tangent": 15, "view": 18}  # fmt: skip
+           "tangent": 15, "view": 18,
+           "normal_x": 21, "normal_y": 24, "normal_z": 27}  # fmt: skip
 U32 = np.uint32
 
 
@@ -186,7 +187,7 @@ FORMULAS = {
 
 
 def evaluate(value, points):
-    """A value (of ``usd.graphs``) at points (n, 21), textures white."""
+    """A value (of ``usd.graphs``) at points (n, 30), textures white."""
     points = np.asarray(points, np.float64)
     results = {}
 

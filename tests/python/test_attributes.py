@@ -12,6 +12,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.usd import load_stage
+from wavecomb.usd.graphs.node import POINT_SIZE
 
 _core = pytest.importorskip("wavecomb._core")
 
@@ -177,7 +178,8 @@ def test_nodes_of_networks_read_primvars(tmp_path):
     assert scene.mesh("B")["attributes"] == {}
     assert scene.material_of("/B")["base_color"] == pytest.approx((0.5, 0.5, 0.5))
     rest_of_it = scene.graphs[scene.material_of("/B")["graph"]]
-    assert rest_of_it.names == () and (rest_of_it.run(np.ones((1, 21), np.float32)) == 0).all()
+    at = np.ones((1, POINT_SIZE), np.float32)
+    assert rest_of_it.names == () and (rest_of_it.run(at) == 0).all()
 
 
 def test_what_no_material_reads_is_not_kept(tmp_path):

@@ -23,14 +23,12 @@ from wavecomb.usd.materialx.nodes.table import CATEGORIES
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "material-graphs.md"
 
 CODE = "code in the library, which value graphs have no operation for"
-SPACES = "spaces of a mesh are known only where it is placed"
 HEIGHT = "differences between texels of a height"
 MATRIX = "matrices are made, transposed and applied only"
 HAIR = "inputs of hair"
 REASONS = {
     "flake2d": CODE, "flake3d": CODE,
     "heighttonormal": HEIGHT, "bump": HEIGHT,
-    "transformpoint": SPACES, "transformvector": SPACES, "transformnormal": SPACES,
     "determinant": MATRIX, "invertmatrix": MATRIX,
     "roughness_anisotropy": "inputs of BSDF nodes", "roughness_dual": "inputs of BSDF nodes",
     "glossiness_anisotropy": "inputs of BSDF nodes", "artistic_ior": "inputs of BSDF nodes",

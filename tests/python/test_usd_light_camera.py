@@ -151,8 +151,7 @@ def test_what_lights_ask_for_and_do_not_get(tmp_path):
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
         "shaping of DomeLights",
-        "light filters",
-        "colour and distance of shadows",
+        "light filter PortalLight",
         "curves as lights (they shine by their material alone)",
     ]
     assert len(scene.lights) == 2 and "/Glow is no PortalLight" in said(loaded)

@@ -17,7 +17,8 @@ class Recorder:
 
     def __init__(self):
         self.textures, self.materials, self.meshes, self.lights = [], [], [], []
-        self.profiles, self.sets, self.mesh_lights, self.graphs = [], [], [], []
+        self.filters, self.profiles, self.sets = [], [], []
+        self.mesh_lights, self.graphs = [], []
         self.groups = [{"name": "world", "meshes": [], "children": []}]
         self.camera = None
         self.grids, self.volumes = [], []
@@ -214,6 +215,11 @@ class Recorder:
         assert candela.shape == (len(horizontal), len(vertical)) and candela.dtype == np.float32
         self.profiles.append({"vertical": vertical, "horizontal": horizontal, "candela": candela})
         return len(self.profiles) - 1
+
+    def add_light_filter(self, transform, distance, sides, *rest):
+        assert transform.shape == (4, 4) and np.shape(sides) == (4, 3)
+        self.filters.append((transform, distance, sides, *rest))
+        return len(self.filters) - 1
 
     def set_camera(self, transform, **options):
         self.camera = {"transform": np.asarray(transform), **options}

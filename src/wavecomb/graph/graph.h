@@ -70,8 +70,13 @@ enum class GraphInput : uint8_t {
   kTangent,    ///< unit, along u in the world
   kBitangent,  ///< unit, along v as far as that is across the tangent
   kView,       ///< unit, to the viewer in the world
+  /// In the world, what the axes of the group's space are to normals: rows of the inverse of its
+  /// map.
+  kNormalX,
+  kNormalY,
+  kNormalZ,
 };
-inline constexpr uint32_t kGraphInputCount = 8;
+inline constexpr uint32_t kGraphInputCount = 11;
 inline constexpr uint32_t graph_input_bit(GraphInput i) {
   return 1u << static_cast<uint32_t>(i);
 }

@@ -33,9 +33,11 @@ template <typename F>
     at.tangent = unit(s.dpdu - s.ns * dot(s.ns, s.dpdu), make_frame<F>(s.ns).s);
     at.handedness = s.handedness;
   }
-  if ((wanted & (graph_input_bit(GraphInput::kLocalPosition) |
-                 graph_input_bit(GraphInput::kLocalNormal))) == 0)
-    return at;
+  constexpr uint32_t kOfSpace =
+      graph_input_bit(GraphInput::kLocalPosition) | graph_input_bit(GraphInput::kLocalNormal) |
+      graph_input_bit(GraphInput::kNormalX) | graph_input_bit(GraphInput::kNormalY) |
+      graph_input_bit(GraphInput::kNormalZ);
+  if ((wanted & kOfSpace) == 0) return at;
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   if (scene.has_motion)
     maps.place(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
@@ -46,6 +48,9 @@ template <typename F>
   const Vec3<F> p = s.p - maps.t;
   at.local_position = (c[0] * p.x + c[1] * p.y + c[2] * p.z) * inv;
   at.local_normal = unit(m[0] * s.ns.x + m[1] * s.ns.y + m[2] * s.ns.z, s.ns);
+  at.normal_x = maps.inverse_row(0);
+  at.normal_y = maps.inverse_row(1);
+  at.normal_z = maps.inverse_row(2);
   return at;
 }
 

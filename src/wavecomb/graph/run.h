@@ -20,6 +20,8 @@ struct GraphPoint {
   Vec3<F> tangent{F(1.f), F(0.f), F(0.f)};
   F handedness{1.f};  ///< as in Surface
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
+  Vec3<F> normal_x{F(1.f), F(0.f), F(0.f)}, normal_y{F(0.f), F(1.f), F(0.f)},
+      normal_z{F(0.f), F(0.f), F(1.f)};
   MeshPlace<F> place;  ///< where attributes are read
 };
 
@@ -44,6 +46,12 @@ inline Vec3<F> input_value(const GraphPoint<F>& at, GraphInput input) {
       return cross(at.normal, at.tangent) * at.handedness;
     case GraphInput::kView:
       return at.view;
+    case GraphInput::kNormalX:
+      return at.normal_x;
+    case GraphInput::kNormalY:
+      return at.normal_y;
+    case GraphInput::kNormalZ:
+      return at.normal_z;
   }
   return Vec3<F>(F(0.f));
 }

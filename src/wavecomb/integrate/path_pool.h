@@ -100,17 +100,20 @@ class PathPool {
  public:
   PathPool() = default;
   /// `cold`: paths keep a PathColdRow. `joined`: and PathState::ratio. `knows`: and an InsideRow.
-  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false)
+  /// `shaded`: and VertexResult::shade.
+  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false, bool shaded = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
         ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()),
-        inside_(knows ? SoaBlock(1, capacity * kRowWords<InsideRow>) : SoaBlock()) {
+        inside_(knows ? SoaBlock(1, capacity * kRowWords<InsideRow>) : SoaBlock()),
+        shades_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
     this->cold = cold ? cold_.floats(0) : nullptr;
     ratio = joined ? ratios_.floats(0) : nullptr;
     inside = knows ? inside_.floats(0) : nullptr;
+    shades = shaded ? shades_.floats(0) : nullptr;
   }
 
   float* paths = nullptr;     ///< PathRow
@@ -119,10 +122,13 @@ class PathPool {
   float* cold = nullptr;      ///< PathColdRow; null where no path has one
   float* ratio = nullptr;     ///< PathState::ratio; null where no paths start at lights
   float* inside = nullptr;    ///< InsideRow; null where nobody knows
-  size_t bytes() const { return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes(); }
+  float* shades = nullptr;    ///< RadianceRow of VertexResult::shade; null where shadows are black
+  size_t bytes() const {
+    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes() + shades_.bytes();
+  }
 
  private:
-  SoaBlock rows_, cold_, ratios_, inside_;
+  SoaBlock rows_, cold_, ratios_, inside_, shades_;
 };
 
 /// Adds c to the active lanes' rows of radiance, which are distinct.

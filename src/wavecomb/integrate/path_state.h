@@ -82,6 +82,7 @@ struct VertexResult {
   F shadow_tfar;
   UInt<F> shadow_set;  ///< of shadow_set, 0 where nothing is linked
   Color<F> direct;     ///< to add where the shadow ray is free, clamped
+  Color<F> shade;      ///< share of it to add where it is not, where shadows have a colour
   Mask<F> alive;       ///< the path goes on
   PathState<F> next;   ///< the next ray and what goes with it
   // For who learns, where Vertex::guide is there: guide_axis of the surface, and the density of the

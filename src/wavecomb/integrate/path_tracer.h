@@ -175,7 +175,8 @@ class PathTracer {
         const bool links = context_.scene.lights.links.members != nullptr;
         is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
                                   links ? &v.shadow_set : nullptr);
-        if (is_free) add_direct(key, depth, v, aovs_.group_of<F>(aovs.lit_by, true));
+        if (is_free || max_component(v.shade) > 0.f)
+          add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.lit_by, true));
       }
       if constexpr (!Media::kAny)
         if (vertices_ && max_component(offer_.row.light) > 0.f) connect(depth);
@@ -247,8 +248,9 @@ class PathTracer {
     return {material - scene.volumes.first_material, 0, material, false};
   }
 
-  /// What the free shadow ray of `v` brings, of a light of `group`, as much as comes through.
-  void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
+  /// What the shadow ray of `v` brings, of a light of `group`: if free, as much as comes through,
+  /// else what the shadow's colour leaves.
+  void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;
     if constexpr (Media::kAny) {
@@ -260,6 +262,7 @@ class PathTracer {
           c = c *
               media_.pass_inside(rays_.keys(), rays_.time(), inside_, v.shadow_o, v.shadow_d, t);
     }
+    if (!is_free) c = v.direct * v.shade;
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
     if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);

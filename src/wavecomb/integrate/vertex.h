@@ -39,6 +39,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
   out.shadow_set = U(0u);
+  if constexpr (v.has(kMeshLights)) out.shade = Color<F>(F(0.f));
   out.next.link = U(0u);
   out.axis = U(0u);
   out.bsdf_pdf = F(0.f);

@@ -97,7 +97,8 @@ struct WaveContext {
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
-             context.joins_light(), context.knows_inside()),
+             context.joins_light(), context.knows_inside(),
+             context.scene.lights.shadows != nullptr),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),

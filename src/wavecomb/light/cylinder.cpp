@@ -75,7 +75,7 @@ LightKindInfo CylinderKind::describe() {
   LightKindInfo kind;
   kind.name = "cylinder";
   kind.prims = {"CylinderLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen;
+  kind.traits = kPlaced | kSized | kShaped | kSeen | kFiltered;
   kind.parameters = {"radius", "length"};
   kind.make = &make;
   kind.bound = &bound;

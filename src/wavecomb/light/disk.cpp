@@ -56,7 +56,7 @@ LightKindInfo DiskKind::describe() {
   LightKindInfo kind;
   kind.name = "disk";
   kind.prims = {"DiskLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen;
+  kind.traits = kPlaced | kSized | kShaped | kSeen | kFiltered;
   kind.parameters = {"radius"};
   kind.make = &make;
   kind.bound = &bound;

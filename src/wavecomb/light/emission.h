@@ -2,7 +2,7 @@
 /// Paths that start at lights: a light, a place on it and a direction; and the densities that both
 /// ends of a path need of it for multiple importance sampling (docs/light-paths.md).
 ///
-/// Lights that do not give all surfaces the same (LightRecord::sampled_only, light links) and mesh
+/// Lights of which a path would have to know what it meets (LightRecord::camera_only) and mesh
 /// lights, whose glow looks otherwise than what it lights, send no paths: the camera's find all of
 /// their light.
 #pragma once
@@ -52,8 +52,7 @@ inline Mask<F> sends_paths(const LightView& view, const UInt<F>& light, const Ma
     sends = sends & (not_(triangle) | Mask<F>(record_of<F>(view, light, triangle) == U(kNoLight)));
   if (any(record)) {
     const LightReader<F> reader(view.lights, light, record);
-    sends = sends & (not_(record) | (Mask<F>(reader[&LightRecord::sampled_only] == U(0u)) &
-                                     Mask<F>(reader[&LightRecord::light_link] == U(kNoSet))));
+    sends = sends & (not_(record) | Mask<F>(reader[&LightRecord::camera_only] == U(0u)));
   }
   return sends;
 }
@@ -131,6 +130,9 @@ template <typename F>
           }
           if (view.shapings)
             e.radiance = detail::shaped<F>(view, reader.shaping(), e.d, e.radiance, lanes);
+          if (view.filters) [[unlikely]]
+            e.radiance = detail::filtered<F>(view, reader[&LightRecord::filter], {e.p, e.d, F(0.f)},
+                                             e.radiance, lanes);
           const F size = detail::size_of_terms<F>(reader.p(), reader.u(), reader.v());
           put(e, reader.pick_pdf(), F(size + reader.radius()), lanes);
         });

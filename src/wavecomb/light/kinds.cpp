@@ -12,6 +12,18 @@ std::span<const LightKindInfo> light_kinds() {
   return kinds;
 }
 
+namespace {
+
+/// Whether a filter, or one that goes with it, asks how far light goes, which paths from the light
+/// do not know.
+bool fades(std::span<const LightFilter> filters, uint32_t filter) {
+  for (; filter != kNoFilter; filter = filters[filter].next)
+    if (filters[filter].fades()) return true;
+  return false;
+}
+
+}  // namespace
+
 MadeLight make_light(const Light& light, LightMaking& making) {
   const LightKindInfo& kind = info_of(light.kind);
   MadeLight made;
@@ -26,7 +38,15 @@ MadeLight make_light(const Light& light, LightMaking& making) {
   r.hidden = !light.visible && !kind.has(light_trait::kInfinite);
   r.light_link = light.light_link;
   r.shadow_link = light.shadow_link;
-  r.sampled_only = r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet;
+  r.shadow = kPlainShadow;
+  if (!light.shadow.is_plain()) {
+    r.shadow = static_cast<uint32_t>(making.set.shadows.size());
+    making.set.shadows.push_back(making::make_shadow(light.shadow));
+  }
+  r.filter = kind.has(light_trait::kFiltered) ? light.filter : kNoFilter;
+  r.sampled_only = r.diffuse != 1 || r.specular != 1 || r.hidden != 0 || r.shadow_link != kNoSet ||
+                   r.shadow != kPlainShadow;
+  r.camera_only = r.sampled_only != 0 || r.light_link != kNoSet || fades(making.filters, r.filter);
   if (kind.make) kind.make(made, light, making);
   if (!light.shaping.is_plain() && kind.has(light_trait::kShaped))
     making::add_shaping(made, light, making);

@@ -8,6 +8,7 @@
 
 #include "wavecomb/core/vec.h"
 #include "wavecomb/light/aim.h"
+#include "wavecomb/light/filter.h"
 #include "wavecomb/light/kinds.h"
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/link.h"
@@ -98,7 +99,7 @@ template <typename F>
 inline F infinite_emission_density(const LightView& view, uint32_t light, const Vec3<F>& from,
                                    const Vec3<F>& dir, const Mask<F>& active) {
   const LightRecord& record = view.lights[light];
-  if (record.sampled_only != 0 || record.light_link != kNoSet) return F(0.f);
+  if (record.camera_only != 0) return F(0.f);
   const LightReader<F> reader(record, active);
   const float pick = view.pick_pdf ? view.pick_pdf[light] : record.pick_pdf;
   F density = emission_density_of_kind<F>(static_cast<LightKind>(record.kind),
@@ -178,6 +179,10 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
         if (view.shapings)
           s.radiance =
               detail::shaped<F>(view, light.shaping(), -s.wi, s.radiance, lanes & (s.pdf > 0.f));
+        if (view.filters) [[unlikely]]
+          s.radiance = detail::filtered<F>(view, light[&LightRecord::filter],
+                                           {fma(s.wi, s.distance, p), -s.wi, s.distance},
+                                           s.radiance, lanes & (s.pdf > 0.f));
         put(s, pick.pdf(light.pick_pdf()), lanes);
       });
   return result;
@@ -205,6 +210,9 @@ LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightRe
         detail::KindHit<F> hit = detail::hit_kind<F>(kind, {view, reader, origin, dir, t, lanes});
         if (view.shapings)
           hit.radiance = detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
+        if (view.filters) [[unlikely]]
+          hit.radiance = detail::filtered<F>(view, reader[&LightRecord::filter],
+                                             {fma(dir, t, origin), -dir, t}, hit.radiance, lanes);
         result.radiance = select<F>(lanes, hit.radiance, result.radiance);
         result.pdf = select(lanes, F(hit.pdf * pick_pdf), result.pdf);
       });
@@ -228,6 +236,7 @@ template <typename F>
 struct LightEffect {
   F diffuse, specular;   ///< factors of the two parts of the response
   Mask<F> sampled_only;  ///< LightRecord::sampled_only
+  UInt<F> shadow;        ///< LightRecord::shadow
 
   LightEffect(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
     const UInt<F> record = detail::record_of<F>(view, light, active);
@@ -236,6 +245,7 @@ struct LightEffect {
     diffuse = select(known, reader[&LightRecord::diffuse], F(1.f));
     specular = select(known, reader[&LightRecord::specular], F(1.f));
     sampled_only = known & Mask<F>(reader[&LightRecord::sampled_only] != UInt<F>(0u));
+    shadow = select(Mask<UInt<F>>(known), reader[&LightRecord::shadow], UInt<F>(kPlainShadow));
   }
 
   /// Factor of what a path gets that meets the light; a mirror's image of it is specular.

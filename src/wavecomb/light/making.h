@@ -85,6 +85,9 @@ Distribution2D density_of(const LightRecord& light, const LightMaking& making,
 /// mean over all directions, as if they had nothing to do with one another.
 void add_shaping(MadeLight& made, const Light& light, LightMaking& making);
 
+/// What a light's shadows are like, as lanes read it.
+ShadowLookRecord make_shadow(const ShadowLook& look);
+
 /// A box from the point `a` to the point `b`, `half` larger, and a little more for rounding.
 Bounds box_around(const float (&a)[3], const float (&b)[3], const float (&half)[3]);
 

@@ -52,7 +52,7 @@ LightKindInfo RectKind::describe() {
   LightKindInfo kind;
   kind.name = "rect";
   kind.prims = {"RectLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen | kPictured;
+  kind.traits = kPlaced | kSized | kShaped | kSeen | kPictured | kFiltered;
   kind.parameters = {"width", "height"};
   kind.make = &make;
   kind.bound = &bound;

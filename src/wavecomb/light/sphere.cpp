@@ -59,7 +59,7 @@ LightKindInfo SphereKind::describe() {
   LightKindInfo kind;
   kind.name = "sphere";
   kind.prims = {"SphereLight"};
-  kind.traits = kPlaced | kSized | kShaped | kSeen;
+  kind.traits = kPlaced | kSized | kShaped | kSeen | kFiltered;
   kind.parameters = {"radius"};
   kind.make = &make;
   kind.bound = &bound;

@@ -25,7 +25,7 @@ Bounds shape_bounds(const PlacedShape& shape) {
 }
 
 bool sends_paths_itself(const LightRecord& record) {
-  return record.sampled_only == 0 && record.light_link == kNoSet;
+  return record.camera_only == 0;
 }
 
 float farthest(const Bounds& box, const Vec3<float>& from) {

@@ -214,6 +214,12 @@ uint64_t hash_lights(const Scene& scene) {
     h.add_array(std::span<const float>(p.horizontal));
     h.add_array(std::span<const float>(p.candela));
   }
+  for (const LightFilter& f : scene.geometry()->filters) {
+    h.add(f.to_world, f.picture_u, f.picture_v);
+    for (const Vec3<float>& side : f.sides) h.add(side);
+    h.add(f.distance, f.texture, f.near_start, f.near_end, f.far_start, f.far_end, f.density,
+          f.next);
+  }
   for (const Mesh& m : scene.meshes()) {
     h.add(m.light_group);
     if (m.mesh_light != kNoLight) h.add(m.mesh_light, m.light_group);

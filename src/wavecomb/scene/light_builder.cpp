@@ -97,6 +97,8 @@ LightView LightSet::view(const MaterialView& materials) const {
     v.ies = ies.data();
     v.ies_numbers = ies_numbers.data();
   }
+  if (!filters.empty()) v.filters = filters.data();
+  if (!shadows.empty()) v.shadows = shadows.data();
   if (records.size() > record_count) v.mesh_lights = mesh_lights.data();
   for (const LightRecord& record : records) v.has_sampled_only |= record.sampled_only != 0;
   v.materials = materials;
@@ -115,7 +117,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       std::span<const TexturePtr> textures, const LightSet* before,
                       std::span<const IesProfile> profiles,
                       std::span<const PlacedMeshLight> mesh_lights, size_t most_picked,
-                      TreeTime tree_time) {
+                      TreeTime tree_time, std::span<const LightFilter> filters) {
   (void)centre;  // directions of infinite lights do not depend on it
   check_light_count(lights.size() + triangle_count);
   SceneCounts counts{.lights = lights.size() + mesh_lights.size()};
@@ -130,7 +132,8 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   powers.reserve(lights.size() + triangle_count);
   set.of_input.resize(lights.size());
   put_profiles(set, profiles);
-  LightMaking making{set, before, scene_radius, textures, profiles};
+  for (const LightFilter& filter : filters) set.filters.push_back(make_light_filter(filter));
+  LightMaking making{set, before, scene_radius, textures, profiles, filters};
   for (const bool infinite : {true, false}) {
     for (size_t i = 0; i < lights.size(); ++i) {
       if (info_of(lights[i].kind).has(light_trait::kInfinite) != infinite) continue;

@@ -59,6 +59,8 @@ struct LightSet {
   std::vector<LightRecord> portals;
   std::vector<PortalGroup> portal_groups;
   std::vector<ShapingRecord> shapings;
+  std::vector<FilterRecord> filters;
+  std::vector<ShadowLookRecord> shadows;
   std::vector<IesRecord> ies;
   std::vector<float> ies_numbers;
   uint32_t infinite_count = 0;
@@ -117,7 +119,8 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       std::span<const TexturePtr> textures, const LightSet* before = nullptr,
                       std::span<const IesProfile> profiles = {},
                       std::span<const PlacedMeshLight> mesh_lights = {},
-                      size_t most_picked = kMaxPicked, TreeTime tree_time = TreeTime::kNow);
+                      size_t most_picked = kMaxPicked, TreeTime tree_time = TreeTime::kNow,
+                      std::span<const LightFilter> filters = {});
 
 /// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,

@@ -27,6 +27,8 @@ inline constexpr size_t kMaxOwnParameters = 4;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
+inline constexpr uint32_t kNoFilter = 0xffffffffu;
+inline constexpr uint32_t kPlainShadow = 0xffffffffu;
 inline constexpr uint32_t kNoPortals = 0xffffffffu;
 inline constexpr uint32_t kNoDistribution = 0xffffffffu;
 /// All geometry: no GeometrySet. kNoSet + 1 is 0.
@@ -43,6 +45,35 @@ struct Shaping {
   bool ies_normalize = false;  ///< divide by IesProfile::mean
 
   bool is_plain() const { return !(focus > 0) && !(cone_angle < 180) && ies == kNoIes; }
+};
+
+/// UsdLuxShadowAPI: what a light's shadows are like. Not physical.
+struct ShadowLook {
+  Vec3<float> color{0, 0, 0};  ///< of the light, what arrives where something is in the way
+  float distance = -1;         ///< from a surface to what shades it, in the world; less than 0: any
+  float falloff = -1;          ///< how long before that shadows fade; 0 or less: not at all
+  float gamma = 1;             ///< exponent of how strong they are in that zone
+
+  bool is_plain() const { return color.x == 0 && color.y == 0 && color.z == 0 && distance < 0; }
+};
+
+/// What stands before a light and changes what goes through it (light/filter.h).
+struct LightFilter {
+  /// The window is the plane z = -distance of its own space. 0 or less: none.
+  Affine to_world;
+  float distance = 0;
+  /// (a, b, c): at (x, y) of the window, light passes a side by smoothstep(a x + b y + c).
+  std::array<Vec3<float>, 4> sides{
+      {{0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}, {0.f, 0.f, 1.f}}};
+  uint32_t texture = kNoTexture;  ///< a picture on the window, at u = picture_u . (x, y, 1), ...
+  Vec3<float> picture_u{1, 0, 0.5f}, picture_v{0, 1, 0.5f};
+  /// Light begins to arrive at near_start from it and is whole at near_end; it begins to fade at
+  /// far_start and is gone at far_end. Not where the end is not beyond the start.
+  float near_start = 0, near_end = 0, far_start = 0, far_end = 0;
+  float density = 1;          ///< how much of all that there is
+  uint32_t next = kNoFilter;  ///< another one, added before
+
+  bool fades() const { return near_end > near_start || far_end > far_start; }
 };
 
 /// The distribution of an IES file, expanded to the whole circle: candela at a grid of angles in
@@ -90,7 +121,9 @@ struct Light {
   float diffuse = 1, specular = 1;
   /// SceneBuilder::add_geometry_set: what it shines on, and what casts shadows in its light.
   uint32_t light_link = kNoSet, shadow_link = kNoSet;
-  bool visible = true;  ///< whether rays meet its shape
+  ShadowLook shadow;
+  uint32_t filter = kNoFilter;  ///< SceneBuilder::add_light_filter; of lights with a place
+  bool visible = true;          ///< whether rays meet its shape
   /// Dome: maps of the unit square in the xy plane, whose -z side is lit, to the portals that guide
   /// its sampling.
   std::vector<Affine> portals;
@@ -136,6 +169,9 @@ struct alignas(64) LightRecord {
   uint32_t portals;  ///< of a dome: index into LightView::portal_groups, or kNoPortals
   /// |u|, |v|, and their inverses, 0 where there is none.
   float length_u, length_v, inverse_u, inverse_v;
+  uint32_t shadow;       ///< index into LightView::shadows, or kPlainShadow
+  uint32_t filter;       ///< index into LightView::filters, or kNoFilter
+  uint32_t camera_only;  ///< not 0: no paths start here, those from the camera find its light
 };
 static_assert(sizeof(LightRecord) == 192);
 
@@ -152,6 +188,29 @@ struct alignas(64) ShapingRecord {
   uint32_t ies;  ///< index into LightView::ies, or kNoIes
 };
 static_assert(sizeof(ShapingRecord) == 128);
+
+/// A ShadowLook as lanes read it.
+struct alignas(32) ShadowLookRecord {
+  float color[3];
+  float distance;  ///< kFarAway where any will do
+  float falloff;
+  float inverse_gamma;
+};
+static_assert(sizeof(ShadowLookRecord) == 32);
+
+/// A LightFilter as lanes read it.
+struct alignas(64) FilterRecord {
+  /// Rows of the map from the world to its space.
+  float row_x[3], row_y[3], row_z[3], origin[3];
+  float side_0[3], side_1[3], side_2[3], side_3[3];
+  float picture_u[3], picture_v[3];
+  float distance;
+  uint32_t texture;
+  float near_start, near_inverse, far_start, far_inverse;
+  float density;
+  uint32_t next;
+};
+static_assert(sizeof(FilterRecord) == 192);
 
 /// Where the parts of an IesProfile lie in LightView::ies_numbers.
 struct IesRecord {
@@ -302,6 +361,8 @@ struct LightView {
   const ShapingRecord* shapings = nullptr;
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
+  const FilterRecord* filters = nullptr;      ///< null where no light has one
+  const ShadowLookRecord* shadows = nullptr;  ///< null where all shadows are plain
   /// Of triangle i the record of its mesh light, or kNoLight; null where there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
   bool has_sampled_only = false;  ///< some record is that

@@ -22,6 +22,7 @@ struct LightMaking {
   double scene_radius;
   std::span<const TexturePtr> textures;
   std::span<const IesProfile> profiles;
+  std::span<const LightFilter> filters;
 };
 
 /// A record in the making, and the power that its choice rests on.
@@ -66,6 +67,8 @@ inline const LightKindInfo& info_of(LightKind kind) {
 
 /// The record of a light, and its power.
 MadeLight make_light(const Light& light, LightMaking& making);
+/// A filter as lanes read it.
+FilterRecord make_light_filter(const LightFilter& filter);
 
 /// What the triangles of a placed mesh light have in common.
 LightRecord make_mesh_light(const PlacedMeshLight& placed, LightMaking& making);

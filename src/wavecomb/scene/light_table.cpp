@@ -15,7 +15,7 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kNone = 0xffffffffu;
-static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone);
+static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone && kNoFilter == kNone);
 
 /// A member of a light, or a member of a member.
 template <auto kFirst, auto... kRest, typename Object>
@@ -113,6 +113,8 @@ std::vector<LightParameter> common_rows() {
   using enum LightGroup;
   using namespace light_trait;
   constexpr auto kS = &L::shaping;
+  using H = ShadowLook;
+  constexpr auto kH = &L::shadow;
   return {
       all(kEmission, positive(row<&L::color>("color", "colour", "color",
                                              "Emitted radiance, W / (m^2 sr): colour * intensity * "
@@ -187,6 +189,30 @@ std::vector<LightParameter> common_rows() {
           id(row<&L::shadow_link>("shadow_link", "shadow link", "",
                                   "Set of geometry that casts shadows in its light; none: all."),
              LightRefers::kSet)),
+      all(kResponse,
+          positive(row<kH, &H::color>("shadow_color", "shadow colour", "shadow:color",
+                                      "Share of its light that arrives where something is in the "
+                                      "way."),
+                   1)),
+      all(kResponse,
+          usually(row<kH, &H::distance>("shadow_distance", "shadow distance", "shadow:distance",
+                                        "Farthest that what shades a surface may be from it, in "
+                                        "the world; less than 0: anywhere."),
+                  10)),
+      all(kResponse,
+          usually(row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
+                                       "How long before that distance shadows fade; 0 or less: "
+                                       "they do not."),
+                  10)),
+      all(kResponse,
+          positive(row<kH, &H::gamma>("shadow_falloff_gamma", "shadow falloff gamma",
+                                      "shadow:falloffGamma",
+                                      "Exponent of how strong shadows are where they fade."),
+                   4)),
+      with(
+          kFiltered, kEmission,
+          id(row<&L::filter>("filter", "filter", "", "What stands before it, of add_light_filter."),
+             LightRefers::kFilter)),
       with(kSeen, kShape,
            row<&L::visible>("visible", "visible", "", "Whether rays meet its shape.")),
       in(kShape,
@@ -240,7 +266,7 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
     for (const Affine& map : *maps)
       if (!finite(map)) throw Error(of + "a transform of " + p.name + " is not finite; mend it");
   const auto* number = std::get_if<uint32_t>(&value);
-  const size_t counts[] = {kNone, there.textures, there.profiles, there.sets, kNone};
+  const size_t counts[] = {kNone, there.textures, there.profiles, there.sets, kNone, there.filters};
   if (!number || *number < counts[static_cast<size_t>(p.refers)]) return;
   const std::string what = light_refers_name(p.refers);
   throw Error(of + p.name + " is " + what + " " + std::to_string(*number) +
@@ -268,7 +294,7 @@ const LightParameter* find_light_parameter(std::string_view name) {
 }
 
 const char* light_refers_name(LightRefers refers) {
-  constexpr const char* kNames[] = {"", "texture", "profile", "set", "group"};
+  constexpr const char* kNames[] = {"", "texture", "profile", "set", "group", "filter"};
   return kNames[static_cast<size_t>(refers)];
 }
 

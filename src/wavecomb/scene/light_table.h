@@ -23,7 +23,7 @@ using LightValue =
 
 enum class LightValueKind : uint8_t { kNumber, kColour, kFlag, kChoice, kId, kTransforms };
 /// What an id counts.
-enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup };
+enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup, kFilter };
 /// What a parameter is about.
 enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
 
@@ -35,6 +35,7 @@ inline constexpr uint32_t kShaped = 4;     ///< UsdLuxShapingAPI
 inline constexpr uint32_t kSeen = 8;       ///< rays may meet its shape
 inline constexpr uint32_t kPictured = 16;  ///< a texture
 inline constexpr uint32_t kInfinite = 32;  ///< it is all around the scene
+inline constexpr uint32_t kFiltered = 64;  ///< filters may stand before it
 }  // namespace light_trait
 
 /// Contract: lives as long as the program.
@@ -107,7 +108,7 @@ LightKind light_kind(std::string_view name);
 
 /// How many things there are that lights refer to.
 struct LightReferences {
-  size_t textures = 0, profiles = 0, sets = 0;
+  size_t textures = 0, profiles = 0, sets = 0, filters = 0;
 };
 
 /// Throws Error with one line that names the light where a value is not finite or out of range,

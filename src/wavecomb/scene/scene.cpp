@@ -130,7 +130,8 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());
-    check_light(light, {textures().size(), geometry_->profiles.size(), geometry_->sets.size()});
+    check_light(light, {textures().size(), geometry_->profiles.size(), geometry_->sets.size(),
+                        geometry_->filters.size()});
     if (light.group >= light_groups().size())
       throw_unknown("light group", light.group, light_groups().size());
   }
@@ -211,17 +212,18 @@ SceneBytes Scene::bytes() const {
   const auto of = [](const auto&... v) { return ((v.size() * sizeof(v[0])) + ...); };
   const SceneGeometry& g = *geometry_;
   const LightSet& set = lights_->set;
-  b.records = of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
-                 g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
-                 g.instance_motions, g.attribute_records, g.mesh_attributes) +
-              of(materials_->materials, materials_->shaded, materials_->records, materials_->uses,
-                 materials_->programs, materials_->openpbr, materials_->graphs->programs,
-                 materials_->graphs->ops, materials_->graphs->constants, materials_->graphs->images,
-                 materials_->graphs->outputs) +
-              of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records,
-                 set.triangles, set.triangle_uvs, set.pick_bins, set.powers, set.portals,
-                 set.portal_groups, set.shapings, set.ies, set.ies_numbers) +
-              lights_->tree_bytes() + g.names.bytes();
+  b.records =
+      of(g.meshes, g.face_materials, g.instances, g.mesh_records, g.instance_records,
+         g.geometry_mesh, g.texture_views, g.placements, g.mesh_motions, g.steps,
+         g.instance_motions, g.attribute_records, g.mesh_attributes) +
+      of(materials_->materials, materials_->shaded, materials_->records, materials_->uses,
+         materials_->programs, materials_->openpbr, materials_->graphs->programs,
+         materials_->graphs->ops, materials_->graphs->constants, materials_->graphs->images,
+         materials_->graphs->outputs) +
+      of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
+         set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
+         set.ies, set.ies_numbers, set.filters, set.shadows) +
+      lights_->tree_bytes() + g.names.bytes();
   std::set<const VolumeGrid*> grids;
   for (const Volume& volume : g.volumes)
     for (const VolumeField* field : {&volume.density, &volume.color, &volume.glow})

@@ -205,6 +205,8 @@ class SceneBuilder {
   void add_visibility(VisibilityRule rule);
   /// A profile for Shaping::ies.
   uint32_t add_ies(IesProfile profile);
+  /// A filter for Light::filter.
+  uint32_t add_light_filter(LightFilter filter);
   uint32_t add_light(Light light);
   /// A light for Mesh::mesh_light, of kind kMeshLight. If not `visible` it shines at any opacity.
   uint32_t add_mesh_light(Light light);
@@ -249,6 +251,7 @@ class SceneBuilder {
   GraphSet graphs_;
   std::vector<TexturePtr> textures_;
   std::vector<IesProfile> profiles_;
+  std::vector<LightFilter> filters_;
   std::vector<GeometrySet> sets_;
   std::vector<VisibilityRule> visibility_;
   std::vector<Light> lights_, mesh_lights_;

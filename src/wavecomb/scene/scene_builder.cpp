@@ -163,6 +163,12 @@ uint32_t SceneBuilder::add_ies(IesProfile profile) {
   return static_cast<uint32_t>(profiles_.size() - 1);
 }
 
+uint32_t SceneBuilder::add_light_filter(LightFilter filter) {
+  check_filter(filter, textures_.size(), filters_.size());
+  filters_.push_back(filter);
+  return static_cast<uint32_t>(filters_.size() - 1);
+}
+
 uint32_t SceneBuilder::add_geometry_set(GeometrySet set) {
   std::ranges::sort(set.entries, {}, &GeometrySet::Entry::path);
   sets_.push_back(std::move(set));
@@ -174,14 +180,14 @@ void SceneBuilder::add_visibility(VisibilityRule rule) {
 }
 
 uint32_t SceneBuilder::add_light(Light light) {
-  check_light(light, {textures_.size(), profiles_.size(), sets_.size()});
+  check_light(light, {textures_.size(), profiles_.size(), sets_.size(), filters_.size()});
   lights_.push_back(std::move(light));
   return static_cast<uint32_t>(lights_.size() - 1);
 }
 
 uint32_t SceneBuilder::add_mesh_light(Light light) {
   light.kind = kMeshLight;
-  check_mesh_light(light, {textures_.size(), profiles_.size(), sets_.size()});
+  check_mesh_light(light, {textures_.size(), profiles_.size(), sets_.size(), filters_.size()});
   mesh_lights_.push_back(std::move(light));
   return static_cast<uint32_t>(mesh_lights_.size() - 1);
 }

@@ -96,4 +96,18 @@ void check_profile(const IesProfile& p) {
       throw Error("an IES profile has a value that is negative or not finite");
 }
 
+void check_filter(const LightFilter& f, size_t textures, size_t filters) {
+  const auto good = [](const auto&... values) { return (std::isfinite(values) && ...); };
+  bool is_finite = finite(f.to_world) &&
+                   good(f.distance, f.near_start, f.near_end, f.far_start, f.far_end, f.density);
+  for (const Vec3<float>& line :
+       {f.sides[0], f.sides[1], f.sides[2], f.sides[3], f.picture_u, f.picture_v})
+    is_finite = is_finite && good(line.x, line.y, line.z);
+  if (!is_finite) throw Error("a light filter has a value that is not finite; mend it");
+  if (f.texture != kNoTexture && f.texture >= textures)
+    throw Error("a light filter's texture was never added; add textures before filters");
+  if (f.next != kNoFilter && f.next >= filters)
+    throw Error("the filter that a light filter goes with was never added; add that before");
+}
+
 }  // namespace wavecomb

@@ -24,5 +24,7 @@ std::string quoted(const std::string& kind, const std::string& name);
 /// `texture_count`, `graph_count`: textures and graphs that there are.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);
 void check_profile(const IesProfile& profile);
+/// `textures`, `filters`: how many were added.
+void check_filter(const LightFilter& filter, size_t textures, size_t filters);
 
 }  // namespace wavecomb

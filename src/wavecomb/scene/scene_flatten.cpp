@@ -187,6 +187,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   geometry->groups = std::move(groups_);
   geometry->textures = std::move(textures_);
   geometry->profiles = std::move(profiles_);
+  geometry->filters = std::move(filters_);
   geometry->sets = std::move(sets_);
   geometry->visibility = std::move(visibility_);
   geometry->mesh_lights = std::move(mesh_lights_);

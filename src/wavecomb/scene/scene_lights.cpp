@@ -142,7 +142,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
   set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
                      before ? &before->set : nullptr, geometry.profiles, placed, kMaxPicked,
-                     TreeTime::kWhenChosen);
+                     TreeTime::kWhenChosen, geometry.filters);
   // Table entries now count from the first triangle and the first mesh light; make them ids.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)

@@ -80,6 +80,7 @@ struct SceneGeometry {
   std::vector<Instance> instances;
   std::vector<TexturePtr> textures;
   std::vector<IesProfile> profiles;
+  std::vector<LightFilter> filters;
   std::vector<GeometrySet> sets;
   std::vector<VisibilityRule> visibility;
   std::vector<Light> mesh_lights;  ///< Mesh::mesh_light

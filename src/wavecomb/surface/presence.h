@@ -49,6 +49,9 @@ template <typename F>
   at.local_normal = unit(n, at.local_normal);
   at.normal = unit(maps.map_normal(n), at.normal);
   at.view = select<F>(flat, at.normal, at.view);
+  at.normal_x = select<F>(flat, maps.inverse_row(0), at.normal_x);
+  at.normal_y = select<F>(flat, maps.inverse_row(1), at.normal_y);
+  at.normal_z = select<F>(flat, maps.inverse_row(2), at.normal_z);
   return at;
 }
 

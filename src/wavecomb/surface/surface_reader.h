@@ -146,6 +146,14 @@ struct InstanceMaps {
                    dot(cross(row[0], row[1]), n)) *
            side;
   }
+  /// Row j of the inverse of the map of vectors: a normal (a, b, c) there is a times row 0 and so
+  /// on in the world, but for its length.
+  Vec3<F> inverse_row(int j) const {
+    const Vec3<F> c[3] = {cross(row[1], row[2]), cross(row[2], row[0]), cross(row[0], row[1])};
+    const F det = dot(row[0], c[0]), inverse = 1.f / select(det == 0.f, F(1.f), det);
+    const auto part = [j](const Vec3<F>& v) { return j == 0 ? v.x : (j == 1 ? v.y : v.z); };
+    return Vec3<F>{part(c[0]), part(c[1]), part(c[2])} * inverse;
+  }
 
  private:
   /// From the words of an InstanceRecord.

@@ -326,6 +326,15 @@ CALLS: dict[str, Call] = {
         {},
         "profiles",
     ),
+    "add_light_filter": Call(
+        {
+            "transform": _MATRIX, "distance": number, "sides": row(*[COLOUR] * 4),
+            "picture_u": COLOUR, "picture_v": COLOUR, "texture": maybe(whole), "decay": _FOUR,
+            "density": number, "next": maybe(whole),
+        },
+        {},
+        "filters",
+    ),
     "set_camera": Call({"transform": _MATRIX}, CAMERA),
 }  # fmt: skip
 """Methods of ``SceneBuilder`` that a sandbox may ask for."""

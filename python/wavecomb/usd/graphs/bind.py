@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wavecomb.usd.graphs.expressions import Expressions, substituted
 from wavecomb.usd.graphs.node import (
+    OF_SPACE,
     PARAMETERS,
     PRIMVAR,
     Node,
@@ -28,7 +29,7 @@ from wavecomb.usd.looks.surface import TEXTURED_PARAMETERS, SurfaceGraph
 if TYPE_CHECKING:
     from wavecomb.usd.looks.surface import Surface
 
-_LOCAL = ("local_position", "local_normal")
+_LOCAL, _AXES = OF_SPACE[:2], OF_SPACE[2:]
 
 _CONSTANTS = {*TEXTURED_PARAMETERS, "ior"} - {"normal"}
 """Parameters beside those of layers that a constant may stand for."""
@@ -134,7 +135,7 @@ def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> 
 
 
 def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str, Value]:
-    """The group's position and normal, brought to the mesh's own space."""
+    """The group's position, normal and axes of normals, brought to the mesh's own space."""
     inverse = np.linalg.pinv(matrix)
 
     def mapped(vector: Value, rows: NDArray[Any]) -> Value:
@@ -143,12 +144,20 @@ def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str
             total = make.op("add", total, make.op("multiply", (part,) * 3, numbers(*row)))
         return total
 
+    def mapped_sum(vectors: Sequence[Value], weights: NDArray[Any]) -> Value:
+        total: Value = numbers(0.0, 0.0, 0.0)
+        for vector, weight in zip(vectors, weights, strict=True):
+            total = make.op("add", total, make.op("multiply", vector, numbers(float(weight))))
+        return total
+
     position = make.op(
         "add", mapped(make.input(_LOCAL[0]), inverse[:3, :3]), numbers(*inverse[3, :3])
     )
     normal = mapped(make.input(_LOCAL[1]), matrix[:3, :3].T)
     length = make.op("sqrt", make.op("dot", normal, normal))
-    return {_LOCAL[0]: position, _LOCAL[1]: make.op("divide", normal, length)}
+    axes = [make.input(name) for name in _AXES]
+    turned = {name: mapped_sum(axes, inverse[:3, i]) for i, name in enumerate(_AXES)}
+    return {_LOCAL[0]: position, _LOCAL[1]: make.op("divide", normal, length), **turned}
 
 
 def asks_for(graph: SurfaceGraph | None) -> bool:

@@ -18,9 +18,12 @@ INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
 PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
 """Parameter -> (its first component, how many it has)."""
 
-POINT_SIZE = 21
-"""Numbers of a point: uv, its width, then position, local position, normal, local normal, tangent
-and view of three each."""
+POINT_SIZE = 3 * len(INPUTS) - 3
+"""Numbers of a point: uv, its width, then position, local position, normal, local normal, tangent,
+view and the three axes of normals, of three each."""
+
+OF_SPACE = ("local_position", "local_normal", "normal_x", "normal_y", "normal_z")
+"""Inputs that depend on the object's own space."""
 
 PRIMVAR = "primvar"
 """A node that stands for what a mesh gives."""

@@ -12,6 +12,7 @@ from pxr import Usd, UsdShade
 from wavecomb.usd.graphs.expressions import Expressions, substituted
 from wavecomb.usd.graphs.linear import Linear, linear
 from wavecomb.usd.graphs.node import (
+    OF_SPACE,
     PARAMETERS,
     POINT_SIZE,
     PRIMVAR,
@@ -86,7 +87,7 @@ def sampled(value: Value) -> Any:
     steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     points[:, 0], points[:, 1] = (axis.ravel() for axis in np.meshgrid(steps, steps))
     points[:, [3, 4, 6, 7]] = np.tile(points[:, :2], 2)
-    points[:, [11, 14, 15, 20]] = 1.0
+    points[:, [11, 14, 15, 20]] = points[:, 21::4] = 1.0
     ready = substituted(Expressions(), value, _as_it_is)
     return assemble(dict(enumerate(ready))).run(points)
 
@@ -228,7 +229,7 @@ def graphs_of(outputs: Mapping[str, Value], primvars: tuple[str, ...]) -> Surfac
     seen = float(sampled(ready["emission"]).max()) if emission else 0.0
     nodes = nodes_of([part for value in outputs.values() for part in value])
     wanted = {node.number for node in nodes if node.code == PRIMVAR}
-    local = any(node.name.startswith("local_") for node in nodes)
+    local = any(node.name in OF_SPACE for node in nodes)
     names = primvars if wanted else ()
     return SurfaceGraph(
         whole, opacity, emission, seen, names, local, tuple(sorted(outputs.items()))

@@ -21,6 +21,7 @@ from wavecomb.light_table import (
 )
 from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
+from wavecomb.usd.lights.filters import Filter, FilterReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.colour_space import linear_colour, space_of
 from wavecomb.usd.looks.network import colour, number
@@ -54,11 +55,13 @@ class Light:
         kind: rect, disk, sphere, cylinder, distant or dome.
         options: Keyword arguments.
         local: (4, 4) applied before the prim's transform.
+        filters: What stands before it, relative to it.
     """
 
     kind: str
     options: dict[str, Any]
     local: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    filters: tuple[Filter, ...] = ()
 
 
 def blackbody(kelvin: float) -> tuple[float, float, float]:
@@ -103,6 +106,7 @@ class LightReader:
         self.hidden = hidden
         self.links = links
         self.domes = DomeReader(time, up_axis, textures, report)
+        self.filters = FilterReader(time, textures, report)
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
@@ -132,17 +136,17 @@ class LightReader:
         options["normalize"] = normalize
         if self.hidden and kind in light_parameters()["visible"].kinds:
             options["visible"] = False
-        return Light(kind, options, local)
+        return Light(kind, options, local, self.filters.of(prim, kind))
 
     def read_mesh(self, prim: Usd.Prim) -> dict[str, Any]:
         """The light of a mesh that is one, as ``SceneBuilder.add_mesh_light`` takes it."""
         options = self._common(prim, "mesh")
         options["normalize"] = bool(self._get(prim, "normalize", False))
+        self.filters.of(prim, "mesh")
         return options
 
     def _common(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
         """Options that lights of all kinds have."""
-        self._say_unsupported(prim)
         radiance = self._colour(prim)
         if not all(0 <= value < 1e30 for value in radiance):
             self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
@@ -289,13 +293,3 @@ class LightReader:
                 return made
         wraps = ("clamp", "clamp") if rect else ("repeat", "clamp")
         return self.textures.add(path, image, tag, *wraps, is_colour=True)
-
-    def _say_unsupported(self, prim: Usd.Prim) -> None:
-        path = prim.GetPath()
-
-        filters = prim.GetRelationship("light:filters")
-        if filters and filters.HasAuthoredTargets():
-            self.report.missing("light filters", path)
-        tint = colour(self._get(prim, "shadow:color", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
-        if any(tint) or number(self._get(prim, "shadow:distance", -1.0), -1.0) >= 0:
-            self.report.missing("colour and distance of shadows", path)

@@ -82,7 +82,9 @@ class MeshLights:
         number = self._builder.add_mesh_light(np.array(draw.matrix), sync, **options)
         self.any = True
         self._report.tally("mesh lights")
-        kept = {"diffuse", "specular", "shadow_link"} & options.keys()
+        kept = {
+            "diffuse", "specular", "shadow_link", "shadow_color", "shadow_distance",
+        } & options.keys()  # fmt: skip
         return MeshLight(number, material, sync == "independent" or bool(kept))
 
     def say_moving(self, path: Sdf.Path) -> None:

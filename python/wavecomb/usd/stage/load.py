@@ -34,6 +34,7 @@ from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces, parse_level
 from wavecomb.usd.geometry.view_size import ViewSize
 from wavecomb.usd.lights.dome import soft_dome, up_rotation
+from wavecomb.usd.lights.filters import add_filters
 from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.lights.links import LinkTable
@@ -412,6 +413,8 @@ def _add_lights(
         options = light.options
         if "portals" in options:
             options = {**options, "portals": options["portals"] @ transform}
+        if light.filters:
+            options = {**options, "filter": add_filters(builder, light.filters, transform)}
         builder.add_light(light.kind, transform, **options)
     if lights:
         return tuple(light.options["name"] for light, _ in lights)

@@ -81,6 +81,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       store_row<ShadowRow, F>(
           pool.shadows, slot,
           {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, lit_by, v.shadow_set}, v.has_shadow);
+    if constexpr (V::has(kMeshLights))
+      if (pool.shades) [[unlikely]]
+        store_row<RadianceRow, F>(pool.shades, slot, {v.shade}, v.has_shadow);
     if (any(v.alive))
       store_row<PathRow, F>(pool.paths, slot,
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,

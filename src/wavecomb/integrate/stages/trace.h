@@ -105,9 +105,10 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   const bool is_watched =
       wave.aovs.wants_lights() || wave.aovs.wants_light_samples() || wave.history;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
-    const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
+    Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
     Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
+    const Color<F> direct = c;
     if constexpr (Media::kAny) {
       if constexpr (Media::kStreams) {
         c = c * media.template passed<F>(wave, i);
@@ -119,6 +120,13 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
         c = c * media.template transmittance<F>(
                     {context.settings->sampler, path.key, depth, o, d, t}, active);
       }
+    }
+    if (wave.pool.shades) [[unlikely]] {
+      // Shadows of a colour: what is in the way leaves some of the light.
+      const Mask<F> blocked = first_lanes<F>(q.size - i) & not_(active);
+      const Color<F> shade = load_row<RadianceRow, F>(wave.pool.shades, slot, blocked).sum;
+      c = select<F>(blocked, direct * shade, c);
+      active = active | (blocked & (max_component(shade) > 0.f));
     }
     add_radiance<F>(wave.pool.radiance, slot, c, active);
     if (is_watched) {

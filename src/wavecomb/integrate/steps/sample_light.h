@@ -12,6 +12,7 @@
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/integrate/steps/join.h"
 #include "wavecomb/light/light.h"
+#include "wavecomb/light/shadow_look.h"
 
 namespace wavecomb {
 
@@ -76,12 +77,15 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
     light = chosen_light<F>(lights, receiver, r.x, lit);
   if constexpr ((kFeatures & kJoined) != 0)
     w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, receiver.p);
+  ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
   if (sampled_only) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);
     const Color<F> diffuse = at.bsdf.diffuse_f_cos(seen, wi);
     f_cos = select<F>(effect.sampled_only,
                       fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
     w = select(effect.sampled_only, F(1.f), w);
+    if (lights.shadows) [[unlikely]]
+      reach = shadow_reach<F>(lights, effect.shadow, r.w, lit);
   }
   if (v.has_links()) [[unlikely]] {
     w = select(shines_on<F>(lights, out.next.link, light, lit), w, F(0.f));
@@ -99,6 +103,10 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   out.shadow_o = at.origin(l.wi);
   out.shadow_d = l.wi;
   out.shadow_tfar = l.distance * kShadowReach;
+  if (sampled_only) [[unlikely]] {
+    out.shadow_tfar = min(out.shadow_tfar, reach.distance);
+    out.shade = reach.color;
+  }
 }
 
 }  // namespace wavecomb

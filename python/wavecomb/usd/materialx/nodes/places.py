@@ -7,6 +7,7 @@ from wavecomb.usd.graphs.colour import in_working_space
 from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import COLOURS, NORMAL
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
+from wavecomb.usd.materialx.nodes.spaces import tangent_of_object
 from wavecomb.usd.stage.times import frame_number
 
 NODES: dict[str, Handler] = {}
@@ -95,11 +96,10 @@ def _normal_map(n: NodeCall) -> Value:
     """A normal in tangent space; of a map that is flat, the surface's own."""
     m, n.width = n.make, 3
     texel = n.inputs.find("in", NORMAL)
-    if texel is None or n.text("space", "tangent") != "tangent":
-        if texel is not None:
-            what = f"MaterialX node {n.identifier} in object space (left out)"
-            n.networks.report.missing(what, n.inputs.path)
+    if texel is None:
         return numbers(0.0, 0.0, 1.0)
     tilted = m.op("subtract", m.op("multiply", fit(texel, 3), numbers(2.0)), numbers(1.0))
+    if n.text("space", "tangent") != "tangent":
+        return tangent_of_object(m, tilted)
     scale = n.value("scale", 1.0, 0)
     return m.op("multiply", tilted[:2], fit(scale, 2)) + tilted[2:]

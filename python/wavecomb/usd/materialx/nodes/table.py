@@ -15,6 +15,7 @@ from wavecomb.usd.materialx.nodes import (
     matrices,
     places,
     procedures,
+    spaces,
 )
 from wavecomb.usd.materialx.nodes.call import Handler
 
@@ -30,6 +31,7 @@ PRIMITIVES: dict[str, Handler] = {
     **matrices.NODES,
     **places.NODES,
     **procedures.NODES,
+    **spaces.NODES,
 }
 """What compiles a category."""
 
