@@ -236,8 +236,9 @@ TEST(Equiangular, DrawsByItsDensity) {
 
 TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
   const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
-  const auto lamps = two_lamps();
-  for (const LightView* lights : {static_cast<const LightView*>(nullptr), &lamps->view().lights})
+  const auto scene = two_lamps();
+  const LightView lamps = scene->view().lights;
+  for (const LightView* lights : {static_cast<const LightView*>(nullptr), &lamps})
     for (Case c : cases()) {
       if (lights) c.name += " by lamps";
       const Records r(c.volumes);
