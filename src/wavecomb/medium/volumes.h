@@ -222,18 +222,12 @@ class Volumes {
     using U = UInt<F>;
     const Way<F> way(sampler, key, depth, VertexSet::kFlight);
     const Color<F> none(F(0.f));
-    return {o,
-            d,
-            throughput,
-            F(throughput.x + throughput.y + throughput.z),
-            F(0.f),
-            way.branch(0x51ee9u).seed,
-            U(0u),
-            float_bits<F>(cone_width),
-            way.r.y,
-            way.r.z,
-            U(0u),
-            none,
+    return {o,          d,
+            throughput, F(throughput.x + throughput.y + throughput.z),
+            F(0.f),     way.branch(0x51ee9u).seed,
+            U(0u),      float_bits<F>(cone_width),
+            way.r.y,    way.r.z,
+            U(0u),      none,
             none};
   }
   /// Rays of a wave through what fills meshes.
