@@ -217,11 +217,11 @@ TEST(Equiangular, DrawsByItsDensity) {
   const Vec3<float> o{-1, 0.3f, 0.4f}, d{1, 0, 0};
   for (const float u : {0.1f, 0.9f}) {
     const auto way =
-        lamp_way<float>(scene->view().lights, o, d, 1, 2.4f, 0.5f, {u, 0.3f, 0.8f, 0.f}, true);
+        lamp_way<float>(scene->view().lights, o, d, 1, 3.4f, 0.5f, {u, 0.3f, 0.8f, 0.f}, true);
     ASSERT_GT(way.share, 0.f);
     double sum = 0;
     for (int i = 0; i < 4000; ++i)
-      sum += double{way.density(1 + 1.4f * (static_cast<float>(i) + 0.5f) / 4000)} * 1.4 / 4000;
+      sum += double{way.density(1 + 2.4f * (static_cast<float>(i) + 0.5f) / 4000)} * 2.4 / 4000;
     EXPECT_NEAR(sum, 1, 1e-3);
     for (const float v : {0.f, 0.2f, 0.5f, 0.99f}) EXPECT_NEAR(way.before(way.draw(v)), v, 1e-4f);
     EXPECT_NEAR(way.draw(0), 1, 1e-4f);
