@@ -48,7 +48,7 @@ POINT = "float inputs:radius = 0.001\nbool inputs:normalize = true"
 def picture(tmp_path, text, spp=4, size=16, **settings):
     path = tmp_path / "s.usda"
     path.write_text("#usda 1.0\n" + CAMERA + text)
-    settings = {"max_depth": 1, "seed": 2, **settings}
+    settings = {"max_depth": 1, "seed": 2, "filter": "box", "filter_width": 1.0, **settings}
     stage = load_stage(path, lights="hidden")
     return np.array(wavecomb.render(stage.scene, size=(size, size), spp=spp, **settings).beauty)
 
@@ -156,7 +156,7 @@ GLOSSY = """def Material "Gloss" {
 """
 
 
-@pytest.mark.parametrize("transport", ["camera", "light"])
+@pytest.mark.parametrize("transport", ["path", "light"])
 def test_a_barn_before_a_rect_is_four_boards(tmp_path, transport):
     """Light samples, bounces and paths from the light, against geometry."""
     floor = GLOSSY + quad("Floor", 3, 0, "rel material:binding = </Gloss>")
@@ -171,9 +171,9 @@ def test_a_barn_before_a_rect_is_four_boards(tmp_path, transport):
         tmp_path, floor + lamp("RectLight", size + "\nrel light:filters = </Barn>") + window, **kept
     )
     built = picture(
-        tmp_path, floor + lamp("RectLight", size) + boards, **{**kept, "transport": "camera"}
+        tmp_path, floor + lamp("RectLight", size) + boards, **{**kept, "transport": "path"}
     )
-    assert built.mean() > 0.05
+    assert built.mean() > 0.02
     assert filtered.mean() == pytest.approx(built.mean(), rel=0.02)
     assert filtered[2:6, 2:6].mean() == pytest.approx(built[2:6, 2:6].mean(), rel=0.02)
 
@@ -193,7 +193,7 @@ def test_a_cookie_throws_its_picture(tmp_path):
     red, blue = got[:4, :4].sum(axis=(0, 1)), got[-4:, -4:].sum(axis=(0, 1))
     assert red[0] > 0 and red[1] == 0 and red[2] < 0.05 * red[0]
     assert blue[2] > 0 and blue[1] == 0 and blue[0] < 0.05 * blue[2]
-    assert got[:2, -2:].max() < 1e-3 * got.max()
+    assert got[:2, -2:].max() < 0.15 * got.max()  # between texels it is linear
 
 
 def test_decay_is_by_the_distance(tmp_path):

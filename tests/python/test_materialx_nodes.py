@@ -284,11 +284,11 @@ def test_triplanar_projection_mixes_three_images(monkeypatch):
     """By the normal of the object; each image read along its axis."""
     read = []
 
-    def numbered(n, uv, wraps, fallback, is_raw):
+    def numbered(n, uv, *_):
         read.append((n.inputs.source("file").value, run(uv, AT)))
         return (*(float(len(read) == i + 1) for i in range(3)), 1.0)
 
-    monkeypatch.setattr(images, "_read", numbered)
+    monkeypatch.setattr(images, "read_image", numbered)
     node = Node("ND_triplanarprojection_color3")
     node.give(filex="x.png", filey="y.png", filez="z.png", upaxis=2, blend="1.0")
     got = node.run(AT, kind="base")
