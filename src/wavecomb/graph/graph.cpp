@@ -67,8 +67,7 @@ uint32_t least_width(GraphCode code) {
   return three ? 3 : 1;
 }
 
-constexpr std::array<uint32_t, kGraphInputCount> kInputWidths{2, 3, 3, 3, 3, 3,
-                                                             3, 3, 3, 3, 3};
+constexpr std::array<uint32_t, kGraphInputCount> kInputWidths{2, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3};
 constexpr uint32_t kMaxOctaves = 32;
 
 }  // namespace

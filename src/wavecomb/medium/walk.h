@@ -7,17 +7,18 @@
 /// So light that arrives evenly leaves evenly, and a flat wall has the colour that is asked for
 /// (scene/walk_data.h).
 ///
-/// Techniques: each walk is of a channel, which decides how far it goes (hero wavelengths, Wilkie et
-/// al. 2014), and is free or led. A free walk goes as the medium scatters. One that is led makes for
-/// the surface that it entered by (Krivanek and d'Eon, "A Zero-Variance-Based Sampling Scheme for
-/// Monte Carlo Subsurface Scattering", 2014): with n the normal there, mu = d n, and nu the
+/// Techniques: each walk is of a channel, which decides how far it goes (hero wavelengths, Wilkie
+/// et al. 2014), and is free or led. A free walk goes as the medium scatters. One that is led makes
+/// for the surface that it entered by (Krivanek and d'Eon, "A Zero-Variance-Based Sampling Scheme
+/// for Monte Carlo Subsurface Scattering", 2014): with n the normal there, mu = d n, and nu the
 /// diffusion length in mean free paths, it draws
 ///
-///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),   p(t) = s exp(-s t),  s = (1 - mu / nu) e
+///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),   p(t) = s exp(-s t),  s = (1 - mu / nu)
+///   e
 ///
-/// with e the extinction. Its technique is chosen by a number that is spread over a pixel's samples,
-/// and its weight is that of all six (balance heuristic over whole walks): with q_k the techniques'
-/// shares and p_k their densities
+/// with e the extinction. Its technique is chosen by a number that is spread over a pixel's
+/// samples, and its weight is that of all six (balance heuristic over whole walks): with q_k the
+/// techniques' shares and p_k their densities
 ///
 ///   T_c = T_c(0) A_c p_c / sum over k of q_k p_k
 ///
@@ -150,10 +151,10 @@ inline void begin_flight(const WalkMedium<F>& medium, Walk<F>& w) {
   using U = UInt<F>;
   const U channel = w.channel();
   const F denser = detail::component<F>(detail::led_density(medium, w), channel);
-  const F extinction = detail::component<F>(medium.extinction, channel) *
-                       select(w.is_led(), denser, F(1.f));
-  const F number = select(Mask<F>(w.number == U(0u)), w.flight,
-                          walk_numbers<F>(w.seed, w.number).x);
+  const F extinction =
+      detail::component<F>(medium.extinction, channel) * select(w.is_led(), denser, F(1.f));
+  const F number =
+      select(Mask<F>(w.number == U(0u)), w.flight, walk_numbers<F>(w.seed, w.number).x);
   w.rest = max(F(-log(F(1.f - number)) / extinction), F(1e-30f));
 }
 
