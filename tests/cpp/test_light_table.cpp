@@ -20,7 +20,7 @@ using scene_testing::make_light;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
-constexpr LightReferences kThere{2, 2, 2};
+constexpr LightReferences kThere{2, 2, 2, 2};
 
 Light a_light(LightKind kind = LightKind::kRect) {
   Light light = make_light(kind, {1, 1, 1});
@@ -80,6 +80,7 @@ uint64_t hash_of(const Light& light) {
     b.add_texture({"t", "\x10\x20\x30", 1, 1, 3, TexelFormat::kU8, false});
     b.add_ies({{0, 90}, {0}, {1, 1}});
     b.add_geometry_set({{{"/", PathRule::kExpand}}});
+    b.add_light_filter({});
   }
   if (light.kind == LightKind::kTriangle)
     b.add_mesh_light(light);
