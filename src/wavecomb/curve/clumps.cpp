@@ -75,8 +75,7 @@ ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
 
 /// How often a segment is halved. A clump's box is as large as the pieces in it are long, and a
 /// bent piece is thicker than the curve; but each piece takes memory.
-uint32_t halvings(const Mesh& mesh, uint32_t segment) {
-  const ClumpPiece whole = piece_of(mesh, kPieceNodes * segment + 1);
+uint32_t halvings(const Mesh& mesh, uint32_t segment, const ClumpPiece& whole) {
   if (!(length(Vec3<float>(whole.b - whole.a)) > kSlender * whole.radius)) {
     const float r = mesh.radii[mesh.indices[segment] & kCurveFirstPoint];
     if (whole.radius <= 2 * r) return 0;
@@ -84,14 +83,13 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment) {
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-/// A segment or a piece, and the middle of its line, twice.
+/// A piece's number, or that of a segment's first piece, and the middle of its line, twice.
 struct ClumpEntry {
   std::array<float, 3> middle;
   uint32_t number;
 };
 
-ClumpEntry entry_of(const Mesh& mesh, uint32_t piece, uint32_t number) {
-  const ClumpPiece line = piece_of(mesh, piece);
+ClumpEntry entry_of(const ClumpPiece& line, uint32_t number) {
   const Vec3<float> m = line.a + line.b;
   return {{m.x, m.y, m.z}, number};
 }
@@ -136,12 +134,18 @@ void part_entries(std::span<ClumpEntry> entries, size_t full, const CurveClumps:
   second();
 }
 
+/// A segment has as many pieces as its first one's number says.
+uint32_t pieces_of(const ClumpEntry& segment) {
+  return segment.number % kPieceNodes;
+}
+
 /// All segments, those that lie close together side by side.
 std::vector<ClumpEntry> segments_of(const Mesh& mesh, size_t group, const CurveClumps::Both& both) {
   std::vector<ClumpEntry> out(mesh.indices.size());
   over_all(0, out.size(), 1u << 14, both, [&](size_t s) {
     const auto segment = static_cast<uint32_t>(s);
-    out[s] = entry_of(mesh, kPieceNodes * segment + 1, segment);
+    const ClumpPiece whole = piece_of(mesh, kPieceNodes * segment + 1);
+    out[s] = entry_of(whole, kPieceNodes * segment + (1u << halvings(mesh, segment, whole)));
   });
   part_entries(out, group, both);
   return out;
@@ -164,20 +168,16 @@ CurveClumps::CurveClumps(const Mesh& mesh, const Both& both) : mesh_(mesh) {
   std::vector<size_t> first(groups + 1, 0);
   over_all(0, groups, 1, both, [&](size_t g) {
     size_t pieces = 0;
-    for (const ClumpEntry& s : group(g)) pieces += size_t{1} << halvings(mesh, s.number);
+    for (const ClumpEntry& s : group(g)) pieces += pieces_of(s);
     first[g + 1] = (pieces + kPieces - 1) / kPieces;
   });
   std::partial_sum(first.begin(), first.end(), first.begin());
   clumps_.resize(first.back());
   over_all(0, groups, 1, both, [&](size_t g) {
     std::vector<ClumpEntry> pieces;
-    for (const ClumpEntry& s : group(g)) {
-      const uint32_t n = 1u << halvings(mesh, s.number);
-      for (uint32_t i = n; i < 2 * n; ++i) {
-        const uint32_t number = kPieceNodes * s.number + i;
-        pieces.push_back(entry_of(mesh, number, number));
-      }
-    }
+    for (const ClumpEntry& s : group(g))
+      for (uint32_t number = s.number; number < s.number + pieces_of(s); ++number)
+        pieces.push_back(entry_of(piece_of(mesh, number), number));
     part_entries(pieces, kPieces, both);
     for (size_t at = 0, c = first[g]; at < pieces.size(); at += kPieces, ++c) {
       std::array<uint32_t, kPieces> numbers;

@@ -50,7 +50,7 @@ struct Walk {
   Vec3<F> o, d;
   Color<F> throughput;
   F first;            ///< sum of the channels of the throughput that it began with
-  F rest;             ///< to the next collision; 0: not yet known
+  F rest;             ///< to the next collision, once a flight has begun
   UInt<F> seed;       ///< of its random numbers
   UInt<F> number;     ///< of collisions so far
   UInt<F> normal;     ///< pack_normal of the surface that it entered by, outwards
@@ -145,7 +145,7 @@ inline void choose_technique(const WalkMedium<F>& medium, const F& across, Walk<
   before(w.free.x, 0u);
 }
 
-/// Chooses how far a walk goes that does not know it.
+/// Chooses how far a walk goes until its next collision.
 template <typename F>
 inline void begin_flight(const WalkMedium<F>& medium, Walk<F>& w) {
   using U = UInt<F>;
