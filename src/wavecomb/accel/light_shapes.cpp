@@ -2,19 +2,63 @@
 #include "wavecomb/accel/light_shapes.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "wavecomb/scene/light_motion.h"
 
 namespace wavecomb {
+namespace {
+
+/// Distance along d to the parallelogram of a record, as LightKindInfo::intersect has it, from
+/// either side: o + t d = a u + b v, by T. Moller and B. Trumbore, "Fast, Minimum Storage
+/// Ray-Triangle Intersection", 1997.
+double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
+                               const double (&d)[3]) {
+  const auto cross = [](const double* a, const double* b, double (&c)[3]) {
+    for (int i = 0; i < 3; ++i) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+  };
+  const auto dot = [](const double* a, const double* b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  };
+  double u[3], v[3], dv[3], ou[3];
+  std::ranges::copy(light.u, u);
+  std::ranges::copy(light.v, v);
+  cross(d, v, dv);
+  cross(o, u, ou);
+  const double det = dot(u, dv);
+  if (det == 0) return 0;
+  const double a = dot(o, dv) / det, b = dot(d, ou) / det;
+  if (!(a >= 0 && a <= 1 && b >= 0 && b <= 1)) return 0;
+  return dot(v, ou) / det;
+}
+
+/// A box around what does not move, in place of the whole way.
+Bounds box_at_rest(const PlacedShape& shape) {
+  const LightRecord& l = shape.light;
+  if (shape.kind->box) return shape.kind->box(l);
+  float lo[3], hi[3];
+  for (int i = 0; i < 3; ++i) {
+    lo[i] = l.p[i] + std::min(l.u[i], 0.f) + std::min(l.v[i], 0.f);
+    hi[i] = l.p[i] + std::max(l.u[i], 0.f) + std::max(l.v[i], 0.f);
+  }
+  return {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
+}
+
+}  // namespace
 
 bool PlacedShape::operator==(const PlacedShape& other) const {
   const LightRecord &a = light, &b = other.light;
   return shape == other.shape && a.kind == b.kind && a.radius == b.radius &&
          std::ranges::equal(a.p, b.p) && std::ranges::equal(a.u, b.u) &&
-         std::ranges::equal(a.v, b.v);
+         std::ranges::equal(a.v, b.v) && std::ranges::equal(motion.origin, other.motion.origin) &&
+         steps == other.steps;
 }
 
 std::vector<PlacedShape> light_shapes(const Scene& scene) {
   std::vector<PlacedShape> shapes;
-  for (const LightRecord& record : scene.light_set().records) {
+  const LightSet& set = scene.light_set();
+  for (const LightRecord& record : set.records) {
+    const size_t number = shapes.size();
     PlacedShape& placed = shapes.emplace_back();
     const LightKindInfo& kind = info_of(static_cast<LightKind>(record.kind));
     if (!kind.shape || !(record.area > 0) || record.hidden != 0) continue;
@@ -26,22 +70,48 @@ std::vector<PlacedShape> light_shapes(const Scene& scene) {
     std::ranges::copy(record.p, placed.light.p);
     std::ranges::copy(record.u, placed.light.u);
     std::ranges::copy(record.v, placed.light.v);
+    if (number >= set.motions.size() || set.motions[number].segments == 0) continue;
+    const LightMotion& motion = set.motions[number];
+    placed.shape = LightShape::kOwn;
+    placed.motion = motion;
+    placed.motion.first = 0;
+    const auto first = set.motion_steps.begin() + motion.first;
+    placed.steps.assign(first, first + motion.segments + 1);
   }
   return shapes;
 }
 
 Bounds own_shape_bounds(const PlacedShape& shape) {
-  return shape.kind->box(shape.light);
+  const Bounds rests = box_at_rest(shape);
+  if (shape.steps.empty()) return rests;
+  const Vec3<float> centre = (rests.lo + rests.hi) * 0.5f, half = (rests.hi - rests.lo) * 0.5f;
+  const double x{half.x}, y{half.y}, z{half.z};
+  const Ball way = along_way(shape.motion, shape.steps,
+                             Ball{{double{centre.x}, double{centre.y}, double{centre.z}},
+                                  std::sqrt(x * x + y * y + z * z)});
+  float lo[3], hi[3];
+  for (int i = 0; i < 3; ++i) {
+    const double slack = way.radius + 1e-6 * std::abs(way.centre[i]);
+    lo[i] = static_cast<float>(way.centre[i] - slack);
+    hi[i] = static_cast<float>(way.centre[i] + slack);
+  }
+  return {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
 }
 
-float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3],
-                          const float (&dir)[3]) {
+float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3], const float (&dir)[3],
+                          float time) {
   double o[3], d[3];
-  for (int i = 0; i < 3; ++i) {
-    o[i] = static_cast<double>(origin[i]) - shape.light.p[i];
-    d[i] = dir[i];
+  std::ranges::copy(origin, o);
+  std::ranges::copy(dir, d);
+  if (!shape.steps.empty()) {
+    const double seen[3] = {o[0], o[1], o[2]}, along[3] = {d[0], d[1], d[2]};
+    const LightPlace place(shape.motion, shape.steps, double{time});
+    place.point_to_rest(seen, o);
+    place.to_rest(along, d);
   }
-  const double t = shape.kind->intersect(shape.light, o, d);
+  for (int i = 0; i < 3; ++i) o[i] -= double{shape.light.p[i]};
+  const double t = shape.kind->intersect ? shape.kind->intersect(shape.light, o, d)
+                                         : intersect_parallelogram(shape.light, o, d);
   return t > 0 ? static_cast<float>(t) : 0.f;
 }
 

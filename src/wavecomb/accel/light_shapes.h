@@ -14,6 +14,8 @@ struct PlacedShape {
   LightShape shape = LightShape::kNone;
   LightRecord light{};                  ///< kind, p, u, v and radius
   const LightKindInfo* kind = nullptr;  ///< of shapes of their own
+  LightMotion motion{};                 ///< of what moves, which has a shape of its own
+  std::vector<LightStep> steps;
 
   bool operator==(const PlacedShape& other) const;
 };
@@ -21,13 +23,13 @@ struct PlacedShape {
 /// By record; kNone where rays do not meet it.
 std::vector<PlacedShape> light_shapes(const Scene& scene);
 
-/// A box around a shape of its own, a little larger.
+/// A box around a shape of its own and all its way, a little larger.
 Bounds own_shape_bounds(const PlacedShape& shape);
 
 /// Distance along dir to a shape of its own, in units of |dir|; 0 where it is not ahead. One ray at
 /// a time and in double precision, so that a hit is the same whatever the rays beside it are:
-/// Embree's own spheres and discs round differently in packets and alone.
-float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3],
-                          const float (&dir)[3]);
+/// Embree's own spheres and discs round differently in packets and alone. `time`: of the shutter.
+float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3], const float (&dir)[3],
+                          float time);
 
 }  // namespace wavecomb

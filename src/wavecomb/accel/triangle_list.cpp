@@ -120,7 +120,7 @@ struct ListTracer {
       const auto i = static_cast<size_t>(std::countr_zero(bits));
       const float o[3] = {lane(packet.o.x, i), lane(packet.o.y, i), lane(packet.o.z, i)};
       const float d[3] = {lane(packet.d.x, i), lane(packet.d.y, i), lane(packet.d.z, i)};
-      t[i] = intersect_own_shape(shape.placed, o, d);
+      t[i] = intersect_own_shape(shape.placed, o, d, 0.f);
     }
     const F found = load<F>(t.data());
     return select(found < limit, found, F(0.f));

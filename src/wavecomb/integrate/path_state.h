@@ -69,8 +69,13 @@ struct PathState {
   // Where paths know what they are inside of (InsideRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< what collides, by material
+  F time{0.5f};        ///< of the shutter, where lights move
 
-  LightReceiver<F> vertex_before() const { return LightReceiver<F>(o, receiver); }
+  LightReceiver<F> vertex_before() const {
+    LightReceiver<F> from(o, receiver);
+    from.time = time;
+    return from;
+  }
 };
 
 /// What shading a vertex gives. Lanes outside the masks hold anything.

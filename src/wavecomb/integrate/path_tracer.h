@@ -87,6 +87,7 @@ class PathTracer {
     ++counts_.samples;
 
     for (uint32_t depth = 0;; ++depth) {
+      path.time = time;
       clock_.enter(Phase::kTrace);
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
       SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
@@ -121,7 +122,10 @@ class PathTracer {
         if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
         if (depth == 0) aovs_.hit_light<F>(*context_.camera, kSlot, p, time, hit.geom, true);
         if (depth == 0 && aovs_.wants_motion())
-          aovs_.move<F>(kSlot, screen_motion<F>(*context_.camera, p, p, true), true);
+          aovs_.move<F>(
+              kSlot,
+              screen_motion_of_light<F>(scene.lights, *context_.camera, hit.geom, p, time, true),
+              true);
         add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
         return depth;
       }

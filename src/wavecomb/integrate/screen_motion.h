@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/integrate/camera_connection.h"
+#include "wavecomb/light/moving.h"
 #include "wavecomb/surface/surface.h"
 
 namespace wavecomb {
@@ -34,6 +35,19 @@ inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, co
   const F x = b.x - a.x, y = a.y - b.y;
   const Mask<F> good = is_finite(x) & is_finite(y);
   return {select(good, x, F(0.f)), select(good, y, F(0.f))};
+}
+
+/// The same of place `p` on lights `light` at `time`.
+template <typename F>
+inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup& camera,
+                                      const UInt<F>& light, const Vec3<F>& p, const F& time,
+                                      const Mask<F>& active) {
+  if (!lights.motions) return screen_motion<F>(camera, p, p, active);
+  const Vec3<F> rests = light_pose<F>(lights, light, time, active).point_to_rest(p);
+  const auto at = [&](float moment) {
+    return light_pose<F>(lights, light, F(moment), active).point_to_world(rests);
+  };
+  return screen_motion<F>(camera, at(0.f), at(1.f), active);
 }
 
 /// The same of the surface of a hit.

@@ -13,6 +13,7 @@
 #include "wavecomb/light/light_tree.h"
 #include "wavecomb/light/link.h"
 #include "wavecomb/light/mesh_light.h"
+#include "wavecomb/light/moving.h"
 #include "wavecomb/light/shaping.h"
 #include "wavecomb/light/triangle.h"
 #include "wavecomb/scene/light_data.h"
@@ -174,15 +175,20 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
         // Often there is one light of a kind, whose record is the same in all
         // its lanes.
         const detail::LightReader<F> light(view.lights, index, lanes);
+        Vec3<F> from = p;
+        if (view.motions) [[unlikely]]
+          from = light_pose<F>(view, index, to.time, lanes).point_to_rest(p);
         detail::KindSample<F> s =
-            detail::sample_kind<F>(kind, {view, index, light, p, u, v, lanes});
+            detail::sample_kind<F>(kind, {view, index, light, from, u, v, lanes});
         if (view.shapings)
           s.radiance =
               detail::shaped<F>(view, light.shaping(), -s.wi, s.radiance, lanes & (s.pdf > 0.f));
         if (view.filters) [[unlikely]]
           s.radiance = detail::filtered<F>(view, light[&LightRecord::filter],
-                                           {fma(s.wi, s.distance, p), -s.wi, s.distance},
+                                           {fma(s.wi, s.distance, from), -s.wi, s.distance},
                                            s.radiance, lanes & (s.pdf > 0.f));
+        if (view.motions) [[unlikely]]
+          s.wi = light_pose<F>(view, index, to.time, lanes).to_world(s.wi);
         put(s, pick.pdf(light.pick_pdf()), lanes);
       });
   return result;
@@ -194,17 +200,22 @@ struct LightHit {
   F pdf;  ///< what sample_light would have given for this direction, 0 for delta lights
 };
 
-/// Radiance that light `light` sends back along the ray from.p + t dir which hit its shape at
+/// Radiance that light `light` sends back along the ray from.p + t along which hit its shape at
 /// distance t. Kinds without a shape and inactive lanes give 0.
 template <typename F>
 LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
-                      const Vec3<F>& dir, const F& t, const Mask<F>& hit_lanes) {
-  const Vec3<F>& origin = from.p;
+                      const Vec3<F>& along, const F& t, const Mask<F>& hit_lanes) {
   LightHit<F> result{Color<F>(F(0.f)), F(0.f)};
   const Mask<F> active = hit_lanes & Mask<F>(light < UInt<F>(view.first_triangle));
   if (none(active)) return result;
   const detail::LightReader<F> reader(view.lights, light, active);
   const F pick_pdf = detail::finite_pick_pdf<F>(view, light, reader.pick_pdf(), from, active);
+  Vec3<F> origin = from.p, dir = along;
+  if (view.motions) [[unlikely]] {
+    const LightPose<F> pose = light_pose<F>(view, light, from.time, active);
+    origin = pose.point_to_rest(origin);
+    dir = pose.to_rest(dir);
+  }
   detail::for_each_kind<F>(
       reader[&LightRecord::kind], active, [&](LightKind kind, const Mask<F>& lanes) {
         detail::KindHit<F> hit = detail::hit_kind<F>(kind, {view, reader, origin, dir, t, lanes});
@@ -280,12 +291,18 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
                                         const Vec3<F>& dir, const F& bsdf_pdf,
                                         const Mask<F>& bsdf_is_delta, const Mask<F>& active,
                                         bool from_camera = false, const UInt<F>& link = UInt<F>(0u),
-                                        const F& ratio = F(0.f)) {
+                                        const F& ratio = F(0.f), const F& time = F(0.5f)) {
   const LightRecord& record = view.lights[light];
+  Vec3<F> seen_from = from, along = dir;
+  if (view.motions) [[unlikely]] {
+    const LightPose<F> pose = light_pose<F>(view, UInt<F>(light), time, active);
+    seen_from = pose.point_to_rest(from);
+    along = pose.to_rest(dir);
+  }
   detail::KindHit<F> hit = detail::escape_kind<F>(static_cast<LightKind>(record.kind),
-                                                  {view, record, from, dir, active});
+                                                  {view, record, seen_from, along, active});
   if (record.shaping != kNoShaping) [[unlikely]]
-    hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -dir, hit.radiance, active);
+    hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -along, hit.radiance, active);
   const F light_pdf = hit.pdf * infinite_pick_pdf(view, light);
   F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, light_pdf));
   if (view.sends_paths()) [[unlikely]]
@@ -307,11 +324,12 @@ template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
                                  const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
                                  const Mask<F>& active, bool from_camera = false,
-                                 const UInt<F>& link = UInt<F>(0u), const F& ratio = F(0.f)) {
+                                 const UInt<F>& link = UInt<F>(0u), const F& ratio = F(0.f),
+                                 const F& time = F(0.5f)) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
     sum += infinite_light_radiance<F>(view, i, from, dir, bsdf_pdf, bsdf_is_delta, active,
-                                      from_camera, link, ratio);
+                                      from_camera, link, ratio, time);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

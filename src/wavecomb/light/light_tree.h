@@ -28,11 +28,12 @@ struct LightReceiver {
   /// Normal on the side that light has to come from, as pack_normal gives it; 0: any side.
   UInt<F> normal;
   UInt<F> seed;  ///< of bits below those of the number that chooses
+  F time;        ///< of the shutter, where lights move: mid-shutter, unless it is set
 
   /// Light may come from any side.
-  LightReceiver(const Vec3<F>& p_) : p(p_), normal(0u), seed(0u) {}
+  LightReceiver(const Vec3<F>& p_) : p(p_), normal(0u), seed(0u), time(0.5f) {}
   explicit LightReceiver(const Vec3<F>& p_, const UInt<F>& normal_)
-      : p(p_), normal(normal_), seed(0u) {}
+      : p(p_), normal(normal_), seed(0u), time(0.5f) {}
 };
 
 /// A light and the probability of its choice. pdf 0: no light.

@@ -7,6 +7,7 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/light_kind.h"
+#include "wavecomb/scene/light_motion.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_limits.h"
 
@@ -98,6 +99,10 @@ LightView LightSet::view(const MaterialView& materials) const {
     v.ies_numbers = ies_numbers.data();
   }
   if (!filters.empty()) v.filters = filters.data();
+  if (!motions.empty()) {
+    v.motions = motions.data();
+    v.motion_steps = motion_steps.data();
+  }
   if (!shadows.empty()) v.shadows = shadows.data();
   if (records.size() > record_count) v.mesh_lights = mesh_lights.data();
   for (const LightRecord& record : records) v.has_sampled_only |= record.sampled_only != 0;
@@ -145,6 +150,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
     if (infinite) set.infinite_count = static_cast<uint32_t>(set.records.size());
   }
   set.record_count = static_cast<uint32_t>(set.records.size());
+  add_motions(set, lights);
   for (const PlacedMeshLight& placed : mesh_lights)
     set.records.push_back(make_mesh_light(placed, making));
   powers.resize(lights.size() + triangle_count);

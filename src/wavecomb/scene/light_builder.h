@@ -61,6 +61,8 @@ struct LightSet {
   std::vector<ShapingRecord> shapings;
   std::vector<FilterRecord> filters;
   std::vector<ShadowLookRecord> shadows;
+  std::vector<LightMotion> motions;  ///< by record; empty where no light moves
+  std::vector<LightStep> motion_steps;
   std::vector<IesRecord> ies;
   std::vector<float> ies_numbers;
   uint32_t infinite_count = 0;

@@ -103,7 +103,11 @@ enum class MaterialSync : uint32_t {
 struct Light {
   std::string name;
   LightKind kind{};  ///< a rect, unless it is said
-  Affine to_world;
+  Affine to_world;  ///< in mid-shutter, where it moves
+  /// The same at equal steps of the shutter, two or more; empty: it stands still. It is turned and
+  /// carried as a stiff body; sizes are those of to_world.
+  std::vector<Affine> motion;
+  bool moves() const { return !motion.empty(); }
   /// Emitted radiance (area lights and dome: W / (m^2 sr)); for a distant light of angle 0 and for
   /// a sphere of radius 0 (a point light), see `color`'s use in light/.
   Vec3<float> color{1, 1, 1};
@@ -174,6 +178,23 @@ struct alignas(64) LightRecord {
   uint32_t camera_only;  ///< not 0: no paths start here, those from the camera find its light
 };
 static_assert(sizeof(LightRecord) == 192);
+
+/// How a light moves, by record (scene/light_motion.h): 8 words.
+struct alignas(32) LightMotion {
+  float origin[3] = {0, 0, 0};  ///< what it is turned about, in mid-shutter
+  uint32_t first = 0;           ///< of its LightSteps
+  uint32_t segments = 0;        ///< steps less one; 0: it stands still
+  uint32_t pad[3] = {0, 0, 0};
+};
+static_assert(sizeof(LightMotion) == 32);
+/// Where it is at one step.
+struct alignas(32) LightStep {
+  float turn[4] = {0, 0, 0, 1};  ///< quaternion from mid-shutter, x y z w, of length 1
+  float place[3] = {0, 0, 0};    ///< where its origin is
+  float pad = 0;
+  bool operator==(const LightStep&) const = default;
+};
+static_assert(sizeof(LightStep) == 32);
 
 /// Shaping as lanes read it.
 struct alignas(64) ShapingRecord {
@@ -362,6 +383,8 @@ struct LightView {
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
   const FilterRecord* filters = nullptr;      ///< null where no light has one
+  const LightMotion* motions = nullptr;       ///< by record; null where no light moves
+  const LightStep* motion_steps = nullptr;
   const ShadowLookRecord* shadows = nullptr;  ///< null where all shadows are plain
   /// Of triangle i the record of its mesh light, or kNoLight; null where there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;

@@ -9,6 +9,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/number_text.h"
 #include "wavecomb/scene/light_kind.h"
+#include "wavecomb/scene/motion.h"
 #include "wavecomb/scene/scene_checks.h"
 
 namespace wavecomb {
@@ -215,6 +216,10 @@ std::vector<LightParameter> common_rows() {
              LightRefers::kFilter)),
       with(kSeen, kShape,
            row<&L::visible>("visible", "visible", "", "Whether rays meet its shape.")),
+      with(kPlaced, kShape,
+           row<&L::motion>("motion", "motion", "",
+                           "Its transforms at equal steps over the shutter, (k, 4, 4), two or more; "
+                           "sizes are those of its transform, which is that in mid-shutter.")),
       in(kShape,
          row<&L::portals>("portals", "portals", "",
                           "Maps of the unit square in the xy plane to rectangles that guide its "
@@ -276,6 +281,9 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
 void check(const Light& light, const LightReferences& there) {
   const std::string of = quoted("light", light.name) + ": ";
   if (!finite(light.to_world)) throw Error(of + "its transform is not finite; mend it");
+  if (light.moves() && (light.motion.size() < 2 || light.motion.size() > kMostSteps))
+    throw Error(of + "motion has " + std::to_string(light.motion.size()) +
+                " transforms; give from 2 to " + std::to_string(kMostSteps) + ", or none");
   for (const LightParameter& p : light_table())
     if (!p.is_own || p.is_of(light.kind)) check_value(of, p, p.read(light), there);
 }

@@ -11,6 +11,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/light_builder.h"
 #include "wavecomb/scene/light_cluster.h"
+#include "wavecomb/scene/light_motion.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_limits.h"
 
@@ -285,9 +286,11 @@ class Builder {
 
  public:
   static LightCluster cluster_of(const LightSet& set, uint32_t light, double power) {
-    return light < set.first_triangle()
-               ? bound_light(set.records[light], power)
-               : bound_light(set.triangles[light - set.first_triangle()], power);
+    if (light >= set.first_triangle())
+      return bound_light(set.triangles[light - set.first_triangle()], power);
+    const LightCluster rests = bound_light(set.records[light], power);
+    if (set.motions.empty() || set.motions[light].segments == 0) return rests;
+    return along_way(set.motions[light], set.motion_steps, rests);
   }
 
  private:

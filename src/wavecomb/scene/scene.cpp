@@ -94,7 +94,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
              geometry_->exit_material};
   v.interiors = {materials_->interiors.empty() ? nullptr : materials_->interiors.data(),
                  geometry_->inside_material};
-  v.has_motion = geometry_->moves();
+  v.has_motion = geometry_->moves() || v.lights.motions;
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
                              [](const Mesh& mesh) { return mesh.is_curved(); });
@@ -222,7 +222,7 @@ SceneBytes Scene::bytes() const {
          materials_->graphs->outputs) +
       of(lights_->emissive, lights_->mesh_lights, set.mesh_lights, set.records, set.triangles,
          set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
-         set.ies, set.ies_numbers, set.filters, set.shadows) +
+         set.ies, set.ies_numbers, set.filters, set.shadows, set.motions, set.motion_steps) +
       lights_->tree_bytes() + g.names.bytes();
   std::set<const VolumeGrid*> grids;
   for (const Volume& volume : g.volumes)

@@ -44,7 +44,7 @@ struct SceneView {
   bool has_presence = false;
   bool has_emissive_meshes = false;
   bool has_curves = false;  ///< curves or points
-  bool has_motion = false;  ///< some mesh or instance moves while the shutter is open
+  bool has_motion = false;  ///< some mesh, instance or light moves while the shutter is open
 };
 
 /// Memory of a scene's arrays, bytes.

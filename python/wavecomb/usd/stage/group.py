@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -18,8 +19,39 @@ from wavecomb.usd.volumes.volume import Volume
 Matrices = NDArray[np.float64]
 T = TypeVar("T")
 
+MOST_STEPS = 64
+"""Steps of a place that moves within one that moves."""
+
 _MANY_BOXES = 1024
 """More are made one before others are added."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A transform, which may change while the shutter is open.
+
+    Attributes:
+        middle: (4, 4), in mid-shutter.
+        steps: (s, 4, 4) at equal steps over the shutter; None: it stands still.
+    """
+
+    middle: Matrices
+    steps: Matrices | None = None
+
+    def within(self, outer: Place) -> Place:
+        """The place in what the space of this one is placed in."""
+        inner, outside = self.steps, outer.steps
+        middle = self.middle @ outer.middle
+        if inner is None and outside is None:
+            return Place(middle)
+        if inner is None or outside is None:
+            left = self.middle if inner is None else inner
+            return Place(middle, left @ (outer.middle if outside is None else outside))
+        segments = math.lcm(len(inner) - 1, len(outside) - 1)
+        if segments >= MOST_STEPS:
+            segments = max(len(inner), len(outside)) - 1
+        count = segments + 1
+        return Place(middle, _resampled(inner, count) @ _resampled(outside, count))
 
 
 @dataclass
@@ -31,9 +63,9 @@ class Group:
         boxes: Bounds (2, 3) of what is in it, in its own space.
         outlines: Where what is in it reaches farthest, in its own space; see ``framing``.
         root: Prim path that the names of what is in it begin with.
-        lights: With their transforms (4, 4) in the group.
-        volumes: Likewise.
-        children: Groups that hold lights or volumes placed in it, transforms (k, 4, 4).
+        lights: With their places in the group.
+        volumes: With their transforms (4, 4) in the group.
+        children: Groups that hold lights or volumes placed in it, and where.
         surfaced: The same of groups that hold surfaces to be refined.
         holds_placed: Whether lights or volumes are in it, or in what is placed in it.
         sampled_lamp: A mesh light in it that cannot move.
@@ -43,9 +75,9 @@ class Group:
     root: str = ""
     number: int | None = None
     boxes: list[NDArray[Any]] = field(default_factory=list)
-    lights: list[tuple[Light, Matrices]] = field(default_factory=list)
+    lights: list[tuple[Light, Place]] = field(default_factory=list)
     volumes: list[tuple[Volume, Matrices]] = field(default_factory=list)
-    children: list[tuple[Group, Matrices]] = field(default_factory=list)
+    children: list[tuple[Group, list[Place]]] = field(default_factory=list)
     surfaced: list[tuple[Group, Matrices]] = field(default_factory=list)
     holds_placed: bool = False
     has_surfaces: bool = False
@@ -113,24 +145,40 @@ def middle_of(motion: Matrices) -> Matrices:
     return middle
 
 
-def placed_lights(group: Group, limit: int) -> list[tuple[Light, Matrices]]:
+def changes_size(steps: Matrices) -> bool:
+    """Whether a transform (s, 4, 4) that moves stretches by another factor at another step."""
+    sizes = np.linalg.svd(steps[:, :3, :3], compute_uv=False)
+    return bool((np.abs(sizes - sizes[:1]) > 1e-2 * sizes[:1].max()).any())
+
+
+def _resampled(steps: Matrices, count: int) -> Matrices:
+    """(s, 4, 4) at ``count`` equal steps, by straight lines."""
+    at = np.linspace(0.0, len(steps) - 1.0, count)
+    before = np.minimum(at.astype(np.intp), len(steps) - 2)
+    part = (at - before)[:, None, None]
+    mixed: Matrices = steps[before] * (1.0 - part) + steps[before + 1] * part
+    return mixed
+
+
+def placed_lights(group: Group, limit: int) -> list[tuple[Light, Place]]:
     """All lights of a group and of what is placed in it, at most ``limit``."""
     return _placed(group, limit, lambda one: one.lights)
 
 
 def placed_volumes(group: Group, limit: int) -> list[tuple[Volume, Matrices]]:
     """All volumes of a group and of what is placed in it, at most ``limit``."""
-    return _placed(group, limit, lambda one: one.volumes)
+    found = _placed(group, limit, lambda one: [(v, Place(m)) for v, m in one.volumes])
+    return [(volume, place.middle) for volume, place in found]
 
 
 def _placed(
-    group: Group, limit: int, of: Callable[[Group], list[tuple[T, Matrices]]]
-) -> list[tuple[T, Matrices]]:
+    group: Group, limit: int, of: Callable[[Group], list[tuple[T, Place]]]
+) -> list[tuple[T, Place]]:
     out = list(of(group)[:limit])
-    for child, transforms in group.children:
+    for child, places in group.children:
         inner = _placed(child, limit, of)
-        for transform in transforms:
+        for place in places:
             if len(out) >= limit:
                 return out
-            out += [(one, local @ transform) for one, local in inner]
+            out += [(one, local.within(place)) for one, local in inner]
     return out[:limit]

@@ -46,7 +46,7 @@ from wavecomb.usd.stage.catchers import IGNORED, check_there, set_catchers
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
 from wavecomb.usd.stage.frame_cache import FrameCache
-from wavecomb.usd.stage.group import Group, placed_lights
+from wavecomb.usd.stage.group import Group, changes_size, placed_lights
 from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.loaded import LoadedStage
@@ -409,8 +409,13 @@ def _add_lights(
     if len(lights) > MAX_LIGHTS:
         report.warn(f"more than {MAX_LIGHTS} lights: the rest is left out")
         lights = lights[:MAX_LIGHTS]
-    for light, transform in lights:
-        options = light.options
+    for light, place in lights:
+        options, transform = light.options, place.middle
+        if place.steps is not None:
+            options = {**options, "motion": np.ascontiguousarray(place.steps)}
+            if changes_size(place.steps):
+                what = "lights that change their size: as large as in mid-shutter"
+                report.missing(what, options["name"])
         if "portals" in options:
             options = {**options, "portals": options["portals"] @ transform}
         if light.filters:

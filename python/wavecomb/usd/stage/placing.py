@@ -16,7 +16,7 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.looks.assign import Parent
-from wavecomb.usd.stage.group import Group, Matrices, middle_of
+from wavecomb.usd.stage.group import Group, Matrices, Place, middle_of
 from wavecomb.usd.stage.identity import Assets
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.report import LoadReport
@@ -90,7 +90,11 @@ class GroupPlacer:
                 self.mesh_lights.say_moving(child.sampled_lamp)
         if child.holds_placed:
             middle = transforms if motion is None else middle_of(motion)
-            parent.children.append((child, middle))
+            places = [
+                Place(matrix, None if motion is None else motion[k])
+                for k, matrix in enumerate(middle)
+            ]
+            parent.children.append((child, places))
             parent.holds_placed = True
         if child.has_surfaces:
             parent.surfaced.append((child, transforms))

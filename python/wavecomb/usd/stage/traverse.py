@@ -23,6 +23,7 @@ from wavecomb.usd.looks.assign import Draw, Parent
 from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.looks.network import word
 from wavecomb.usd.stage.draw_modes import DrawModes
+from wavecomb.usd.stage.group import Place
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.ray_visibility import NAMES as RAY_NAMES
 from wavecomb.usd.stage.ray_visibility import RayVisibility
@@ -57,7 +58,7 @@ class Gathered:
     volumes: list[Draw] = field(default_factory=list)
     instances: list[Placed] = field(default_factory=list)
     instancers: list[Placed] = field(default_factory=list)
-    lights: list[tuple[Light, Matrices]] = field(default_factory=list)
+    lights: list[tuple[Light, Place]] = field(default_factory=list)
     stand_ins: list[Draw] = field(default_factory=list)
 
 
@@ -217,10 +218,10 @@ class Traversal:
                 continue
             elif kind == "light":
                 if shown:
+                    steps = None
                     if track is not None and self.motion is not None:
-                        self.report.note("moving light: still, in mid-shutter", prim.GetPath())
-                        matrix = track.at(self.motion.middle)
-                    self._light(found, prim, matrix)
+                        matrix, steps = track.at(self.motion.middle), track.steps()
+                    self._light(found, prim, matrix, steps)
             elif kind == "volume":
                 if shown:
                     if track is not None and self.motion is not None:
@@ -266,15 +267,19 @@ class Traversal:
         more = UsdGeom.PrimvarsAPI(prim).FindIncrementallyInheritablePrimvars(list(inherited))
         return more if more else inherited
 
-    def _light(self, found: Gathered, prim: Usd.Prim, matrix: Gf.Matrix4d) -> None:
+    def _light(
+        self, found: Gathered, prim: Usd.Prim, matrix: Gf.Matrix4d, steps: Matrices | None
+    ) -> None:
         scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
         light = self.lights.read(prim, scale)
         transform = light.local @ np.array(matrix)
-        if not bool(sound(transform[None])[0]):
+        if steps is not None:
+            steps = light.local @ steps
+        if not sound(transform[None] if steps is None else np.stack([transform, *steps])).all():
             self.report.warn("light left out: its transform has no inverse", prim.GetPath())
             return
         self.report.tally("lights")
-        found.lights.append((light, transform))
+        found.lights.append((light, Place(transform, steps)))
 
 
 def _binds(prim: Usd.Prim) -> bool:

@@ -125,6 +125,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
       if (context.joins_light() && depth > 0)
         state.ratio = gather<F>(wave.pool.ratio, slot, wanted);
+      if (scene.lights.motions) [[unlikely]]
+        state.time = gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, wanted);
     }
     if (const Mask<F> ended = missed | shape; !kFromLights && any(ended)) {
       Color<F> c(F(0.f));
@@ -154,7 +156,10 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
                              shape);
     if (notes_hits && wave.aovs.wants_motion() && any(shape)) [[unlikely]]
-      wave.aovs.move<F>(slot, screen_motion<F>(*context.camera, fma(d, t, o), fma(d, t, o), shape),
+      wave.aovs.move<F>(slot,
+                        screen_motion_of_light<F>(scene.lights, *context.camera,
+                                                  load<U>(hits.geom + i), fma(d, t, o), state.time,
+                                                  shape),
                         shape);
     const auto recorded = [&] {
       if constexpr (Media::kAny)

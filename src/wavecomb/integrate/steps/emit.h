@@ -59,7 +59,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le = escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
-                                          depth == 0, path.link, path.ratio);
+                                          depth == 0, path.link, path.ratio, path.time);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 

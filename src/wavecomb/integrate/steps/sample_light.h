@@ -21,6 +21,8 @@ template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
                                                 const Frame<F>& frame, const Vec3<F>& wo) {
   LightReceiver<F> receiver(Vec3<F>(F(0.f)));
+  if (v.has(kMotion) && v.scene.lights.motions) [[unlikely]]
+    receiver.time = v.hit.time;
   if (v.scene.lights.by_tree) {
     // What reflects alone is lit on the side that it is seen from.
     if (!Bsdf::kTransmits)
