@@ -110,11 +110,15 @@ class Integrator {
     return !scene_.lights.links.members ||
            is_linked<F>(scene_.lights.links, link, scene_.lights.lights[record].light_link, true);
   }
+  /// Whether a light is looked for apart from what rays meet.
+  static bool is_apart(const LightRecord& light) {
+    return light.sampled_only != 0 || light.diffuse != 1 || light.specular != 1;
+  }
   /// Share of record `light` that a ray gets which meets it.
   F share_met(uint32_t record, const Ray& ray, bool from_camera) const {
     const LightRecord& light = scene_.lights.lights[record];
     if (!lights_class(record, ray.link)) return 0;
-    if (light.sampled_only == 0) return 1;
+    if (!is_apart(light)) return 1;
     return !ray.is_seen ? 0.f : (from_camera ? 1.f : light.specular);
   }
 
@@ -259,7 +263,7 @@ class Integrator {
       next.o = spawn_origin<F>(s, next.d);
       const F sphere = (kOpaque ? 2.f : 4.f) * kPi / static_cast<F>(n);
       out += e.f_cos * radiance(next, depth + 1, kInfinity) * sphere;
-      if (scene_.lights.has_sampled_only)
+      if (scene_.lights.has_effects)
         out += sampled_only(e.f_cos, bsdf.diffuse_f_cos(wo, wi), next) * sphere;
     }
     return passed * out;
@@ -288,7 +292,7 @@ class Integrator {
 
   /// f |cos| as a light with multipliers sees it.
   Rgb lit(const LightRecord& light, const Rgb& f_cos, const Rgb& diffuse) const {
-    if (light.sampled_only == 0) return f_cos;
+    if (!is_apart(light)) return f_cos;
     return (f_cos - diffuse) * light.specular + diffuse * light.diffuse;
   }
 
@@ -323,7 +327,7 @@ class Integrator {
     Rgb sum(0.f);
     for (uint32_t i = 0; i < view.first_triangle; ++i) {
       const LightRecord& light = view.lights[i];
-      if (light.sampled_only == 0 || !lights_class(i, ray.link)) continue;
+      if (!is_apart(light) || !lights_class(i, ray.link)) continue;
       const bool is_far = i < view.infinite_count;
       const F t = is_far ? kFarAway : static_cast<F>(meets(light, ray.o, ray.d));
       if (!(t > 0)) continue;
@@ -347,7 +351,7 @@ class Integrator {
       const uint32_t i = hit.inst == kLightShape ? kNoLight : mesh_light_of(hit);
       if (i == kNoLight) continue;
       const LightRecord& light = scene_.lights.lights[i];
-      if (light.sampled_only == 0 || light.hidden != 0 || !lights_class(i, ray.link)) continue;
+      if (!is_apart(light) || light.hidden != 0 || !lights_class(i, ray.link)) continue;
       Rgb c = triple(light.radiance);
       if (static_cast<MaterialSync>(light.sync) != MaterialSync::kIndependent)
         c = c * glow(hit, ray);

@@ -100,13 +100,15 @@ class PathPool {
  public:
   PathPool() = default;
   /// `cold`: paths keep a PathColdRow. `joined`: and PathState::ratio. `knows`: and an InsideRow.
-  /// `shaded`: and VertexResult::shade.
-  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false, bool shaded = false)
+  /// `shaded`: and VertexResult::shade. `split`: and PathState::diffuse.
+  PathPool(size_t capacity, bool cold, bool joined = false, bool knows = false, bool shaded = false,
+           bool split = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
         ratios_(joined ? SoaBlock(1, capacity) : SoaBlock()),
         inside_(knows ? SoaBlock(1, capacity * kRowWords<InsideRow>) : SoaBlock()),
-        shades_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
+        shades_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
+        diffuse_(split ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
@@ -114,6 +116,7 @@ class PathPool {
     ratio = joined ? ratios_.floats(0) : nullptr;
     inside = knows ? inside_.floats(0) : nullptr;
     shades = shaded ? shades_.floats(0) : nullptr;
+    diffuse = split ? diffuse_.floats(0) : nullptr;
   }
 
   float* paths = nullptr;     ///< PathRow
@@ -123,12 +126,14 @@ class PathPool {
   float* ratio = nullptr;     ///< PathState::ratio; null where no paths start at lights
   float* inside = nullptr;    ///< InsideRow; null where nobody knows
   float* shades = nullptr;    ///< RadianceRow of VertexResult::shade; null where shadows are black
+  float* diffuse = nullptr;   ///< RadianceRow of PathState::diffuse; null: no light asks for it
   size_t bytes() const {
-    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes() + shades_.bytes();
+    return rows_.bytes() + cold_.bytes() + ratios_.bytes() + inside_.bytes() + shades_.bytes() +
+           diffuse_.bytes();
   }
 
  private:
-  SoaBlock rows_, cold_, ratios_, inside_, shades_;
+  SoaBlock rows_, cold_, ratios_, inside_, shades_, diffuse_;
 };
 
 /// Adds c to the active lanes' rows of radiance, which are distinct.

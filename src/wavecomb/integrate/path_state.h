@@ -70,6 +70,8 @@ struct PathState {
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< what collides, by material
   F time{0.5f};        ///< of the shutter, where lights move
+  /// Share of what the bounce before scatters that is diffuse, where lights have multipliers.
+  Color<F> diffuse{F(0.f)};
 
   LightReceiver<F> vertex_before() const {
     LightReceiver<F> from(o, receiver);

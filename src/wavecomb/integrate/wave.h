@@ -98,7 +98,7 @@ struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
              context.joins_light(), context.knows_inside(),
-             context.scene.lights.shadows != nullptr),
+             context.scene.lights.shadows != nullptr, context.scene.lights.has_multipliers),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),

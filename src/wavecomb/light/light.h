@@ -242,11 +242,12 @@ F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightRec
 }
 
 /// What becomes of the light that the two techniques bring where lights do not give all surfaces
-/// the same. Run only where LightView::has_sampled_only.
+/// the same. Run only where LightView::has_effects.
 template <typename F>
 struct LightEffect {
   F diffuse, specular;   ///< factors of the two parts of the response
   Mask<F> sampled_only;  ///< LightRecord::sampled_only
+  Mask<F> applies;       ///< that, or a factor is not 1
   UInt<F> shadow;        ///< LightRecord::shadow
 
   LightEffect(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
@@ -256,13 +257,15 @@ struct LightEffect {
     diffuse = select(known, reader[&LightRecord::diffuse], F(1.f));
     specular = select(known, reader[&LightRecord::specular], F(1.f));
     sampled_only = known & Mask<F>(reader[&LightRecord::sampled_only] != UInt<F>(0u));
+    applies = sampled_only | not_(Mask<F>(diffuse == F(1.f)) & Mask<F>(specular == F(1.f)));
     shadow = select(Mask<UInt<F>>(known), reader[&LightRecord::shadow], UInt<F>(kPlainShadow));
   }
 
-  /// Factor of what a path gets that meets the light; a mirror's image of it is specular.
-  F of_hit(const Mask<F>& bsdf_is_delta, bool from_camera) const {
-    const F mirrored = from_camera ? F(1.f) : specular;
-    return select(sampled_only, select(bsdf_is_delta, mirrored, F(0.f)), F(1.f));
+  /// Factor of what a path gets that meets the light, `share` of whose bounce is diffuse; a
+  /// mirror's image of it is specular.
+  Color<F> of_hit(const Mask<F>& bsdf_is_delta, bool from_camera, const Color<F>& share) const {
+    return detail::factor_of_hit<F>(diffuse, specular, sampled_only, bsdf_is_delta, from_camera,
+                                    share);
   }
 };
 
@@ -291,7 +294,8 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
                                         const Vec3<F>& dir, const F& bsdf_pdf,
                                         const Mask<F>& bsdf_is_delta, const Mask<F>& active,
                                         bool from_camera = false, const UInt<F>& link = UInt<F>(0u),
-                                        const F& ratio = F(0.f), const F& time = F(0.5f)) {
+                                        const F& ratio = F(0.f), const F& time = F(0.5f),
+                                        const Color<F>& share = Color<F>(F(0.f))) {
   const LightRecord& record = view.lights[light];
   Vec3<F> seen_from = from, along = dir;
   if (view.motions) [[unlikely]] {
@@ -309,8 +313,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
     weight = joint_bounce_weight<F>(
         bsdf_pdf, light_pdf, bsdf_is_delta,
         F(ratio * detail::infinite_emission_density<F>(view, light, from, dir, active)));
-  if (view.has_sampled_only)
-    weight *= LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera);
+  if (view.has_effects) [[unlikely]]
+    hit.radiance = hit.radiance * LightEffect<F>(view, UInt<F>(light), active)
+                                      .of_hit(bsdf_is_delta, from_camera, share);
   if (view.links.members)
     weight = select(shines_on<F>(view, link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
@@ -319,17 +324,18 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 /// Sum over all infinite lights of radiance * MIS weight for a ray that left `from` and the scene
 /// along dir;
 /// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
-/// too). `ratio`: PathState::ratio, where lights send paths, which then share in the weight.
+/// too); `share` of the bounce is diffuse. `ratio`: PathState::ratio, where lights send paths, which then share in the weight.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
                                  const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
                                  const Mask<F>& active, bool from_camera = false,
                                  const UInt<F>& link = UInt<F>(0u), const F& ratio = F(0.f),
-                                 const F& time = F(0.5f)) {
+                                 const F& time = F(0.5f),
+                                 const Color<F>& share = Color<F>(F(0.f))) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
     sum += infinite_light_radiance<F>(view, i, from, dir, bsdf_pdf, bsdf_is_delta, active,
-                                      from_camera, link, ratio, time);
+                                      from_camera, link, ratio, time, share);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

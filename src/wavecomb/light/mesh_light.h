@@ -27,15 +27,30 @@ inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
   return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
 }
 
+/// Factor of what a path gets that meets a light with these multipliers: `share` of the path's last
+/// bounce is diffuse, the rest specular. A camera sees the light as it is. `is_seen`: no light
+/// sample could have been as the path is.
+template <typename F>
+inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
+                              const Mask<F>& is_seen, bool from_camera, const Color<F>& share) {
+  Color<F> factor(F(1.f));
+  if (!from_camera) {
+    const F more = diffuse - specular;
+    factor = {fma(more, share.x, specular), fma(more, share.y, specular),
+              fma(more, share.z, specular)};
+  }
+  return select<F>(sampled_only & not_(is_seen), Color<F>(F(0.f)), factor);
+}
+
 }  // namespace detail
 
 /// What a path along `dir` gets of meshes of mesh lights `record` (kNoLight: of none) that it met,
 /// before MIS: `glow` is the radiance that the material says. `is_seen`: a camera or a mirror looks
-/// at it, else it is a bounce which light sampling could have made.
+/// at it, else it is a bounce which light sampling could have made, `share` of which is diffuse.
 template <typename F>
 inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
                                     const Color<F>& glow, const Vec3<F>& dir, const UInt<F>& link,
-                                    const Mask<F>& is_seen, bool from_camera,
+                                    const Mask<F>& is_seen, bool from_camera, const Color<F>& share,
                                     const Mask<F>& active) {
   using U = UInt<F>;
   using R = LightRecord;
@@ -49,14 +64,14 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   if (none(given)) return glow;
   Color<F> radiance = glow * light.radiance();
   if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -dir, radiance, given);
-  const F mirrored = from_camera ? F(1.f) : light[&R::specular];
   const Mask<F> sampled_only = Mask<F>(light[&R::sampled_only] != U(0u));
-  F factor = select(sampled_only, select(is_seen, mirrored, F(0.f)), F(1.f));
+  radiance = radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular],
+                                                 sampled_only, is_seen, from_camera, share);
   if (view.links.members) {
     const U set = light[&R::light_link];
-    factor = select(is_linked<F>(view.links, link, set, given), factor, F(0.f));
+    radiance = radiance * select(is_linked<F>(view.links, link, set, given), F(1.f), F(0.f));
   }
-  return select<F>(given, radiance * factor, glow);
+  return select<F>(given, radiance, glow);
 }
 
 /// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h). Records of mesh lights are no lights that

@@ -105,7 +105,10 @@ LightView LightSet::view(const MaterialView& materials) const {
   }
   if (!shadows.empty()) v.shadows = shadows.data();
   if (records.size() > record_count) v.mesh_lights = mesh_lights.data();
-  for (const LightRecord& record : records) v.has_sampled_only |= record.sampled_only != 0;
+  for (const LightRecord& record : records) {
+    v.has_multipliers |= record.diffuse != 1 || record.specular != 1;
+    v.has_effects |= v.has_multipliers || record.sampled_only != 0;
+  }
   v.materials = materials;
   return v;
 }

@@ -164,8 +164,8 @@ struct alignas(64) LightRecord {
   uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
   /// Not 0: paths that meet the light by a bounce that light sampling could have made get nothing
-  /// of it; what light samples bring counts in full. So it is where a light does not give all
-  /// surfaces the same, which a path that meets it does not know.
+  /// of it; what light samples bring counts in full. So it is of what rays do not meet, and where
+  /// shadows are not those that rays see.
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1: rays do not meet its shape
   uint32_t light_link, shadow_link;
@@ -388,7 +388,8 @@ struct LightView {
   const ShadowLookRecord* shadows = nullptr;  ///< null where all shadows are plain
   /// Of triangle i the record of its mesh light, or kNoLight; null where there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  bool has_sampled_only = false;  ///< some record is that
+  bool has_effects = false;      ///< some record is sampled_only, or has multipliers
+  bool has_multipliers = false;  ///< some record's diffuse or specular is not 1
   LinkView links;
   MaterialView materials;  ///< textures, and emission and opacity of triangles where they vary
   /// A sphere around all surfaces, which paths from infinite lights start towards, from `reach`

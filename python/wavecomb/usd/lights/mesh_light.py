@@ -82,14 +82,12 @@ class MeshLights:
         number = self._builder.add_mesh_light(np.array(draw.matrix), sync, **options)
         self.any = True
         self._report.tally("mesh lights")
-        kept = {
-            "diffuse", "specular", "shadow_link", "shadow_color", "shadow_distance",
-        } & options.keys()  # fmt: skip
+        kept = {"shadow_link", "shadow_color", "shadow_distance"} & options.keys()
         return MeshLight(number, material, sync == "independent" or bool(kept))
 
     def say_moving(self, path: Sdf.Path) -> None:
         """Says what is not done for a light that moves and is found by light sampling alone."""
-        what = "multipliers, shadow linking and the sync mode independent of moving mesh lights"
+        what = "shadows of their own and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)
 
     def _lamp(self, hidden: bool) -> int:

@@ -125,6 +125,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
       if (context.joins_light() && depth > 0)
         state.ratio = gather<F>(wave.pool.ratio, slot, wanted);
+      if (wave.pool.diffuse && depth > 0) [[unlikely]]
+        state.diffuse = load_row<RadianceRow, F>(wave.pool.diffuse, slot, wanted).sum;
       if (scene.lights.motions) [[unlikely]]
         state.time = gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, wanted);
     }

@@ -65,7 +65,7 @@ inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, s
 inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) {
   const SceneView& scene = context.scene;
   return !scene.has_motion && !scene.has_curves && !context.links() && !scene.mesh_lights &&
-         !scene.lights.has_sampled_only && !settings.cosine_sampling && !settings.schlick_fresnel;
+         !scene.lights.has_effects && !settings.cosine_sampling && !settings.schlick_fresnel;
 }
 
 /// The kernels, by variant.

@@ -41,6 +41,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                        path.receiver};
     if (links && context.scene.mesh_lights && depth > 0) [[unlikely]]
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
+    if (V::has(kMeshLights) && context.scene.mesh_lights && pool.diffuse && depth > 0) [[unlikely]]
+      state.diffuse = load_row<RadianceRow, F>(pool.diffuse, slot, active).sum;
     if (context.weighs_pixels()) [[unlikely]]
       state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
     if constexpr ((kFeatures & kJoined) != 0) state.ratio = gather<F>(pool.ratio, slot, active);
@@ -84,6 +86,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     if constexpr (V::has(kMeshLights))
       if (pool.shades) [[unlikely]]
         store_row<RadianceRow, F>(pool.shades, slot, {v.shade}, v.has_shadow);
+    if constexpr (V::has(kMeshLights))
+      if (pool.diffuse) [[unlikely]]
+        store_row<RadianceRow, F>(pool.diffuse, slot, {v.next.diffuse}, v.alive);
     if (any(v.alive))
       store_row<PathRow, F>(pool.paths, slot,
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,

@@ -30,7 +30,7 @@ template <typename F>
   const U record =
       select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)), U(kNoLight));
   return mesh_light_radiance<F>(scene.lights, record, glow, path.dir, path.link,
-                                not_(path.pdf > 0.f), from_camera, active);
+                                not_(path.pdf > 0.f), from_camera, path.diffuse, active);
 }
 
 /// Radiance of a light's own shape met by a path.
@@ -38,15 +38,16 @@ template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
                                uint32_t depth, const UInt<F>& light, const F& t,
                                const PathState<F>& path, const Mask<F>& active) {
-  const LightHit<F> hit =
+  LightHit<F> hit =
       light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
   F w = bounce_weight<F>(path.pdf, hit.pdf);
   if (scene.lights.sends_paths()) [[unlikely]]
     w = joint_bounce_weight<F>(
         path.pdf, hit.pdf, not_(Mask<F>(path.pdf > 0.f)),
         F(path.ratio * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
-  if (scene.lights.has_sampled_only)
-    w *= LightEffect<F>(scene.lights, light, active).of_hit(not_(path.pdf > 0.f), depth == 0);
+  if (scene.lights.has_effects) [[unlikely]]
+    hit.radiance = hit.radiance * LightEffect<F>(scene.lights, light, active)
+                                      .of_hit(not_(path.pdf > 0.f), depth == 0, path.diffuse);
   if (scene.lights.links.members)
     w = select(shines_on<F>(scene.lights, path.link, light, active), w, F(0.f));
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
@@ -59,7 +60,8 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le = escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
-                                          depth == 0, path.link, path.ratio, path.time);
+                                          depth == 0, path.link, path.ratio, path.time,
+                                          path.diffuse);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 

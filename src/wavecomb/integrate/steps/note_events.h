@@ -48,10 +48,10 @@ template <typename Bsdf, typename F>
                                               const F pdf, const Mask<F> has_shadow,
                                               VertexAovs<F>& aovs) {
   F diffuse(1.f), specular(1.f);
-  if (lights.has_sampled_only && any(has_shadow)) {
+  if (lights.has_effects && any(has_shadow)) {
     const LightEffect<F> effect(lights, aovs.lit_by, has_shadow);
-    diffuse = select(effect.sampled_only, effect.diffuse, diffuse);
-    specular = select(effect.sampled_only, effect.specular, specular);
+    diffuse = select(effect.applies, effect.diffuse, diffuse);
+    specular = select(effect.applies, effect.specular, specular);
   }
   const F all(1.f);
   aovs.lit =

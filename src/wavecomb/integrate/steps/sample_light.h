@@ -74,16 +74,16 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
   U light(kNoLight);
-  const bool sampled_only = v.has(kMeshLights) && lights.has_sampled_only;
-  if ((kFeatures & kJoined) != 0 || sampled_only || v.has_links() || v.wants_lights()) [[unlikely]]
+  const bool has_effects = v.has(kMeshLights) && lights.has_effects;
+  if ((kFeatures & kJoined) != 0 || has_effects || v.has_links() || v.wants_lights()) [[unlikely]]
     light = chosen_light<F>(lights, receiver, r.x, lit);
   if constexpr ((kFeatures & kJoined) != 0)
     w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, receiver.p);
   ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
-  if (sampled_only) [[unlikely]] {
+  if (has_effects) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);
     const Color<F> diffuse = at.bsdf.diffuse_f_cos(seen, wi);
-    f_cos = select<F>(effect.sampled_only,
+    f_cos = select<F>(effect.applies,
                       fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
     w = select(effect.sampled_only, F(1.f), w);
     if (lights.shadows) [[unlikely]]
@@ -105,7 +105,7 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   out.shadow_o = at.origin(l.wi);
   out.shadow_d = l.wi;
   out.shadow_tfar = l.distance * kShadowReach;
-  if (sampled_only) [[unlikely]] {
+  if (has_effects) [[unlikely]] {
     out.shadow_tfar = min(out.shadow_tfar, reach.distance);
     out.shade = reach.color;
   }

@@ -14,6 +14,19 @@
 
 namespace wavecomb {
 
+/// Share of what the bounce `b` scatters that is diffuse; 0 of mirrors.
+template <typename F, typename Bsdf, typename View>
+WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen,
+                                       const BsdfSample<F>& b) {
+  const Color<F> diffuse = bsdf.diffuse_f_cos(seen, b.wi);
+  const auto share = [&](const F& part, const F& weight) {
+    const F whole = weight * b.pdf;
+    const Mask<F> good = not_(b.is_delta) & (whole > 0.f);
+    return select(good, clamp(F(part / select(good, whole, F(1.f))), F(0.f), F(1.f)), F(0.f));
+  };
+  return {share(diffuse.x, b.weight.x), share(diffuse.y, b.weight.y), share(diffuse.z, b.weight.z)};
+}
+
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& at,
                              const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
@@ -30,6 +43,8 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   out.next.eta_scale = path.eta_scale * b.eta * b.eta;
   out.next.receiver = receiver.normal;
   out.next.cone_width = path.cone_width;
+  if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
+    out.next.diffuse = diffuse_share<F>(at.bsdf, seen, b);
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
     // What medium/walk.h looks for.
     const Mask<F> enters = at.bsdf.enters(wo, b.wi);
