@@ -158,3 +158,19 @@ def test_a_damaged_value_is_not_taken_for_a_bomb(monkeypatch: pytest.MonkeyPatch
     assert memory.ran_out(error, lambda: 2_000_000)
     assert not memory.ran_out(ValueError("other"), lambda: 2_000_000)
     assert memory.ran_out(MemoryError(), int)
+
+
+def test_meshes_that_cannot_fit_are_told_before_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "large.usdc"))
+    mesh = UsdGeom.Mesh.Define(stage, "/M")
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.zeros((100_000, 3), np.float32)))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(1, 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.arange(3, dtype=np.int32)))
+    stage.Save()
+    file = tmp_path / "large.usdc"
+    wavecomb.load(file, isolate=False)
+    monkeypatch.setattr(memory, "room", lambda: 1_000_000)
+    with pytest.raises(WavecombError, match=r"large.usdc: .*100,000 points .* 2 MB where 1 MB"):
+        wavecomb.load(file, isolate=False)

@@ -2,6 +2,7 @@
 """Subdivision surfaces: against closed forms and masks that are worked out here."""
 
 import json
+import weakref
 
 import numpy as np
 import pytest
@@ -662,3 +663,28 @@ def test_threads_change_nothing(tmp_path):
     two, _ = load(tmp_path, text, subdivision=3, threads=2)
     for a, b in zip(one.meshes, two.meshes, strict=True):
         assert all(np.array_equal(a[key], b[key]) for key in ("positions", "normals", "indices"))
+
+
+def test_cages_go_as_soon_as_they_are_refined(tmp_path, monkeypatch):
+    body = """
+    point3f[] points = [(0,0,0), (1,0,0), (1,1,0), (0,1,0)]
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0,1,2,3]
+"""
+    cages, alive = [], []
+    add, refine = surfaces.Surfaces.add, surfaces.Surfaces._refine
+
+    def noted_add(self, group, number, draw, mesh, worn):
+        cages.append(weakref.ref(mesh.cage))
+        add(self, group, number, draw, mesh, worn)
+
+    def noted_refine(self, batch):
+        alive.append(sum(cage() is not None for cage in cages))
+        refine(self, batch)
+
+    monkeypatch.setattr(surfaces.Surfaces, "add", noted_add)
+    monkeypatch.setattr(surfaces.Surfaces, "_refine", noted_refine)
+    monkeypatch.setattr(surfaces, "_BATCH_TRIANGLES", 1)
+    text = "".join(f'def Mesh "M{k}" {{ {body} }}\n' for k in range(4))
+    load(tmp_path, text, subdivision=1)
+    assert alive == [4, 3, 2, 1]

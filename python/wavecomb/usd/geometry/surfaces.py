@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -215,23 +215,25 @@ class Surfaces:
         if not self._all:
             return
         self._choose(world, view)
-        batch: list[Surface] = []
-        triangles = 0
-        for surface in self._all:
-            if surface.level == 0 and not surface.moves:
-                continue
-            batch.append(surface)
-            triangles += surface.cage.triangles_at(surface.level) * max(1, len(surface.cage.steps))
-            if triangles >= _BATCH_TRIANGLES:
-                self._refine(batch)
-                batch, triangles = [], 0
-        self._refine(batch)
         levels = Counter(surface.level for surface in self._all if surface.cage.scheme != "none")
+        waiting = deque(surface for surface in self._all if surface.level or surface.moves)
+        if self.cache is None:
+            self._all = []  # cages that stay as they are go now, others when they are refined
+        while waiting:
+            self._refine(self._next_batch(waiting))
         if levels:
             text = ", ".join(f"{count} at level {level}" for level, count in sorted(levels.items()))
             self.report.note(f"subdivision meshes refined: {text}")
-        if self.cache is None:
-            self._all = []
+
+    def _next_batch(self, waiting: deque[Surface]) -> list[Surface]:
+        """Takes those that are refined at once."""
+        batch: list[Surface] = []
+        triangles = 0
+        while waiting and triangles < _BATCH_TRIANGLES:
+            batch.append(waiting.popleft())
+            cage = batch[-1].cage
+            triangles += cage.triangles_at(batch[-1].level) * max(1, len(cage.steps))
+        return batch
 
     def has_same_levels(
         self, world: Group, view: View, size: tuple[int, int] | None = None

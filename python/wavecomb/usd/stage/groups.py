@@ -35,6 +35,7 @@ from wavecomb.usd.stage.instance_materials import InstanceMaterials
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of
 from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.room import Room
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
 from wavecomb.usd.stage.volumes import VolumePlacer
 from wavecomb.usd.volumes.volume import VolumeReader
@@ -100,6 +101,7 @@ class GroupBuilder:
         self.gprims = GprimReader(
             self.time, report, surfaces, traversal.skeletons, self.motion, cache
         )
+        self.room = Room(stage, self.time)
         self.progress = progress
         self.framed = framed
         self.detail = detail
@@ -135,6 +137,7 @@ class GroupBuilder:
         """Reads prims and all below them into a group."""
         found = self.traversal.walk(roots, purpose, predicate, scope.brings)
         group.lights += found.lights
+        self.room.check(found.draws)
         self._bind(found, scope)
         if scope.worn is not None:
             for draw in found.draws:

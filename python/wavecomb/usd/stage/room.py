@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Says of meshes that cannot fit that they do not, before they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pxr import Usd
+
+from wavecomb.errors import WavecombError
+from wavecomb.run.isolate import memory, patience
+from wavecomb.usd.looks.assign import Draw
+
+LEAST_BYTES = 20
+"""That a mesh takes for each of its points at the least: half a triangle, of 12 bytes and some 32
+in the hierarchy."""
+
+_SHARE = 8
+"""Meshes are weighed where the stage's layers are larger than one part in so many of the room."""
+
+
+class Room:
+    """Weighs the meshes of one stage. Points of a .usdc lie in its file until they are read."""
+
+    def __init__(self, stage: Usd.Stage, time: Usd.TimeCode) -> None:
+        layer = stage.GetRootLayer()
+        self.file = layer.realPath or layer.identifier
+        self.time = time
+        self.is_asked = patience.loaded_layers()[1] > memory.room() // _SHARE
+
+    def check(self, draws: Iterable[Draw]) -> None:
+        """Raises WavecombError where meshes, which are not read yet, need more than there is."""
+        if not self.is_asked:
+            return
+        points = 0
+        for draw in draws:
+            if draw.kind == "mesh":
+                points += len(draw.prim.GetAttribute("points").Get(self.time) or ())
+        needed, there = points * LEAST_BYTES, memory.room()
+        if needed > there:
+            raise WavecombError(
+                f"{self.file}: meshes of {points:,} points need at least "
+                f"{needed / memory.MEGABYTE:,.0f} MB where {there / memory.MEGABYTE:,.0f} MB are "
+                f"left{memory.describe_limit()}; give more memory, or leave parts out by --mask or "
+                "--payloads"
+            )
