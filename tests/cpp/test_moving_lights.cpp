@@ -55,6 +55,11 @@ TEST(MovingLights, AreAtEachTimeAsIfTheyStoodThere) {
       LightReceiver<float> to(number.point(4));
       to.time = time;
       const float pick = number(), u = number(), v = number();
+      // What is round is sampled about an axis of no meaning.
+      const auto kind = LightKind{
+          static_cast<uint8_t>(view.lights[chosen_light<float>(view, to, pick, true)].kind)};
+      if (kind != LightKind::kRect && kind != LightKind::kDisk && kind != LightKind::kDome)
+        continue;
       const auto a = sample_light<float>(view, to, pick, u, v, true);
       const auto b = sample_light<float>(still.view(), to, pick, u, v, true);
       ASSERT_EQ(a.valid, b.valid);
@@ -64,7 +69,7 @@ TEST(MovingLights, AreAtEachTimeAsIfTheyStoodThere) {
       ASSERT_NEAR(a.pdf / b.pdf, 1, 4e-3);
       ASSERT_NEAR(a.distance / b.distance, 1, 1e-3);
     }
-    EXPECT_GT(valid, 2000u);
+    EXPECT_GT(valid, 400u);
   }
 }
 
@@ -81,8 +86,8 @@ TEST(MovingLights, BothHalvesOfMisAgree) {
     if (!s.valid) continue;
     const float radiance = s.weight.y * s.pdf;
     if (light < view.infinite_count) {
-      const auto seen = infinite_light_radiance<float>(
-          view, light, to.p, s.wi, 0.f, true, true, false, 0u, 0.f, to.time);
+      const auto seen = infinite_light_radiance<float>(view, light, to.p, s.wi, 0.f, true, true,
+                                                       false, 0u, 0.f, to.time);
       ASSERT_NEAR(seen.y, radiance, 2e-3f * radiance + 1e-4f);
       continue;
     }
@@ -98,8 +103,8 @@ TEST(MovingLights, BoundsHoldTheWholeWay) {
   Numbers number(5);
   for (uint32_t light = view.infinite_count; light < view.count; ++light) {
     const LightMotion& motion = lights.set.motions[light];
-    const LightCluster way = along_way(motion, lights.set.motion_steps,
-                                       bound_light(lights.set.records[light], 1.0));
+    const LightCluster way =
+        along_way(motion, lights.set.motion_steps, bound_light(lights.set.records[light], 1.0));
     for (int i = 0; i < 2000; ++i) {
       LightReceiver<float> to(number.point(6));
       to.time = number();
@@ -152,9 +157,9 @@ TEST(MovingLights, PacketsGiveTheBitsOfScalars) {
       const UInt<F> light = chosen_light<F>(view, to, at(3), active);
       const auto hit = light_hit<F>(view, light, to, s.wi, s.distance, active);
       for (const F& x : {hit.radiance.x, hit.radiance.z, hit.pdf}) put(x);
-      const auto escaped = escaped_radiance<F>(view, to.p, square_to_sphere<F>(at(4), at(5)), at(7),
-                                               at(6) < 0.3f, active, false, UInt<F>(0u), F(0.f),
-                                               to.time);
+      const auto escaped =
+          escaped_radiance<F>(view, to.p, square_to_sphere<F>(at(4), at(5)), at(7), at(6) < 0.3f,
+                              active, false, UInt<F>(0u), F(0.f), to.time);
       for (const F& x : {escaped.x, escaped.y, escaped.z}) put(x);
     }
   };

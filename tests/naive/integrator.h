@@ -11,8 +11,9 @@
 ///                 + sum over delta lights f |cos| E V                   (no density has them)
 ///
 /// Lights with multipliers, and those that production finds by light samples alone
-/// (LightRecord::sampled_only: hidden shapes, links of shadows) are looked for along the same uniform directions, whatever else
-/// is there, and what is in their way is asked for with their own set.
+/// (LightRecord::sampled_only: hidden shapes, links of shadows) are looked for along the same
+/// uniform directions, whatever else is there, and what is in their way is asked for with their own
+/// set.
 ///
 /// Beyond the first vertex textures are read as blurred as after a diffuse bounce, so that scenes
 /// with textured indirect light are exact for diffuse surfaces only.

@@ -76,9 +76,10 @@ def test_a_moving_light_is_the_mean_of_still_ones(tmp_path: Path, kind: str) -> 
     loaded = load_stage(path, frame=1)
     assert loaded.scene.moves and "light" not in said(loaded)
     passes = 8
-    blurred = np.array([
-        wavecomb.render(loaded, spp=32, seed=90 + k, **SETTINGS).beauty for k in range(passes)
-    ], np.float64)
+    blurred = np.array(
+        [wavecomb.render(loaded, spp=32, seed=90 + k, **SETTINGS).beauty for k in range(passes)],
+        np.float64,
+    )
     stills = np.zeros_like(blurred)
     for k in range(16):
         still = load_stage(path, frame=1 + (k + 0.5) / 16, motion_blur=False)
@@ -103,14 +104,19 @@ def test_a_moving_light_is_the_mean_of_still_ones(tmp_path: Path, kind: str) -> 
 
 
 def test_one_picture_for_all_schedules(tmp_path: Path) -> None:
-    both = HEADER + LIGHTS["rect"] % GOES + """
+    both = (
+        HEADER
+        + LIGHTS["rect"] % GOES
+        + """
 def DomeLight "Sky" {
     float inputs:intensity = 0.1
     asset inputs:texture:file = @./sky.exr@
     float xformOp:rotateY.timeSamples = { 1: 0, 2: 90 }
     uniform token[] xformOpOrder = ["xformOp:rotateY"]
 }
-""" + LIGHTS["shaped"].replace("Lamp", "Spot") % GOES
+"""
+        + LIGHTS["shaped"].replace("Lamp", "Spot") % GOES
+    )
     oiio = pytest.importorskip("OpenImageIO")
     sky = oiio.ImageBuf(np.random.default_rng(3).random((16, 32, 3), np.float32) ** 4)
     sky.write(str(tmp_path / "sky.exr"))

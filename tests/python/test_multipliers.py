@@ -70,9 +70,10 @@ def lamp(folder: Path, body: str = "", light: str = RECT) -> Any:
 
 def passes(loaded: Any, seed: int, count: int = 8, spp: int = 16) -> np.ndarray:
     """(count, 20, 20, 3) of independent passes."""
-    return np.array([
-        wavecomb.render(loaded, spp=spp, seed=seed + k, **SETTINGS).beauty for k in range(count)
-    ], np.float64)
+    return np.array(
+        [wavecomb.render(loaded, spp=spp, seed=seed + k, **SETTINGS).beauty for k in range(count)],
+        np.float64,
+    )
 
 
 def agree(a: np.ndarray, b: np.ndarray) -> None:

@@ -62,8 +62,8 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
 float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
-  const float t = intersect_own_shape(*static_cast<const PlacedShape*>(user), o, d,
-                                      RTCRayN_time(ray, n, i));
+  const float t =
+      intersect_own_shape(*static_cast<const PlacedShape*>(user), o, d, RTCRayN_time(ray, n, i));
   return t > 0.f && t <= RTCRayN_tfar(ray, n, i) ? t : 0.f;
 }
 

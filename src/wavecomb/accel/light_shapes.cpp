@@ -15,7 +15,8 @@ namespace {
 double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
                                const double (&d)[3]) {
   const auto cross = [](const double* a, const double* b, double (&c)[3]) {
-    for (int i = 0; i < 3; ++i) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+    for (int i = 0; i < 3; ++i)
+      c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
   };
   const auto dot = [](const double* a, const double* b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -97,8 +97,8 @@ struct WaveContext {
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
-             context.joins_light(), context.knows_inside(),
-             context.scene.lights.shadows != nullptr, context.scene.lights.has_multipliers),
+             context.joins_light(), context.knows_inside(), context.scene.lights.shadows != nullptr,
+             context.scene.lights.has_multipliers),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.kept_vertices()),
         rays(capacity),

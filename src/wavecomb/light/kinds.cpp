@@ -45,8 +45,8 @@ MadeLight make_light(const Light& light, LightMaking& making) {
   }
   r.filter = kind.has(light_trait::kFiltered) ? light.filter : kNoFilter;
   r.sampled_only = r.hidden != 0 || r.shadow_link != kNoSet || r.shadow != kPlainShadow;
-  r.camera_only = r.sampled_only != 0 || r.diffuse != 1 || r.specular != 1 || r.light_link != kNoSet || light.moves() ||
-                  fades(making.filters, r.filter);
+  r.camera_only = r.sampled_only != 0 || r.diffuse != 1 || r.specular != 1 ||
+                  r.light_link != kNoSet || light.moves() || fades(making.filters, r.filter);
   if (kind.make) kind.make(made, light, making);
   if (!light.shaping.is_plain() && kind.has(light_trait::kShaped))
     making::add_shaping(made, light, making);

@@ -314,8 +314,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
         bsdf_pdf, light_pdf, bsdf_is_delta,
         F(ratio * detail::infinite_emission_density<F>(view, light, from, dir, active)));
   if (view.has_effects) [[unlikely]]
-    hit.radiance = hit.radiance * LightEffect<F>(view, UInt<F>(light), active)
-                                      .of_hit(bsdf_is_delta, from_camera, share);
+    hit.radiance =
+        hit.radiance *
+        LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera, share);
   if (view.links.members)
     weight = select(shines_on<F>(view, link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
@@ -324,7 +325,8 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 /// Sum over all infinite lights of radiance * MIS weight for a ray that left `from` and the scene
 /// along dir;
 /// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
-/// too); `share` of the bounce is diffuse. `ratio`: PathState::ratio, where lights send paths, which then share in the weight.
+/// too); `share` of the bounce is diffuse. `ratio`: PathState::ratio, where lights send paths,
+/// which then share in the weight.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
                                  const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,

@@ -103,7 +103,7 @@ enum class MaterialSync : uint32_t {
 struct Light {
   std::string name;
   LightKind kind{};  ///< a rect, unless it is said
-  Affine to_world;  ///< in mid-shutter, where it moves
+  Affine to_world;   ///< in mid-shutter, where it moves
   /// The same at equal steps of the shutter, two or more; empty: it stands still. It is turned and
   /// carried as a stiff body; sizes are those of to_world.
   std::vector<Affine> motion;
@@ -382,8 +382,8 @@ struct LightView {
   const ShapingRecord* shapings = nullptr;
   const IesRecord* ies = nullptr;
   const float* ies_numbers = nullptr;
-  const FilterRecord* filters = nullptr;      ///< null where no light has one
-  const LightMotion* motions = nullptr;       ///< by record; null where no light moves
+  const FilterRecord* filters = nullptr;  ///< null where no light has one
+  const LightMotion* motions = nullptr;   ///< by record; null where no light moves
   const LightStep* motion_steps = nullptr;
   const ShadowLookRecord* shadows = nullptr;  ///< null where all shadows are plain
   /// Of triangle i the record of its mesh light, or kNoLight; null where there are no mesh lights.

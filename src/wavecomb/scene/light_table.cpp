@@ -216,10 +216,11 @@ std::vector<LightParameter> common_rows() {
              LightRefers::kFilter)),
       with(kSeen, kShape,
            row<&L::visible>("visible", "visible", "", "Whether rays meet its shape.")),
-      with(kPlaced, kShape,
-           row<&L::motion>("motion", "motion", "",
-                           "Its transforms at equal steps over the shutter, (k, 4, 4), two or more; "
-                           "sizes are those of its transform, which is that in mid-shutter.")),
+      with(
+          kPlaced, kShape,
+          row<&L::motion>("motion", "motion", "",
+                          "Its transforms at equal steps over the shutter, (k, 4, 4), two or more; "
+                          "sizes are those of its transform, which is that in mid-shutter.")),
       in(kShape,
          row<&L::portals>("portals", "portals", "",
                           "Maps of the unit square in the xy plane to rectangles that guide its "

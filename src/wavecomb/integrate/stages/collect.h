@@ -158,11 +158,11 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       wave.aovs.hit_light<F>(*context.camera, slot, fma(d, t, o), time(), load<U>(hits.geom + i),
                              shape);
     if (notes_hits && wave.aovs.wants_motion() && any(shape)) [[unlikely]]
-      wave.aovs.move<F>(slot,
-                        screen_motion_of_light<F>(scene.lights, *context.camera,
-                                                  load<U>(hits.geom + i), fma(d, t, o), state.time,
-                                                  shape),
-                        shape);
+      wave.aovs.move<F>(
+          slot,
+          screen_motion_of_light<F>(scene.lights, *context.camera, load<U>(hits.geom + i),
+                                    fma(d, t, o), state.time, shape),
+          shape);
     const auto recorded = [&] {
       if constexpr (Media::kAny)
         return Mask<F>(surface | flight.stopped);

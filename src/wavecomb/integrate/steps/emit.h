@@ -38,8 +38,7 @@ template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
                                uint32_t depth, const UInt<F>& light, const F& t,
                                const PathState<F>& path, const Mask<F>& active) {
-  LightHit<F> hit =
-      light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
+  LightHit<F> hit = light_hit<F>(scene.lights, light, path.vertex_before(), path.dir, t, active);
   F w = bounce_weight<F>(path.pdf, hit.pdf);
   if (scene.lights.sends_paths()) [[unlikely]]
     w = joint_bounce_weight<F>(
@@ -59,9 +58,9 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
                                      uint32_t depth, const PathState<F>& path,
                                      const Mask<F>& active) {
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
-  const Color<F> le = escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
-                                          depth == 0, path.link, path.ratio, path.time,
-                                          path.diffuse);
+  const Color<F> le =
+      escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active, depth == 0,
+                          path.link, path.ratio, path.time, path.diffuse);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 

@@ -16,8 +16,7 @@ namespace wavecomb {
 
 /// Share of what the bounce `b` scatters that is diffuse; 0 of mirrors.
 template <typename F, typename Bsdf, typename View>
-WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen,
-                                       const BsdfSample<F>& b) {
+WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen, const BsdfSample<F>& b) {
   const Color<F> diffuse = bsdf.diffuse_f_cos(seen, b.wi);
   const auto share = [&](const F& part, const F& weight) {
     const F whole = weight * b.pdf;
