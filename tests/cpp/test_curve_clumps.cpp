@@ -56,15 +56,15 @@ void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, fl
   std::vector<uint8_t> may(mesh.primitive_count(), 0);
   for (uint32_t c = 0; c < clumps.count(); ++c) {
     if (!enters(clumps.bounds(c), ray)) continue;
-    const uint32_t bits = clumps.may_meet(c, CurveClumps::Ray(ray.o, ray.d), tfar);
+    const uint32_t bits = clumps.may_meet(c, CurveRay(ray.o, ray.d), tfar);
     for (uint32_t k = 0; k < CurveClumps::kPieces; ++k) {
       if ((bits >> k & 1u) == 0) continue;
-      ASSERT_LT(clumps.segment(c, k), mesh.primitive_count());
-      may[clumps.segment(c, k)] = 1;
+      ASSERT_LT(clumps.piece(c, k).prim, mesh.primitive_count());
+      may[clumps.piece(c, k).prim] = 1;
     }
   }
   for (uint32_t prim = 0; prim < mesh.primitive_count(); ++prim) {
-    const CurveHits hits = intersect_curve(mesh, prim, ray.o, ray.d, tfar, true);
+    const CurveHits hits = intersect_curve(mesh, {prim}, CurveRay(ray.o, ray.d), tfar, CurveQuery::kAll);
     look(prim, may[prim] != 0, hits.begin() != hits.end());
   }
 }
@@ -77,7 +77,7 @@ TEST(CurveClumps, HoldAllPiecesOfEachSegment) {
       std::map<uint32_t, std::pair<uint32_t, Bounds>> found;
       for (uint32_t c = 0; c < clumps.count(); ++c)
         for (uint32_t k = 0; k < CurveClumps::kPieces; ++k) {
-          const uint32_t prim = clumps.segment(c, k);
+          const uint32_t prim = clumps.piece(c, k).prim;
           if (prim >= mesh.primitive_count()) continue;
           auto& [count, box] = found[prim];
           ++count;

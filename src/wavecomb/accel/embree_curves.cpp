@@ -16,12 +16,17 @@ const CurveGeometry& curves_of(const void* user) {
   return *static_cast<const CurveGeometry*>(user);
 }
 
-/// Calls found(i, primitive, hit) with the first hit, on each primitive that there is, of each of a
-/// packet's rays that is there for its path. wants(slot): whether the ray asks for these curves.
-template <typename Arguments, typename Wants, typename Found>
-void for_first_hits(const Arguments& args, RTCRayN* rays, const Wants& wants, const Found& found) {
+/// Calls found(i, primitive, hit) with the first hit, or any, on each primitive that there is, of
+/// each of a packet's rays that is there for its path. wants(slot): whether the ray asks for these
+/// curves.
+template <bool kBare, typename Arguments, typename Wants, typename Found>
+void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Wants& wants,
+              const Found& found) {
   const CurveGeometry& curves = curves_of(args.geometryUserPtr);
-  const auto* context = reinterpret_cast<const QueryContext*>(args.context);
+  if (curves.is_filtered) query = CurveQuery::kAll;
+  auto* context = reinterpret_cast<QueryContext*>(args.context);
+  std::optional<CurveRay> own;
+  std::optional<CurveRay>& ray = kBare ? own : context->curve_ray;
   const unsigned inst = args.context->instID[0], n = args.N;
   for (unsigned i = 0; i < n; ++i) {
     if (args.valid[i] == 0 || !wants(RTCRayN_id(rays, n, i))) continue;
@@ -30,24 +35,26 @@ void for_first_hits(const Arguments& args, RTCRayN* rays, const Wants& wants, co
     const float d[3] = {RTCRayN_dir_x(rays, n, i), RTCRayN_dir_y(rays, n, i),
                         RTCRayN_dir_z(rays, n, i)};
     const float& tfar = RTCRayN_tfar(rays, n, i);
-    const auto meet = [&](uint32_t prim) {
-      for (const CurveHit& hit : intersect_curve(*curves.mesh, prim, o, d, tfar, curves.is_filtered,
-                                                 RTCRayN_time(rays, n, i), curves.is_fibre)) {
-        if (curves.is_filtered && !is_met(*context, inst, args.geomID, curves.id, prim, hit.u,
+    if (!ray || !ray->is(o, d)) ray.emplace(o, d);
+    const auto meet = [&](const CurvePiece& piece) {
+      for (const CurveHit& hit :
+           intersect_curve(*curves.mesh, piece, *ray, tfar, query, RTCRayN_time(rays, n, i),
+                           curves.is_fibre)) {
+        if (curves.is_filtered && !is_met(*context, inst, args.geomID, curves.id, piece.prim, hit.u,
                                           hit.v, RTCRayN_id(rays, n, i)))
           continue;
-        found(i, prim, hit);
+        found(i, piece.prim, hit);
         break;
       }
     };
     if (!curves.clumps) {
-      meet(args.primID);
+      meet({args.primID});
       continue;
     }
     // A ray that is occluded has no tfar left.
-    uint32_t left = curves.clumps->may_meet(args.primID, CurveClumps::Ray(o, d), tfar);
+    uint32_t left = curves.clumps->may_meet(args.primID, *ray, tfar);
     for (; left != 0 && tfar >= 0; left &= left - 1)
-      meet(curves.clumps->segment(args.primID, static_cast<uint32_t>(std::countr_zero(left))));
+      meet(curves.clumps->piece(args.primID, static_cast<uint32_t>(std::countr_zero(left))));
   }
 }
 
@@ -87,20 +94,22 @@ void intersect_curves(const RTCIntersectFunctionNArguments* args) {
     best->t[i] = hit.t;
     put(args, i, prim, hit, hit.t * kSlack);
   };
-  for_first_hits(*args, RTCRayHitN_RayN(args->rayhit, n), wants, found);
+  for_hits<false>(*args, RTCRayHitN_RayN(args->rayhit, n), CurveQuery::kFirst, wants, found);
 }
 
 /// The same where any closest hit will do; such queries have no context of ours.
 void intersect_curves_bare(const RTCIntersectFunctionNArguments* args) {
-  for_first_hits(
-      *args, RTCRayHitN_RayN(args->rayhit, args->N), wants_all,
+  for_hits<true>(
+      *args, RTCRayHitN_RayN(args->rayhit, args->N), CurveQuery::kFirst, wants_all,
       [&](unsigned i, uint32_t prim, const CurveHit& hit) { put(args, i, prim, hit, hit.t); });
 }
 
+template <bool kBare>
 void occlude_curves(const RTCOccludedFunctionNArguments* args) {
-  for_first_hits(*args, args->ray, wants_all, [&](unsigned i, uint32_t, const CurveHit&) {
+  const auto found = [&](unsigned i, uint32_t, const CurveHit&) {
     RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
-  });
+  };
+  for_hits<kBare>(*args, args->ray, CurveQuery::kAny, wants_all, found);
 }
 
 void curve_box(const RTCBoundsFunctionArguments* args) {
@@ -119,9 +128,9 @@ RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, Hit
   rtcSetGeometryTimeStepCount(g, user.mesh->steps);
   rtcSetGeometryUserData(g, const_cast<CurveGeometry*>(&user));  // only read
   rtcSetGeometryBoundsFunction(g, curve_box, nullptr);
-  rtcSetGeometryIntersectFunction(
-      g, rule != HitRule::kEmbree ? intersect_curves : intersect_curves_bare);
-  rtcSetGeometryOccludedFunction(g, occlude_curves);
+  const bool is_bare = rule == HitRule::kEmbree;
+  rtcSetGeometryIntersectFunction(g, is_bare ? intersect_curves_bare : intersect_curves);
+  rtcSetGeometryOccludedFunction(g, is_bare ? occlude_curves<true> : occlude_curves<false>);
   rtcCommitGeometry(g);
   return g;
 }

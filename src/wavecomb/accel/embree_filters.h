@@ -4,7 +4,10 @@
 
 #include <embree4/rtcore.h>
 
+#include <optional>
+
 #include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/curve/ray.h"
 
 namespace wavecomb {
 
@@ -18,6 +21,7 @@ struct alignas(64) QueryContext {
   uint32_t first_world, first_light;   ///< geometry ids of the world's first mesh, and of lights
   const unsigned *inst, *geom, *prim;  ///< of the hits that Embree holds, W each
   alignas(64) float t[16];             ///< their true distances
+  std::optional<CurveRay> curve_ray;   ///< that curves were last asked for
 };
 
 /// Hits farther than the closest by less than this fraction are looked at still.

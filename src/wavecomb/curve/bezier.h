@@ -71,6 +71,21 @@ struct Bezier {
     c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
     c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
   }
+  /// De Casteljau's first or second half alone, the same numbers as split gives.
+  template <typename T, typename S = double>
+  static void keep_half(T* c, bool second, S half = 0.5) {
+    const T a = (c[0] + c[1]) * half, m = (c[1] + c[2]) * half, b = (c[2] + c[3]) * half;
+    const T am = (a + m) * half, mb = (m + b) * half, middle = (am + mb) * half;
+    if (second) {
+      c[0] = middle;
+      c[1] = mb;
+      c[2] = b;
+    } else {
+      c[1] = a;
+      c[2] = am;
+      c[3] = middle;
+    }
+  }
   /// De Casteljau's halves.
   template <typename T>
   static void split(const T* c, T* a, T* b) {

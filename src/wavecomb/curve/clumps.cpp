@@ -8,6 +8,8 @@
 #include <span>
 
 #include "wavecomb/core/vec.h"
+#include "wavecomb/curve/bezier.h"
+#include "wavecomb/curve/capsules.h"
 #include "wavecomb/curve/segment.h"
 
 namespace wavecomb {
@@ -15,8 +17,10 @@ namespace {
 
 using ClumpLanes = FloatP<CurveClumps::kPieces>;
 
-constexpr float kCells = 65535.f;
-constexpr float kLargestCell = 65000.f;  ///< less than that by what rounding adds
+constexpr uint32_t kCellBits = 10;
+constexpr float kCells = (1u << kCellBits) - 1;
+constexpr uint32_t kCellMask = (1u << kCellBits) - 1;
+constexpr float kMostRadius = 253.f;  ///< of a radius, before what rounding adds
 constexpr float kSlender = 32.f;         ///< length over radius above which segments are halved
 constexpr size_t kManySegments = size_t{1} << 20;
 constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
@@ -27,20 +31,8 @@ struct ClumpPiece {
   float radius = 0;
 };
 
-/// Pieces are numbered segment by segment as nodes of a tree: 1 is all of a segment, 2 n and 2 n +
-/// 1 are the halves of n.
-constexpr uint32_t kPieceNodes = 8;
-
-/// De Casteljau's first or second half.
-template <typename T>
-void keep_half(std::array<T, 4>& p, bool second) {
-  const T a = (p[0] + p[1]) * 0.5f, m = (p[1] + p[2]) * 0.5f, b = (p[2] + p[3]) * 0.5f;
-  const T am = (a + m) * 0.5f, mb = (m + b) * 0.5f, middle = (am + mb) * 0.5f;
-  if (second)
-    p = {middle, mb, b, p[3]};
-  else
-    p = {p[0], a, am, middle};
-}
+/// Pieces are numbered segment by segment.
+constexpr uint32_t kPieceNodes = CurvePiece::kNodes;
 
 float distance_to_line(const Vec3<float>& p, const Vec3<float>& a, const Vec3<float>& b) {
   const Vec3<float> c = b - a, v = p - a;
@@ -65,8 +57,8 @@ ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
   }
   const uint32_t node = number % kPieceNodes;
   for (uint32_t bit = std::bit_floor(node) / 2; bit > 0; bit /= 2) {
-    keep_half(p, (node & bit) != 0);
-    keep_half(r, (node & bit) != 0);
+    curve_math::Bezier::keep_half(p.data(), (node & bit) != 0, 0.5f);
+    curve_math::Bezier::keep_half(r.data(), (node & bit) != 0, 0.5f);
   }
   const float bend =
       std::max(distance_to_line(p[1], p[0], p[3]), distance_to_line(p[2], p[0], p[3]));
@@ -196,24 +188,26 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
     pieces[k] = piece_of(mesh_, first[std::min(k, n - 1)]);
     box.add(pieces[k].a);
     box.add(pieces[k].b);
-    out.segment[k] = k < n ? first[k] / kPieceNodes : kNone;
+    out.number[k] = k < n ? first[k] : kNone;
   }
-  float size = max_component(Vec3<float>(box.hi - box.lo));
-  for (const ClumpPiece& piece : pieces) size = std::max(size, 1.001f * piece.radius);
   out.low = {box.lo.x, box.lo.y, box.lo.z};
-  out.step = size * (1.f / kLargestCell);
+  out.step = max_component(Vec3<float>(box.hi - box.lo)) * (1.001f / kCells);
+  for (const ClumpPiece& piece : pieces)
+    out.step = std::max(out.step, piece.radius * (1.001f / kMostRadius));
   const auto cells = [&](float x) { return out.step > 0 ? std::min(x / out.step, kCells) : 0.f; };
   const auto cell = [&](float x, uint32_t axis) {
-    return static_cast<uint32_t>(cells(x - out.low[axis]) + 0.5f);
+    return static_cast<uint32_t>(cells(x - out.low[axis]) + 0.5f) << (kCellBits * axis);
   };
   for (uint32_t k = 0; k < kPieces; ++k) {
     const ClumpPiece& piece = pieces[k];
     const float a[3] = {piece.a.x, piece.a.y, piece.a.z};
     const float b[3] = {piece.b.x, piece.b.y, piece.b.z};
-    for (uint32_t axis = 0; axis < 3; ++axis)
-      out.cells[axis][k] = cell(a[axis], axis) | cell(b[axis], axis) << 16;
-    // Rounding to cells moves a point by less than one.
-    out.radius[k] = static_cast<uint16_t>(std::ceil(cells(1.0001f * piece.radius)) + 1.f);
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      out.ends[0][k] |= cell(a[axis], axis);
+      out.ends[1][k] |= cell(b[axis], axis);
+    }
+    // Rounding to cells moves a point by no more than the root of 3/4 of one.
+    out.radius[k] = static_cast<uint8_t>(std::ceil(cells(1.0001f * piece.radius) + 0.88f));
   }
   return out;
 }
@@ -222,10 +216,10 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
   const Clump& c = clumps_[clump];
   Bounds box;
   for (uint32_t k = 0; k < kPieces; ++k)
-    for (const uint32_t shift : {0u, 16u}) {
+    for (const auto& end : c.ends) {
       float lo[3], hi[3];
       for (uint32_t axis = 0; axis < 3; ++axis) {
-        const auto cell = static_cast<float>((c.cells[axis][k] >> shift) & 0xffffu);
+        const auto cell = static_cast<float>((end[k] >> (kCellBits * axis)) & kCellMask);
         const float x = c.low[axis] + c.step * cell;
         const float reach = c.step * static_cast<float>(c.radius[k]) + 1e-6f * std::abs(x);
         lo[axis] = x - reach;
@@ -237,36 +231,22 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
   return box;
 }
 
-CurveClumps::Ray::Ray(const float (&origin)[3], const float (&dir)[3])
-    : o{origin[0], origin[1], origin[2]} {
-  length = std::sqrt(dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2]);
-  const float inverse = 1.f / length;
-  const float d[3] = {dir[0] * inverse, dir[1] * inverse, dir[2] * inverse};
-  const float sign = std::copysign(1.f, d[2]), a = -1.f / (sign + d[2]), b = d[0] * d[1] * a;
-  axis = {{{1.f + sign * d[0] * d[0] * a, sign * b, -sign * d[0]},
-           {b, sign + d[1] * d[1] * a, -d[1]},
-           {d[0], d[1], d[2]}}};
-}
-
-uint32_t CurveClumps::may_meet(uint32_t clump, const Ray& ray, float tfar) const {
+uint32_t CurveClumps::may_meet(uint32_t clump, const CurveRay& ray, float tfar) const {
   using F = ClumpLanes;
   const Clump& c = clumps_[clump];
-  const float from[3] = {c.low[0] - ray.o[0], c.low[1] - ray.o[1], c.low[2] - ray.o[2]};
+  const float from[3] = {c.low[0] - ray.origin[0], c.low[1] - ray.origin[1], c.low[2] - ray.origin[2]};
   alignas(32) float radii[kPieces];
   for (uint32_t k = 0; k < kPieces; ++k) radii[k] = static_cast<float>(c.radius[k]);
   const F radius = load<F>(radii) * c.step;
   const F rounding =
-      (radius + (clump_size(c.low.data()) + clump_size(ray.o.data()) + 3 * kCells * c.step)) *
+      (radius + (clump_size(c.low.data()) + clump_size(ray.origin) + 3 * kCells * c.step)) *
       kClumpRounding;
-  Vec3<F> cell_a, cell_b;
-  const auto decode = [&](uint32_t axis, F& a, F& b) {
-    const UInt<F> cells = load<UInt<F>>(c.cells[axis].data());
-    a = F(Int<F>(cells & 0xffffu));
-    b = F(Int<F>(cells >> 16u));
+  const auto cells_of = [&](const std::array<uint32_t, kPieces>& end) {
+    const UInt<F> cells = load<UInt<F>>(end.data());
+    return Vec3<F>(F(Int<F>(cells & kCellMask)), F(Int<F>((cells >> kCellBits) & kCellMask)),
+                   F(Int<F>(cells >> (2 * kCellBits))));
   };
-  decode(0, cell_a.x, cell_b.x);
-  decode(1, cell_a.y, cell_b.y);
-  decode(2, cell_a.z, cell_b.z);
+  const Vec3<F> cell_a = cells_of(c.ends[0]), cell_b = cells_of(c.ends[1]);
   // The ends as the ray sees them, which is the z axis here.
   const auto seen = [&](uint32_t n, const Vec3<F>& cell) {
     const auto& e = ray.axis[n];
@@ -274,21 +254,11 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const Ray& ray, float tfar) const
     return fma(cell.x, F(e[0] * c.step),
                fma(cell.y, F(e[1] * c.step), fma(cell.z, F(e[2] * c.step), start)));
   };
-  const F ax = seen(0, cell_a), ay = seen(1, cell_a), az = seen(2, cell_a);
-  const F bx = seen(0, cell_b), by = seen(1, cell_b), bz = seen(2, cell_b);
-  // Whether both ends lie farther than the radius on one side of a line through the ray, along the
-  // piece or square to it.
-  const F cx = bx - ax, cy = by - ay, length = sqrt(fma(cx, cx, F(cy * cy)));
-  // The piece's direction is rounded as its ends are; where one of these is within the radius, the
-  // other is no farther than the piece is long beyond that.
-  const F reach = fma(radius, length, F(rounding * (length + radius)));
-  const F beside = abs(fma(cx, ay, F(-(cy * ax))));
-  const F along_a = fma(cx, ax, F(cy * ay)), along_b = fma(cx, bx, F(cy * by));
-  const F deep = radius + rounding;
-  const Mask<F> passed = (beside > reach) | (along_a > reach) | (along_b < -reach) |
-                         (max(az, bz) < -deep) |
-                         (min(az, bz) - deep > F(tfar * ray.length * 1.00001f)) |
-                         Mask<F>(load<UInt<F>>(c.segment.data()) == UInt<F>(kNone));
+  const Vec3<F> a(seen(0, cell_a), seen(1, cell_a), seen(2, cell_a));
+  const Vec3<F> b(seen(0, cell_b), seen(1, cell_b), seen(2, cell_b));
+  const F z_far = F(tfar * ray.length * 1.00001f) + rounding;
+  const Mask<F> passed = passes_capsules<F>(a, b, radius, rounding, F(-rounding), z_far) |
+                         Mask<F>(load<UInt<F>>(c.number.data()) == UInt<F>(kNone));
   return lane_bits<F>(not_(passed));
 }
 

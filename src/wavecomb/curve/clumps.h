@@ -4,8 +4,8 @@
 /// Boxes of hair are a hundred times longer than a strand is wide: of the segments whose box a ray
 /// meets, it passes by nearly all, and each of them costs memory from another place. So a hierarchy
 /// is made over clumps of pieces that lie close together: segments, or parts of slender ones. A
-/// clump has the lines that these lie about side by side, in 16 bits, and a ray is tested against
-/// the eight at once. Segments of which a piece may be met go to intersect_curve; a clump's own
+/// clump has the lines that these lie about side by side, in 10 bits, and a ray is tested against
+/// the eight at once. Pieces that may be met go to intersect_curve; a clump's own
 /// test says nothing but "perhaps" or "certainly not", so that it changes no picture.
 #pragma once
 
@@ -44,35 +44,29 @@ class CurveClumps {
   /// A box around the pieces of a clump, a little larger than they are.
   Bounds bounds(uint32_t clump) const;
 
-  /// A ray, and axes of which the last is along it.
-  struct Ray {
-    Ray(const float (&origin)[3], const float (&dir)[3]);
-
-    std::array<float, 3> o;
-    std::array<std::array<float, 3>, 3> axis;
-    float length;  ///< of the direction
-  };
-
   /// A bit for each piece that a ray may meet with 0 < t <= tfar.
-  uint32_t may_meet(uint32_t clump, const Ray& ray, float tfar) const;
+  uint32_t may_meet(uint32_t clump, const CurveRay& ray, float tfar) const;
 
-  /// The segment that a piece is of; `k`: of a bit of may_meet.
-  uint32_t segment(uint32_t clump, uint32_t k) const { return clumps_[clump].segment[k]; }
+  /// The piece of a bit k of may_meet.
+  CurvePiece piece(uint32_t clump, uint32_t k) const {
+    const uint32_t number = clumps_[clump].number[k];
+    return {number / CurvePiece::kNodes, number % CurvePiece::kNodes};
+  }
 
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 16 bits: those of
-  /// the first are the lower halves of cells[axis][k], those of the second the upper ones. Its
-  /// radius about the line between them is step * radius[k].
-  struct alignas(32) Clump {
-    std::array<std::array<uint32_t, kPieces>, 3> cells;
-    std::array<uint32_t, kPieces> segment;
-    std::array<uint16_t, kPieces> radius;
+  /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 10 bits, x in the
+  /// lowest ones. Its radius about the line between them is step * radius[k]. Its number is that of
+  /// its segment times kNodes, and its node.
+  struct alignas(128) Clump {
+    std::array<std::array<uint32_t, kPieces>, 2> ends;
+    std::array<uint32_t, kPieces> number;
+    std::array<uint8_t, kPieces> radius;
     std::array<float, 3> low;
     float step;
   };
-  static_assert(sizeof(Clump) == 160);
+  static_assert(sizeof(Clump) == 128);
 
   Clump make(const uint32_t* first, uint32_t n) const;
 

@@ -2,9 +2,12 @@
 #include "wavecomb/curve/intersect.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "wavecomb/curve/bezier.h"
+#include "wavecomb/curve/capsules.h"
 #include "wavecomb/curve/segment.h"
 
 namespace wavecomb {
@@ -16,6 +19,27 @@ uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
 
+using LeafLanes = FloatP<8>;
+
+/// What the control points of a piece weigh at its leaves' ends.
+struct LeafWeights {
+  alignas(64) float at[4][16] = {};
+
+  explicit constexpr LeafWeights(int halvings) {
+    const int n = 1 << halvings;
+    for (int i = 0; i <= n; ++i) {
+      const float u = static_cast<float>(i) / static_cast<float>(n), w = 1 - u;
+      at[0][i] = w * w * w;
+      at[1][i] = 3 * w * w * u;
+      at[2][i] = 3 * w * u * u;
+      at[3][i] = u * u * u;
+    }
+  }
+};
+
+constexpr std::array<LeafWeights, 4> kLeafWeights = {LeafWeights(0), LeafWeights(1), LeafWeights(2),
+                                                     LeafWeights(3)};
+
 /// The values of a mesh's points at a time, bit for bit those of detail::MovingRows.
 class PointsAt {
  public:
@@ -25,8 +49,13 @@ class PointsAt {
   Vec3<float> normal(size_t point) const { return at(mesh_.normals, point); }
 
  private:
-  Vec3<float> at(std::span<const float> values, size_t point) const {
-    if (!mesh_.deforms()) return {values[3 * point], values[3 * point + 1], values[3 * point + 2]};
+  WAVECOMB_INLINE Vec3<float> at(std::span<const float> values, size_t point) const {
+    if (mesh_.deforms()) [[unlikely]]
+      return between(values, point);
+    return {values[3 * point], values[3 * point + 1], values[3 * point + 2]};
+  }
+
+  [[gnu::noinline]] Vec3<float> between(std::span<const float> values, size_t point) const {
     const size_t stride = values.size() / mesh_.steps;
     const float* p = &values[place_.before * stride + 3 * point];
     const float* q = p + stride;
@@ -42,13 +71,14 @@ class PointsAt {
 class SegmentTest {
  public:
   SegmentTest(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
-              float tfar, CurveHits& hits)
+              float tfar, CurveQuery query, CurveHits& hits)
       : mesh_(mesh),
         prim_(prim),
         first_(first_point(mesh, prim)),
         cubic_(mesh.is_cubic()),
         ray_(ray),
         z_far_(tfar * ray.length),
+        query_(query),
         hits_(hits),
         points_(points) {
     const uint32_t n = cubic_ ? 4 : 2;
@@ -63,31 +93,38 @@ class SegmentTest {
     Bezier::line(normal_);
   }
 
-  /// `all`: hits behind the first are wanted too; `outside`: none from inside.
-  void run(bool all, bool outside) {
+  /// `outside`: no hits from inside; `node`: the piece.
+  void run(bool outside, uint32_t node) {
+    side_ = -1;
+    // Where a tube is entered matters behind the ray's origin, too: it may start inside.
+    if (mesh_.is_ribbon() || outside) z_near_ = 0;
+    // From inside, another piece may be where the ray leaves.
+    if (mesh_.is_ribbon() || outside) return search_node(node);
     if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
     const int halvings = depth();
-    side_ = -1;
     search(curve_, 0, 1, halvings);
-    if (mesh_.is_ribbon() || outside || !(may_be_inside_ || (all && hits_.begin() != hits_.end())))
-      return;
+    if (query_ == CurveQuery::kAny && !hits_.empty()) return;
+    if (!may_be_inside_ && (query_ != CurveQuery::kAll || hits_.empty())) return;
     side_ = 1;
+    z_near_ = 0;
     search(curve_, 0, 1, halvings);
   }
 
  private:
   /// Halvings until pieces are straight within a part of the radius (as Wang 1984 bounds them).
-  int depth() const {
+  int depth() {
     double bend = 0;
     for (int i = 0; i < 2; ++i) {
       const V d = curve_.p[i] - curve_.p[i + 1] * 2.0 + curve_.p[i + 2];
       bend = std::max(bend, dot_d(d, d));
     }
     const double r = *std::max_element(curve_.r, curve_.r + 4);
-    const double pieces4 = 0.75 * std::sqrt(bend) / std::max(kStraight * r, 1e-300);  // pieces^2
+    bulge_ = 0.75 * std::sqrt(bend);
+    const double pieces4 = bulge_ / std::max(kStraight * r, 1e-300);  // pieces^2
     int halvings = mesh_.is_ribbon() ? kRibbonHalvings : 0;
     while (halvings < kMostHalvings && pieces4 > static_cast<double>(1u << (2 * halvings)))
       ++halvings;
+    bulge_ /= static_cast<double>(1u << (2 * halvings));
     return halvings;
   }
 
@@ -99,6 +136,21 @@ class SegmentTest {
     const double least = std::min(b0, std::min(b1, b2)), most = std::max(b0, std::max(b1, b2));
     const double reach = r * r * (x * x + y * y) * (1 + 1e-9);
     return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
+  }
+
+  /// Follows the halves of a node of CurvePiece, or of the piece that it is a part of where that is
+  /// straight.
+  void search_node(uint32_t node) {
+    int halvings = depth();
+    Bezier piece = curve_;
+    double u0 = 0, u1 = 1;
+    for (uint32_t bit = std::bit_floor(node) / 2; bit > 0 && halvings > 0; bit /= 2, --halvings) {
+      const bool second = (node & bit) != 0;
+      Bezier::keep_half(piece.p, second);
+      Bezier::keep_half(piece.r, second);
+      (second ? u0 : u1) = 0.5 * (u0 + u1);
+    }
+    search(piece, u0, u1, halvings);
   }
 
   /// Follows the halves of a piece whose hull the ray may meet.
@@ -113,16 +165,52 @@ class SegmentTest {
       }
       return least - r > hi || most + r < lo;
     };
-    // Where a tube is entered matters behind the ray's origin too: it may start inside.
-    const double z_near = side_ < 0 && !mesh_.is_ribbon() ? -kInfinity : 0;
-    if (misses(&V::x, 0, 0) || misses(&V::y, 0, 0) || misses(&V::z, z_near, z_far_)) return;
+    if (misses(&V::x, 0, 0) || misses(&V::y, 0, 0) || misses(&V::z, z_near_, z_far_)) return;
     if (halvings == 0) return mesh_.is_ribbon() ? meet_ribbon(u0, u1) : meet_tube(u0, u1, side_);
+    if (halvings <= kLeafHalvings && !mesh_.is_ribbon())
+      return search_leaves(piece, r, u0, u1, halvings);
     Bezier a, b;
     Bezier::split(piece.p, a.p, b.p);
     Bezier::split(piece.r, a.r, b.r);
     const double middle = 0.5 * (u0 + u1);
     search(a, u0, middle, halvings - 1);
+    if (query_ == CurveQuery::kAny && !hits_.empty()) return;
     search(b, middle, u1, halvings - 1);
+  }
+
+  /// The same for all leaves of a piece of a tube at once, in float.
+  void search_leaves(const Bezier& piece, double r, double u0, double u1, int halvings) {
+    using F = LeafLanes;
+    const LeafWeights& weights = kLeafWeights[halvings];
+    Vec3<F> a, b;
+    double size = 0, deep = 0;
+    const auto ends = [&](double V::* axis, F& at_a, F& at_b) {
+      at_a = at_b = F(0.f);
+      for (int k = 0; k < 4; ++k) {
+        const F p(static_cast<float>(piece.p[k].*axis));
+        at_a = fma(load<F>(&weights.at[k][0]), p, at_a);
+        at_b = fma(load<F>(&weights.at[k][1]), p, at_b);
+      }
+    };
+    ends(&V::x, a.x, b.x);
+    ends(&V::y, a.y, b.y);
+    ends(&V::z, a.z, b.z);
+    for (const V& p : piece.p) {
+      size = std::max(size, std::abs(p.x) + std::abs(p.y));
+      deep = std::max(deep, std::abs(p.z));
+    }
+    const double far = kLeafRounding * (deep + r);
+    const auto wide = static_cast<float>((1 + kLeafRounding) * (r + bulge_));
+    uint32_t left = lane_bits<F>(not_(passes_capsules<F>(
+        a, b, F(wide), F(static_cast<float>(kLeafRounding * (size + r))),
+        F(static_cast<float>(z_near_ - far)), F(static_cast<float>(z_far_ * 1.00001 + far)))));
+    left &= (1u << (1 << halvings)) - 1;
+    const double step = (u1 - u0) / (1 << halvings);
+    for (; left != 0; left &= left - 1) {
+      const double from = u0 + std::countr_zero(left) * step;
+      meet_tube(from, from + step, side_);
+      if (query_ == CurveQuery::kAny && !hits_.empty()) return;
+    }
   }
 
   /// Of the spheres about the curve, the ray meets that of parameter u at z(u) -+ sqrt(h(u)),
@@ -157,29 +245,30 @@ class SegmentTest {
   void meet_tube(double u0, double u1, int side) {
     const double s0 = step(u0, side), s1 = step(u1, side);
     if (s0 > 0 && s1 < 0)
-      meet_tube_at(extreme_between(u0, u1, side), side);
+      meet_tube_at(extreme_between(u0, s0, u1, s1, side), side);
     else if (u0 == 0 && s0 <= 0)
       meet_tube_at(0, side);
     else if (u1 == 1 && s1 >= 0)
       meet_tube_at(1, side);
   }
 
-  /// The root of step() between u0, where it is positive, and u1, where it is negative: by steps
-  /// and secants that stay between.
-  double extreme_between(double u0, double u1, int side) const {
-    double u = 0.5 * (u0 + u1), before = u, step_before = 0;
+  /// The root of step() between u0, where it is s0 > 0, and u1, where it is s1 < 0: by secants that
+  /// stay between.
+  double extreme_between(double u0, double s0, double u1, double s1, int side) const {
+    double before = s0 < -s1 ? u0 : u1, step_before = s0 < -s1 ? s0 : s1;
+    double u = u0 + (u1 - u0) * (s0 / (s0 - s1));
     for (int i = 0; i < kSteps; ++i) {
       const double s = step(u, side);
       if (s == 0) break;
       (s > 0 ? u0 : u1) = u;
-      double next = u + s;
-      const double slope = i > 0 ? (s - step_before) / (u - before) : 0;
-      if (slope < 0) next = u - s / slope;
+      const double slope = (s - step_before) / (u - before);
+      double next = slope < 0 ? u - s / slope : u + s;
       if (!(next > u0 && next < u1)) next = 0.5 * (u0 + u1);
       before = u;
       step_before = s;
       u = next;
-      if (std::abs(u - before) < 1e-13) break;
+      // The next step would be less than the square of this one, over what is a leaf.
+      if (std::abs(u - before) < kNear) break;
     }
     return u;
   }
@@ -209,6 +298,7 @@ class SegmentTest {
 
   /// Notes a hit on a tube by its place on it, with the formulas that shading finds it again by.
   void add_tube(double z, double u, const V& normal) {
+    if (query_ == CurveQuery::kAny) return add(z, 0, 0);
     CurveSegment<float> s;
     s.cubic = cubic_;
     for (uint32_t k = 0; k < 4; ++k) {
@@ -282,7 +372,10 @@ class SegmentTest {
 
   static constexpr double kStraight = 0.025;  ///< of the radius
   static constexpr int kMostHalvings = 9, kRibbonHalvings = 3;
+  static constexpr int kLeafHalvings = 3;
+  static constexpr double kLeafRounding = 4e-6;  ///< of sums of products in float, over their terms
   static constexpr int kSteps = 40, kRibbonSteps = 100;
+  static constexpr double kNear = 1e-9;  ///< steps that are no more leave the extreme as it is
   static constexpr double kFar = 2;  ///< a step beyond either end
   /// Sine of the angle by which ends reach beyond the seam, so that none shows a gap.
   static constexpr double kSeam = 1e-3;
@@ -292,10 +385,13 @@ class SegmentTest {
   const bool cubic_;
   const RaySpace& ray_;
   const double z_far_;
+  const CurveQuery query_;
   CurveHits& hits_;
   const PointsAt& points_;
   Bezier curve_;
   V normal_[4];
+  double bulge_ = 0;            ///< how far leaves are from straight
+  double z_near_ = -kInfinity;  ///< where a tube is entered, at the least, that matters
   int side_ = -1;               ///< which of a tube's extremes are looked for
   bool may_be_inside_ = false;  ///< entered behind the ray's origin or from the next segment
 };
@@ -332,15 +428,15 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
   return box;
 }
 
-CurveHits intersect_curve(const Mesh& mesh, uint32_t prim, const float (&origin)[3],
-                          const float (&dir)[3], float tfar, bool all, float time, bool outside) {
-  const RaySpace ray(origin, dir);
+CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& of, float tfar,
+                          CurveQuery query, float time, bool outside) {
+  const RaySpace& ray = of.space;
   const PointsAt points(mesh, time);
   CurveHits hits;
   if (mesh.primitive == Primitive::kSphere)
-    intersect_sphere(mesh, prim, points, ray, tfar, outside, hits);
+    intersect_sphere(mesh, piece.prim, points, ray, tfar, outside, hits);
   else
-    SegmentTest(mesh, prim, points, ray, tfar, hits).run(all, outside);
+    SegmentTest(mesh, piece.prim, points, ray, tfar, query, hits).run(outside, piece.node);
   return hits;
 }
 
