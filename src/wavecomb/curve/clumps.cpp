@@ -17,10 +17,8 @@ namespace {
 
 using ClumpLanes = FloatP<CurveClumps::kPieces>;
 
-constexpr uint32_t kCellBits = 10;
-constexpr float kCells = (1u << kCellBits) - 1;
-constexpr uint32_t kCellMask = (1u << kCellBits) - 1;
-constexpr float kMostRadius = 253.f;  ///< of a radius, before what rounding adds
+constexpr float kCells = 65535.f;
+constexpr float kLargestCell = 65000.f;  ///< less than that by what rounding adds
 constexpr float kSlender = 32.f;         ///< length over radius above which segments are halved
 constexpr size_t kManySegments = size_t{1} << 20;
 constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
@@ -190,24 +188,22 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
     box.add(pieces[k].b);
     out.number[k] = k < n ? first[k] : kNone;
   }
+  float size = max_component(Vec3<float>(box.hi - box.lo));
+  for (const ClumpPiece& piece : pieces) size = std::max(size, 1.001f * piece.radius);
   out.low = {box.lo.x, box.lo.y, box.lo.z};
-  out.step = max_component(Vec3<float>(box.hi - box.lo)) * (1.001f / kCells);
-  for (const ClumpPiece& piece : pieces)
-    out.step = std::max(out.step, piece.radius * (1.001f / kMostRadius));
+  out.step = size * (1.f / kLargestCell);
   const auto cells = [&](float x) { return out.step > 0 ? std::min(x / out.step, kCells) : 0.f; };
   const auto cell = [&](float x, uint32_t axis) {
-    return static_cast<uint32_t>(cells(x - out.low[axis]) + 0.5f) << (kCellBits * axis);
+    return static_cast<uint32_t>(cells(x - out.low[axis]) + 0.5f);
   };
   for (uint32_t k = 0; k < kPieces; ++k) {
     const ClumpPiece& piece = pieces[k];
     const float a[3] = {piece.a.x, piece.a.y, piece.a.z};
     const float b[3] = {piece.b.x, piece.b.y, piece.b.z};
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      out.ends[0][k] |= cell(a[axis], axis);
-      out.ends[1][k] |= cell(b[axis], axis);
-    }
-    // Rounding to cells moves a point by no more than the root of 3/4 of one.
-    out.radius[k] = static_cast<uint8_t>(std::ceil(cells(1.0001f * piece.radius) + 0.88f));
+    for (uint32_t axis = 0; axis < 3; ++axis)
+      out.cells[axis][k] = cell(a[axis], axis) | cell(b[axis], axis) << 16;
+    // Rounding to cells moves a point by less than one.
+    out.radius[k] = static_cast<uint16_t>(std::ceil(cells(1.0001f * piece.radius)) + 1.f);
   }
   return out;
 }
@@ -216,10 +212,10 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
   const Clump& c = clumps_[clump];
   Bounds box;
   for (uint32_t k = 0; k < kPieces; ++k)
-    for (const auto& end : c.ends) {
+    for (const uint32_t shift : {0u, 16u}) {
       float lo[3], hi[3];
       for (uint32_t axis = 0; axis < 3; ++axis) {
-        const auto cell = static_cast<float>((end[k] >> (kCellBits * axis)) & kCellMask);
+        const auto cell = static_cast<float>((c.cells[axis][k] >> shift) & 0xffffu);
         const float x = c.low[axis] + c.step * cell;
         const float reach = c.step * static_cast<float>(c.radius[k]) + 1e-6f * std::abs(x);
         lo[axis] = x - reach;
@@ -241,12 +237,15 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const CurveRay& ray, float tfar) 
   const F rounding =
       (radius + (clump_size(c.low.data()) + clump_size(ray.origin) + 3 * kCells * c.step)) *
       kClumpRounding;
-  const auto cells_of = [&](const std::array<uint32_t, kPieces>& end) {
-    const UInt<F> cells = load<UInt<F>>(end.data());
-    return Vec3<F>(F(Int<F>(cells & kCellMask)), F(Int<F>((cells >> kCellBits) & kCellMask)),
-                   F(Int<F>(cells >> (2 * kCellBits))));
+  Vec3<F> cell_a, cell_b;
+  const auto decode = [&](uint32_t axis, F& a, F& b) {
+    const UInt<F> cells = load<UInt<F>>(c.cells[axis].data());
+    a = F(Int<F>(cells & 0xffffu));
+    b = F(Int<F>(cells >> 16u));
   };
-  const Vec3<F> cell_a = cells_of(c.ends[0]), cell_b = cells_of(c.ends[1]);
+  decode(0, cell_a.x, cell_b.x);
+  decode(1, cell_a.y, cell_b.y);
+  decode(2, cell_a.z, cell_b.z);
   // The ends as the ray sees them, which is the z axis here.
   const auto seen = [&](uint32_t n, const Vec3<F>& cell) {
     const auto& e = ray.axis[n];

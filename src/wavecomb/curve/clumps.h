@@ -4,7 +4,7 @@
 /// Boxes of hair are a hundred times longer than a strand is wide: of the segments whose box a ray
 /// meets, it passes by nearly all, and each of them costs memory from another place. So a hierarchy
 /// is made over clumps of pieces that lie close together: segments, or parts of slender ones. A
-/// clump has the lines that these lie about side by side, in 10 bits, and a ray is tested against
+/// clump has the lines that these lie about side by side, in 16 bits, and a ray is tested against
 /// the eight at once. Pieces that may be met go to intersect_curve; a clump's own
 /// test says nothing but "perhaps" or "certainly not", so that it changes no picture.
 #pragma once
@@ -56,17 +56,18 @@ class CurveClumps {
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 10 bits, x in the
-  /// lowest ones. Its radius about the line between them is step * radius[k]. Its number is that of
-  /// its segment times kNodes, and its node.
-  struct alignas(128) Clump {
-    std::array<std::array<uint32_t, kPieces>, 2> ends;
+  /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 16 bits: those of
+  /// the first are the lower halves of cells[axis][k], those of the second the upper ones. Its
+  /// radius about the line between them is step * radius[k]. Its number is that of its segment times
+  /// kNodes, and its node.
+  struct alignas(32) Clump {
+    std::array<std::array<uint32_t, kPieces>, 3> cells;
     std::array<uint32_t, kPieces> number;
-    std::array<uint8_t, kPieces> radius;
+    std::array<uint16_t, kPieces> radius;
     std::array<float, 3> low;
     float step;
   };
-  static_assert(sizeof(Clump) == 128);
+  static_assert(sizeof(Clump) == 160);
 
   Clump make(const uint32_t* first, uint32_t n) const;
 
