@@ -117,6 +117,38 @@ TEST(CurveClumps, LetThroughAllThatIsMet) {
       }
 }
 
+TEST(CurveClumps, PiecesHaveTheHitsOfTheirSegment) {
+  std::mt19937 rng(11);
+  for (const Primitive primitive : kStrands)
+    for (const float radius : {1e-4f, 1e-2f, 0.1f}) {
+      const Mesh mesh = make_curves(strands(primitive, 20, 2, 1.f, radius, 3));
+      const CurveQuery first = CurveQuery::kFirst;
+      size_t met = 0;
+      for (uint32_t i = 0; i < 400; ++i) {
+        const TestRay test = aimed(mesh, rng, i % 2 == 0 ? 1.05f : 0.2f);
+        const CurveRay ray(test.o, test.d);
+        for (uint32_t prim = 0; prim < mesh.primitive_count(); ++prim) {
+          const CurveHits whole = intersect_curve(mesh, {prim}, ray, kInf, first, 0, true);
+          CurveHits parts;
+          for (uint32_t node = 4; node < 8; ++node) {
+            const CurveHits part = intersect_curve(mesh, {prim, node}, ray, kInf, first, 0, true);
+            const CurveHits any =
+                intersect_curve(mesh, {prim, node}, ray, kInf, CurveQuery::kAny, 0, true);
+            EXPECT_EQ(part.empty(), any.empty());
+            for (const CurveHit& hit : part) parts.add(hit);
+          }
+          ASSERT_EQ(whole.empty(), parts.empty());
+          if (whole.empty()) continue;
+          ++met;
+          EXPECT_EQ(whole.begin()->t, parts.begin()->t);
+          EXPECT_EQ(whole.begin()->u, parts.begin()->u);
+          EXPECT_EQ(whole.begin()->v, parts.begin()->v);
+        }
+      }
+      EXPECT_GT(met, 50u);
+    }
+}
+
 TEST(CurveClumps, LetThroughLittleElseOfHair) {
   std::mt19937 rng(9);
   const Mesh mesh = make_curves(strands(Primitive::kCubicTube, 200, 2, 1.f, 1e-3f, 3));

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The step `sample_light`: next event estimation, one light sample a vertex.
+/// The step `sample_light`: next event estimation, one shadow ray a vertex.
 ///
 /// A light, and a point of it in direction wi, chosen with density p_light over solid angle:
 ///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bounce + p_light)
 /// (balance heuristic, Veach 1997, 9.2; w = 1 for deltas, which no bounce finds). V is the shadow
 /// ray's to find.
 #pragma once
+
+#include <cmath>
 
 #include "wavecomb/integrate/steps/bounce_sampling.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
@@ -52,20 +54,29 @@ WAVECOMB_INLINE F joint_light_weight(const Vertex<F, kFeatures>& v, const Intera
   return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
 }
 
-/// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
-/// known.
+namespace detail {
+
+/// A point of a light that a vertex may ask for.
+template <typename F>
+struct LightCandidate {
+  Vec3<F> wi;
+  F distance;
+  Color<F> c;            ///< what it brings if it is seen, over its density
+  F w;                   ///< its MIS weight, which is in c
+  Mask<F> valid;         ///< it may bring something; else c is anything
+  UInt<F> light;         ///< where somebody asks
+  UInt<F> shadow_set;    ///< of linked lights
+  ShadowReach<F> reach;  ///< of lights with effects
+};
+
+/// The point that the numbers `r` choose.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
-WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                  const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                                  const Sample4<F>& r, const GuidePlace<F>& place,
-                                  const JointVertex<F>& joint, LightReceiver<F>& receiver,
-                                  VertexResult<F>& out) {
+WAVECOMB_INLINE LightCandidate<F> light_candidate(
+    const Vertex<F, kFeatures>& v, const Interaction& at, const Frame<F>& frame, const Vec3<F>& wo,
+    const View& seen, const Sample4<F>& r, const GuidePlace<F>& place, const JointVertex<F>& joint,
+    const LightReceiver<F>& receiver, const UInt<F>& link, const Mask<F>& lit) {
   using U = UInt<F>;
   const LightView& lights = v.scene.lights;
-  const Mask<F> lit = v.active & at.bsdf.has_non_delta();
-  if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
-  // Light is gathered where reflected rays will start, so that both techniques agree.
-  receiver.p = at.origin(-v.path.dir);
   const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, lit);
   const Vec3<F> wi = frame.to_local(l.wi);
   const BsdfEval<F> e = at.bsdf.eval(seen, wi);
@@ -73,7 +84,7 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
       mixed_pdf<Bsdf, F>(v, place, l.wi, wi, wo, bounce_pdf(v, at.bsdf, wo, seen, wi, e));
   F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
-  U light(kNoLight);
+  U light(kNoLight), set(0u);
   const bool has_effects = v.has(kMeshLights) && lights.has_effects;
   if ((kFeatures & kJoined) != 0 || has_effects || v.has_links() || v.wants_lights()) [[unlikely]]
     light = chosen_light<F>(lights, receiver, r.x, lit);
@@ -90,24 +101,114 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
       reach = shadow_reach<F>(lights, effect.shadow, r.w, lit);
   }
   if (v.has_links()) [[unlikely]] {
-    w = select(shines_on<F>(lights, out.next.link, light, lit), w, F(0.f));
-    out.shadow_set = shadow_set<F>(lights, light, lit);
+    w = select(shines_on<F>(lights, link, light, lit), w, F(0.f));
+    set = shadow_set<F>(lights, light, lit);
   }
-  const Color<F> c =
-      clean<F>(at.throughput * f_cos * l.weight * w, clamp_limit(v.settings, v.depth + 1));
-  out.has_shadow = lit & l.valid & at.is_consistent(l.wi, wi) & (max_component(c) > 0.f);
-  out.direct = c;
+  return {l.wi,
+          l.distance,
+          at.throughput * f_cos * l.weight * w,
+          w,
+          lit & l.valid & at.is_consistent(l.wi, wi),
+          light,
+          set,
+          reach};
+}
+
+/// How many points of lights a vertex on a fibre looks at.
+inline constexpr uint32_t kFibreCandidates = 3;
+
+/// One of several points, x_i, chosen by the brightness g of what each brings if it is seen, c_i:
+///   c = c_k sum_i g_i / (n g_k),   k with probability g_k / sum_i g_i
+/// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for Global
+/// Illumination", 2005). Its mean is that of one point for any densities and weights in c, so MIS
+/// keeps those of one. Where rays are dear, as among strands, a shadow ray to the lamp that counts
+/// is worth three evaluations (docs/decisions/light-candidates.md). `first` is of the numbers `r`;
+/// the others' are r moved: over all lights evenly, and on them by the lattice of R2 (M. Roberts,
+/// "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+template <typename F, typename Candidate>
+WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
+                                           const Candidate& candidate) {
+  using U = UInt<F>;
+  constexpr float kN = kFibreCandidates, kSteps[2] = {0.7548777f, 0.5698403f};
+  const auto brightness = [](const LightCandidate<F>& one) {
+    return select(one.valid, luminance(clean<F>(one.c, 0.f)), F(0.f));
+  };
+  const auto moved = [](const F& x, float by) {
+    const F y = x + (by - std::floor(by));
+    return select(y < 1.f, y, F(y - 1.f));
+  };
+  LightCandidate<F> kept = first;
+  F g = brightness(first), sum = g;
+  for (uint32_t k = 1; k < kFibreCandidates; ++k) {
+    const auto n = static_cast<float>(k);
+    const LightCandidate<F> other = candidate(Sample4<F>{
+        moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
+    const F h = brightness(other);
+    sum += h;
+    // One number does for all: what is left of it is as even.
+    const F q = select(h > 0.f, F(h / select(h > 0.f, sum, F(1.f))), F(0.f));
+    const Mask<F> takes = u < q;
+    u = select(takes, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));
+    g = select(takes, h, g);
+    kept.wi = select<F>(takes, other.wi, kept.wi);
+    kept.distance = select(takes, other.distance, kept.distance);
+    kept.c = select<F>(takes, other.c, kept.c);
+    kept.w = select(takes, other.w, kept.w);
+    kept.valid = (takes & other.valid) | (not_(takes) & kept.valid);
+    kept.light = select(Mask<U>(takes), other.light, kept.light);
+    kept.shadow_set = select(Mask<U>(takes), other.shadow_set, kept.shadow_set);
+    kept.reach.distance = select(takes, other.reach.distance, kept.reach.distance);
+    kept.reach.color = select<F>(takes, other.reach.color, kept.reach.color);
+  }
+  kept.c = kept.c * F(sum / select(g > 0.f, F(g * kN), F(1.f)));
+  return kept;
+}
+
+/// The random number that points are chosen with; none of the sampler's.
+template <typename F>
+inline F candidate_number(const SampleKey<F>& key, uint32_t depth) {
+  using U = UInt<F>;
+  return unit_float<F>(hash_u32<U>(key.pixel_hash, U(key.sample + 0x7f4a7c15u * (depth + 1))));
+}
+
+}  // namespace detail
+
+/// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
+/// known.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
+WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                  const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
+                                  const Sample4<F>& r, const GuidePlace<F>& place,
+                                  const JointVertex<F>& joint, LightReceiver<F>& receiver,
+                                  VertexResult<F>& out) {
+  const LightView& lights = v.scene.lights;
+  const Mask<F> lit = v.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
+  // Light is gathered where reflected rays will start, so that both techniques agree.
+  receiver.p = at.origin(-v.path.dir);
+  const auto candidate = [&](const Sample4<F>& u) {
+    return detail::light_candidate<Bsdf, F>(v, at, frame, wo, seen, u, place, joint, receiver,
+                                            out.next.link, lit);
+  };
+  detail::LightCandidate<F> one = candidate(r);
+  if constexpr (Bsdf::kOnFibre)
+    if (lights.count > 1)
+      one = detail::resample<F>(one, r, detail::candidate_number<F>(v.key, v.depth), candidate);
+  out.direct = clean<F>(one.c, clamp_limit(v.settings, v.depth + 1));
+  out.has_shadow = one.valid & (max_component(out.direct) > 0.f);
+  if (v.has_links()) [[unlikely]]
+    out.shadow_set = one.shadow_set;
   if (v.wants_lights()) {
-    v.aovs->lit_by = light;
+    v.aovs->lit_by = one.light;
     v.aovs->lit_at = receiver.p;
-    v.aovs->light_weight = w;
+    v.aovs->light_weight = one.w;
   }
-  out.shadow_o = at.origin(l.wi);
-  out.shadow_d = l.wi;
-  out.shadow_tfar = l.distance * kShadowReach;
-  if (has_effects) [[unlikely]] {
-    out.shadow_tfar = min(out.shadow_tfar, reach.distance);
-    out.shade = reach.color;
+  out.shadow_o = at.origin(one.wi);
+  out.shadow_d = one.wi;
+  out.shadow_tfar = one.distance * kShadowReach;
+  if (v.has(kMeshLights) && lights.has_effects) [[unlikely]] {
+    out.shadow_tfar = min(out.shadow_tfar, one.reach.distance);
+    out.shade = one.reach.color;
   }
 }
 
