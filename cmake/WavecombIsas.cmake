@@ -34,6 +34,10 @@ endif()
 Python_add_library(wavecomb_cpu MODULE "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
 target_compile_definitions(wavecomb_cpu PRIVATE Py_LIMITED_API=0x030A0000)
 target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  # It calls nothing of libc itself, and auditwheel asks which one it is for.
+  target_link_libraries(wavecomb_cpu PRIVATE "-Wl,--push-state,--no-as-needed" -l:libc.so.6 "-Wl,--pop-state")
+endif()
 set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden
   PREFIX "" SUFFIX ".abi3${CMAKE_SHARED_MODULE_SUFFIX}")
 install(TARGETS wavecomb_cpu LIBRARY DESTINATION wavecomb COMPONENT python)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +20,7 @@ from wavecomb.picture.image import read_layers
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sdist")
-    with tarfile.open(package("wavecomb-*.tar.gz")) as archive:
-        archive.extractall(folder, filter="data")
+    shutil.unpack_archive(package("wavecomb-*.tar.gz"), folder)
     (unpacked,) = folder.iterdir()
     return unpacked
 
