@@ -15,6 +15,8 @@ ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
 WHEEL := build/wheel
 VENV := .venv/bin
+# Of make wheels: portable, or a list of instruction sets as of WAVECOMB_ISAS.
+ISAS ?= portable
 # Of make fuzz.
 MINUTES ?= 10
 SEED ?= 1
@@ -31,15 +33,15 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-naive wheel render docs test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel bench lint format clean
+.PHONY: help setup setup-test build build-naive wheels sdist render docs test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel test-sdist bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # ---- set-up and build --------------------------------------------------------------------------------
 
-build/.setup: tools/setup tools/setup_embree tools/setup_openvdb cmake/embree_probe.cpp cmake/openvdb_probe.cpp constraints.txt \
-  pyproject.toml
+build/.setup: tools/setup tools/setup_embree tools/setup_openvdb tools/debs cmake/embree_probe.cpp cmake/openvdb_probe.cpp \
+  constraints.txt pyproject.toml
 	@mkdir -p build && $(LOCK) tools/setup && touch $@
 
 build/.setup-test: build/.setup
@@ -64,13 +66,22 @@ setup: build/.setup ## Install what building needs (system packages, .venv, Embr
 setup-test: build/.setup-test
 build: build/.built ## Build the core and the Python module into .venv (editable)
 
-# Dependencies are what their wheels bring; Embree travels in this one where it is staged.
-wheel: build/.setup ## A wheel for other machines in dist/: a native library for each instruction set
-	@echo "wheel: a library for each instruction set"
-	@rm -f dist/wavecomb-*.whl
-	@$(LOCK) $(VENV)/python -m pip wheel -q --no-build-isolation --no-deps -w dist . --config-settings=build-dir=$(WHEEL) \
-	  --config-settings=cmake.define.WAVECOMB_ISAS=portable
+# Dependencies are what their wheels bring; Embree travels in this one where it is staged. auditwheel copies nothing: what it
+# would find in the system travels already.
+wheels: build/.setup ## The wheel to pass on, in dist/: every instruction set and Python, tagged and checked by auditwheel
+	@$(VENV)/python -c 'import auditwheel' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'auditwheel>=6.8'
+	@echo "wheels: a library for each instruction set"
+	@rm -rf $(WHEEL)/raw dist/wavecomb-*.whl
+	@$(LOCK) $(VENV)/python -m pip wheel -q --no-build-isolation --no-deps -w $(WHEEL)/raw . \
+	  --config-settings=build-dir=$(WHEEL) --config-settings=cmake.define.WAVECOMB_ISAS="$(ISAS)"
+	@LD_LIBRARY_PATH=.venv/lib $(VENV)/auditwheel repair --plat auto -w dist $(WHEEL)/raw/wavecomb-*.whl --exclude libtbb.so.12 --exclude libembree4.so.4 \
+	  $$($(VENV)/python -m zipfile -l $(WHEEL)/raw/wavecomb-*.whl | sed -n 's|^wavecomb/lib/\(lib[^ /]*\) .*|--exclude \1|p')
 	@ls dist/wavecomb-*.whl
+
+sdist: build/.setup ## The source distribution, in dist/
+	@rm -f dist/wavecomb-*.tar.gz
+	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
+	@ls dist/wavecomb-*.tar.gz
 
 # ---- use -----------------------------------------------------------------------------------------------
 
@@ -135,10 +146,15 @@ test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 50
 	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
 
-test-wheel: wheel ## Install that wheel into a fresh environment and render with each of its libraries
+# Of a machine that has no compiler either: tests/packaging/test_empty_root.py.
+test-wheel: wheels ## Install that wheel into a fresh environment and an empty root; render with each of its libraries
 	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv
-	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pytest dist/wavecomb-*.whl
-	$(WHEEL)/venv/bin/python -m pytest -q tests/python/test_isa.py tests/python/test_cli.py
+	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pip pytest dist/wavecomb-*.whl
+	$(WHEEL)/venv/bin/python -m pytest -q tests/python/test_isa.py tests/python/test_cli.py tests/packaging/test_wheel.py \
+	  tests/packaging/test_empty_root.py
+
+test-sdist: sdist build/.setup-test ## Build the source distribution in a folder of its own, and render
+	$(VENV)/python -m pytest -q tests/packaging/test_sdist.py
 
 test-py-fast: build-naive build/.setup-test
 	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"

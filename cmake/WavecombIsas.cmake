@@ -31,9 +31,15 @@ if(NOT WAVECOMB_HAS_CPU_LEVELS)
 endif()
 
 # The probe runs on every CPU: the compiler's baseline, the C interface of Python, no library but libc.
-Python_add_library(wavecomb_cpu MODULE WITH_SOABI "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
+Python_add_library(wavecomb_cpu MODULE "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
+target_compile_definitions(wavecomb_cpu PRIVATE Py_LIMITED_API=0x030A0000)
 target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)
-set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden)
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  # It calls nothing of libc itself, and auditwheel asks which one it is for.
+  target_link_libraries(wavecomb_cpu PRIVATE "-Wl,--push-state,--no-as-needed" -l:libc.so.6 "-Wl,--pop-state")
+endif()
+set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden
+  PREFIX "" SUFFIX ".abi3${CMAKE_SHARED_MODULE_SUFFIX}")
 install(TARGETS wavecomb_cpu LIBRARY DESTINATION wavecomb COMPONENT python)
 
 add_custom_target(wavecomb_python DEPENDS wavecomb_cpu)

@@ -9,6 +9,29 @@ execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
   OUTPUT_VARIABLE nanobind_ROOT OUTPUT_STRIP_TRAILING_WHITESPACE)
 find_package(nanobind CONFIG REQUIRED)
 
+# One file for every Python from 3.10 on: the stable ABI, with nanobind itself in the wheel nanobind-backend. With libc++
+# that does not work but on macOS (nb_defs.h says why): nanobind is linked in there, for this Python alone.
+check_cxx_source_compiles("#include <version>
+#ifndef _LIBCPP_VERSION
+#error no
+#endif
+int main() { return 0; }" WAVECOMB_HAS_LIBCXX)
+set(WAVECOMB_PYTHON_ABI 3.10)
+if(WAVECOMB_HAS_LIBCXX AND NOT APPLE)
+  set(WAVECOMB_PYTHON_ABI "")
+endif()
+
+# wavecomb_nanobind_module(NAME ARGUMENTS...): as nanobind_add_module.
+function(wavecomb_nanobind_module name)
+  if(WAVECOMB_PYTHON_ABI)
+    nanobind_add_module(${name} BACKEND_MODULE nanobind_backend STABLE_ABI_VERSION ${WAVECOMB_PYTHON_ABI}
+      NB_SUPPRESS_WARNINGS ${ARGN})
+    set_target_properties(${name} PROPERTIES SUFFIX ".abi3${CMAKE_SHARED_MODULE_SUFFIX}")
+  else()
+    nanobind_add_module(${name} NB_STATIC NB_SUPPRESS_WARNINGS ${ARGN})
+  endif()
+endfunction()
+
 file(GLOB binding_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/*.cpp")
 if(NOT binding_sources)
   message(FATAL_ERROR "bindings/ holds no *.cpp: there is no Python module to build.")
@@ -37,7 +60,7 @@ endif()
 
 # wavecomb_add_module(NAME CORE FLAGS FOLDER): wavecomb/FOLDER/_core on top of the core library CORE.
 function(wavecomb_add_module name core flags folder)
-  nanobind_add_module(${name} NB_STATIC NB_SUPPRESS_WARNINGS ${binding_sources})
+  wavecomb_nanobind_module(${name} ${binding_sources})
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
   target_precompile_headers(${name} PRIVATE ${wavecomb_pch} <nanobind/nanobind.h> <nanobind/ndarray.h>)

@@ -4,7 +4,7 @@
 message(STATUS "OpenVDB ${OpenVDB_VERSION} (${OpenVDB_LIBRARY})")
 
 file(GLOB _vdb_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/vdb/*.cpp")
-nanobind_add_module(wavecomb_vdb NB_STATIC NOMINSIZE NB_SUPPRESS_WARNINGS ${_vdb_sources})
+wavecomb_nanobind_module(wavecomb_vdb NOMINSIZE ${_vdb_sources})
 target_link_libraries(wavecomb_vdb PRIVATE wavecomb_common OpenVDB::openvdb TBB::tbb)
 set(_vdb_rpath "$ORIGIN" "$ORIGIN/lib")
 if(WAVECOMB_TBB_IS_WHEEL)
