@@ -91,7 +91,7 @@ TEST(VolumeMotion, CellsBoundWhateverComesBy) {
     v = moving(v, field, -0.2f, 0.4f);
     const VolumeRecord r = make_volume_record(v);
     double filled = 0, bound = 0;
-    std::uniform_real_distribution<float> at(-0.5f, 1.5f);
+    std::uniform_real_distribution<float> at(-1.5f, 2.5f);
     for (int i = 0; i < 40000; ++i) {
       const Vec3<float> p{at(rng), at(rng), at(rng)};
       const float time = value(rng);
@@ -118,8 +118,8 @@ TEST(VolumeMotion, CellsBoundWhateverComesBy) {
           glow_at<float>(r, bricks_point<float>(r.glow_cells.to_bricks, p), time, true).z;
       EXPECT_LE(glow, glows ? brightest * 1.0001f : 0.f);
     }
-    EXPECT_GT(filled, 300);
-    EXPECT_LT(bound, 30000);
+    EXPECT_GT(filled, 100);
+    EXPECT_LT(bound, 8000);
   }
 }
 
@@ -130,7 +130,7 @@ TEST(VolumeMotion, WhatStandsStillKeepsItsCells) {
       1);
   const auto calm =
       make_wind(16, [](int x, int, int) { return Vec3<float>(x == 15 ? 1.f : 0.f, 0.f, 0.f); });
-  v = moving(v, between(calm, 16, 2, 3), -1, 1);
+  v = moving(v, between(calm, 16, 20, 21), -1, 1);
   const MovedCells& cells = v.motion->density();
   const GridView grid = v.density.grid->view();
   EXPECT_EQ(cells.first, (std::array{0., 0., 0.}));

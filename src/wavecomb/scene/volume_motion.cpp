@@ -209,12 +209,19 @@ class MovedField {
   MovedCells space() const {
     const WideBox way = drift_in(velocity_.within(velocity_.table()));
     const WideBox windy = image_of(from_velocity_, velocity_.table());
+    WideBox beyond{};
+    bool meets = true;
+    for (size_t k = 0; k < 3; ++k) {
+      beyond.lo[k] = std::max(way.lo[k], windy.lo[k]);
+      beyond.hi[k] = std::min(grid_.size[k] + way.hi[k], windy.hi[k]);
+      meets = meets && beyond.lo[k] < beyond.hi[k];
+    }
     MovedCells cells;
     std::array<double, 3> end{};
     for (size_t k = 0; k < 3; ++k) {
       const double size = grid_.size[k];
-      cells.first[k] = std::floor(std::min(0.0, std::max(way.lo[k], windy.lo[k])));
-      end[k] = std::ceil(std::max(size, std::min(size + way.hi[k], windy.hi[k])));
+      cells.first[k] = meets ? std::floor(std::min(0.0, beyond.lo[k])) : 0.0;
+      end[k] = meets ? std::ceil(std::max(size, beyond.hi[k])) : size;
     }
     const auto count = [&](size_t k) { return std::ceil((end[k] - cells.first[k]) / cells.edge); };
     while (count(0) * count(1) * count(2) > kMostCells) cells.edge *= 2;
