@@ -27,7 +27,8 @@ struct PlacedVoxels {
 };
 
 PlacedVoxels make_grid(const Array<int32_t>& origins, const AnyArray& values,
-                       const AnyArray& index_to_object, float background, const std::string& name) {
+                       const AnyArray& index_to_object, float background, const std::string& name,
+                       bool is_signed) {
   const size_t n = values.ndim() > 0 ? values.shape(0) : 0;
   const bool is_single = values.ndim() == 4, is_colour = values.ndim() == 5 && values.shape(4) == 3;
   bool fits = origins.ndim() == 2 && origins.shape(1) == 3 && origins.shape(0) == n &&
@@ -42,6 +43,7 @@ PlacedVoxels make_grid(const Array<int32_t>& origins, const AnyArray& values,
   bricks.origins = {origins.data(), origins.size()};
   bricks.components = is_colour ? 3 : 1;
   bricks.background = background;
+  bricks.is_signed = is_signed;
   const bool is_half = values.dtype().code == static_cast<uint8_t>(nb::dlpack::dtype_code::Float) &&
                        values.dtype().bits == 16;
   if (is_half)
@@ -64,21 +66,28 @@ uint32_t add_volume(SceneBuilder& builder, const AnyArray& to_world,
                     const std::optional<PlacedVoxels>& density,
                     const std::optional<PlacedVoxels>& color,
                     const std::optional<PlacedVoxels>& emission_grid,
-                    const std::optional<Corners>& bounds, const Color3& extinction,
-                    const Color3& albedo, const Color3& emission, float anisotropy,
-                    const std::string& name) {
+                    const std::optional<PlacedVoxels>& velocity,
+                    const std::array<float, 2>& seconds, const std::optional<Corners>& bounds,
+                    const Color3& extinction, const Color3& albedo, const Color3& emission,
+                    float anisotropy, const std::string& name) {
   Volume v;
   v.name = name;
   if (density) v.density = density->field;
   if (color) v.color = color->field;
   if (emission_grid) v.glow = emission_grid->field;
+  if (velocity) v.velocity = velocity->field;
+  v.seconds = seconds;
   if (bounds) v.box = {vec3(std::get<0>(*bounds)), vec3(std::get<1>(*bounds))};
   v.to_world = affine(to_world);
   v.extinction = vec3(extinction);
   v.albedo = vec3(albedo);
   v.emission = vec3(emission);
   v.anisotropy = anisotropy;
-  return builder.add_volume(std::move(v));
+  if (!v.moves()) return builder.add_volume(std::move(v));
+  const nb::gil_scoped_release release;
+  uint32_t number = 0;
+  with_threads(0, [&] { number = builder.add_volume(std::move(v)); });
+  return number;
 }
 
 }  // namespace
@@ -87,7 +96,7 @@ void bind_volumes(nb::module_& m) {
   using namespace nb::literals;
   nb::class_<PlacedVoxels>(m, "VolumeGrid")
       .def(nb::new_(&make_grid), "origins"_a, "values"_a, "index_to_object"_a, "background"_a = 0.f,
-           "name"_a = "")
+           "name"_a = "", "is_signed"_a = false)
       .def_prop_ro("bricks", [](const PlacedVoxels& g) { return g.field.grid->brick_count(); })
       .def_prop_ro("bytes", [](const PlacedVoxels& g) { return g.field.grid->bytes(); });
   m.def("walk_albedo", &single_albedo, "color"_a, "anisotropy"_a);
@@ -96,7 +105,8 @@ void bind_volumes(nb::module_& m) {
 void def_volumes(nb::class_<SceneBuilder>& builder) {
   using namespace nb::literals;
   builder.def("add_volume", &add_volume, "to_world"_a, nb::kw_only(), "density"_a = nb::none(),
-              "color"_a = nb::none(), "emission_grid"_a = nb::none(), "bounds"_a = nb::none(),
+              "color"_a = nb::none(), "emission_grid"_a = nb::none(), "velocity"_a = nb::none(),
+              "seconds"_a = std::array<float, 2>{0.f, 0.f}, "bounds"_a = nb::none(),
               "extinction"_a = Color3{1.f, 1.f, 1.f}, "albedo"_a = Color3{0.5f, 0.5f, 0.5f},
               "emission"_a = Color3{0.f, 0.f, 0.f}, "anisotropy"_a = 0.f, "name"_a = "");
 }

@@ -147,9 +147,10 @@ class RecordingBuilder(Recorded):
         index_to_object: NDArray[np.float64],
         background: float = 0.0,
         name: str = "",
+        is_signed: bool = False,
     ) -> _Grid:
         """A grid for ``add_volume``, which keeps it."""
-        native = _core.VolumeGrid(origins, values, index_to_object, background, name)
+        native = _core.VolumeGrid(origins, values, index_to_object, background, name, is_signed)
         arrays = {"origins": origins, "values": values, "background": background,
                   "index_to_object": np.asarray(index_to_object, np.float64)}  # fmt: skip
         return _Grid(native, arrays)

@@ -27,6 +27,7 @@ class VolumeGrid:
         index_to_object: (4, 4), from indices to the volume's own space, as USD has it (rows).
         background: Where there is no brick.
         name: For messages.
+        is_signed: Values may be below 0: velocities.
 
     Raises Error for values that are negative or not finite, bricks that are doubled or not at
     multiples of 8, and grids too large to be numbered.
@@ -39,6 +40,7 @@ class VolumeGrid:
         index_to_object: NDArray[Any],
         background: float = 0.0,
         name: str = "",
+        is_signed: bool = False,
     ) -> None: ...
     @property
     def bricks(self) -> int:
@@ -442,6 +444,8 @@ class SceneBuilder:
         density: VolumeGrid | None = None,
         color: VolumeGrid | None = None,
         emission_grid: VolumeGrid | None = None,
+        velocity: VolumeGrid | None = None,
+        seconds: tuple[float, float] = (0, 0),
         bounds: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None,
         extinction: tuple[float, float, float] = (1, 1, 1),
         albedo: tuple[float, float, float] = (0.5, 0.5, 0.5),
@@ -452,8 +456,10 @@ class SceneBuilder:
         """A volume: extinction * density per unit of world length, of which albedo * color is
         scattered by Henyey and Greenstein's phase function of mean cosine ``anisotropy``, and
         radiance emission * emission_grid (or * density) per unit of world length. Without a density
-        grid it is 1 all over the box ``bounds``, of the volume's own space. ``to_world``: (4, 4),
-        rows. Volumes may overlap. Raises Error that names the volume."""
+        grid it is 1 all over the box ``bounds``, of the volume's own space. ``velocity``: a grid of
+        three components with signs, of the volume's own space over a second: what is at p is what
+        the grids have at p - v(p) t, with t from ``seconds``, where the shutter opens and closes.
+        ``to_world``: (4, 4), rows. Volumes may overlap. Raises Error that names the volume."""
     def add_ies(
         self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]
     ) -> int:

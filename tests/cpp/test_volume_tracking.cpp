@@ -7,6 +7,7 @@
 #include "wavecomb/medium/henyey_greenstein.h"
 #include "wavecomb/medium/tracking.h"
 #include "wavecomb/medium/volume_bsdf.h"
+#include "wavecomb/medium/volume_emission.h"
 
 namespace wavecomb {
 namespace {
@@ -192,8 +193,9 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
       expect_means(means_of(40000,
                             [&](const SampleKey<float>& key) {
                               const Passage<float> p{SamplerKind::kIndependent, key, 2, o, d, t};
-                              return transmittance_through<float>(
-                                  r.view, Way<float>(p, VertexSet::kShadow), o, d, t, true, counts);
+                              const Way<float> way(p, VertexSet::kShadow);
+                              return transmittance_through<float>(r.view, way, o, d, t, 0.f, true,
+                                                                  counts);
                             }),
                    {std::exp(-depth[0]), std::exp(-depth[1]), std::exp(-depth[2])}, c.name);
     }
@@ -308,7 +310,7 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
                                   r.view, 0,
                                   Way<float>({SamplerKind::kIndependent, key, 1, o, d, t},
                                              VertexSet::kFlight),
-                                  o, d, t, true, counts);
+                                  o, d, t, 0.f, true, counts);
                             }),
                    expected, c.name);
     }

@@ -10,8 +10,8 @@ using namespace volume_testing;
 using namespace wave_testing;
 
 /// Smoke of a coarse random grid with a tint and a glow, over a floor, under a lamp and a dome, and
-/// a coloured box that overlaps it.
-std::shared_ptr<const Scene> smoky() {
+/// a coloured box that overlaps it. The smoke may move while the shutter is open.
+std::shared_ptr<const Scene> smoky(bool moves) {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f}));
   const uint32_t glass = b.add_material(make_material(ProgramId::kDielectric, {1, 1, 1}));
@@ -35,6 +35,13 @@ std::shared_ptr<const Scene> smoky() {
   smoke.albedo = {0.9f, 0.8f, 0.7f};
   smoke.emission = {0.3f, 0.2f, 0.1f};
   smoke.anisotropy = 0.6f;
+  if (moves) {
+    smoke.velocity = between(
+        make_wind(16, [&](int, int,
+                          int) { return Vec3<float>(value(rng), value(rng) - 0.5f, -value(rng)); }),
+        16, -2, 2);
+    smoke.seconds = {-0.3f, 0.6f};
+  }
   b.add_volume(smoke);
   Volume box = make_box({-2, 0, -2}, {0.5f, 1.5f, 2}, {0.2f, 0.5f, 0.9f});
   box.anisotropy = -0.3f;
@@ -58,8 +65,11 @@ Settings volume_settings(uint32_t width, uint32_t height, uint32_t spp, uint32_t
   return s;
 }
 
-TEST(Volumes, AreOnePicture) {
-  const auto scene = smoky();
+class OnePicture : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(OfVolumes, OnePicture, testing::Bool());
+
+TEST_P(OnePicture, WhateverRendersIt) {
+  const auto scene = smoky(GetParam());
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 1u);
   Settings s = volume_settings(13, 9, 5, 6);
   s.aovs.bits |= Aov::kDirect | Aov::kIndirect | Aov::kTransmittance | Aov::kHalfDepth |
@@ -117,7 +127,7 @@ TEST(Volumes, FurnaceGainsAndLosesNothing) {
 }
 
 TEST(Volumes, FillTheSceneAndHaveMaterialsOfTheirOwn) {
-  const auto scene = smoky();
+  const auto scene = smoky(false);
   EXPECT_EQ(scene->volumes().size(), 2u);
   EXPECT_EQ(scene->materials().size(), 5u);
   EXPECT_EQ(scene->view().volumes.first_material, 3u);

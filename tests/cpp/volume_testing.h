@@ -42,6 +42,30 @@ inline std::shared_ptr<const VolumeGrid> make_grid(int size, const Voxels& value
       GridBricks{"grid", origins, voxels, halves, components, 0.f});
 }
 
+/// Velocities value(x, y, z) at the voxels 0 <= x, y, z < size, a multiple of 8.
+inline std::shared_ptr<const VolumeGrid> make_wind(
+    int size, const std::function<Vec3<float>(int, int, int)>& value, bool is_half = false) {
+  std::vector<int32_t> origins;
+  std::vector<float> voxels;
+  std::vector<uint16_t> halves;
+  for (int x = 0; x < size; x += 8)
+    for (int y = 0; y < size; y += 8)
+      for (int z = 0; z < size; z += 8) {
+        origins.insert(origins.end(), {x, y, z});
+        for (int i = 0; i < 512; ++i) {
+          const Vec3<float> v = value(x + i / 64, y + i / 8 % 8, z + i % 8);
+          for (const float c : {v.x, v.y, v.z})
+            if (is_half)
+              halves.push_back(float_to_half(c));
+            else
+              voxels.push_back(c);
+        }
+      }
+  GridBricks bricks{"wind", origins, voxels, halves, 3, 0.f};
+  bricks.is_signed = true;
+  return std::make_shared<const VolumeGrid>(bricks);
+}
+
 /// Voxels 0 ... size - 1 between lo and hi along each axis.
 inline VolumeField between(std::shared_ptr<const VolumeGrid> grid, int size, float lo, float hi) {
   const float step = (hi - lo) / static_cast<float>(size - 1);

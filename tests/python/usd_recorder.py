@@ -170,11 +170,12 @@ class Recorder:
         self.lights.append({"kind": kind, "transform": np.asarray(transform), **options})
         return len(self.lights) - 1
 
-    def make_volume_grid(self, origins, values, index_to_object, background=0.0, name=""):
+    def make_volume_grid(self, origins, values, index_to_object, background=0.0, name="",
+                         is_signed=False):  # fmt: skip
         assert origins.dtype == np.int32 and origins.shape == (len(values), 3)
         assert values.dtype in (np.float16, np.float32) and values.flags.c_contiguous
         assert values.shape[1:] in ((8, 8, 8), (8, 8, 8, 3)) and np.isfinite(values).all()
-        assert (values >= 0).all() and (origins % 8 == 0).all()
+        assert (is_signed or (values >= 0).all()) and (origins % 8 == 0).all()
         assert len(np.unique(origins, axis=0)) == len(origins)
         assert index_to_object.shape == (4, 4) and background >= 0
         self.grids.append(
@@ -183,19 +184,21 @@ class Recorder:
                 "values": values,
                 "matrix": index_to_object,
                 "background": background,
+                "signed": is_signed,
             }
         )
         return len(self.grids) - 1
 
-    def add_volume(self, *, to_world, density=None, color=None, emission_grid=None, bounds=None,
-                   **options):  # fmt: skip
+    def add_volume(self, *, to_world, density=None, color=None, emission_grid=None, velocity=None,
+                   bounds=None, **options):  # fmt: skip
         assert np.shape(to_world) == (4, 4) and (density is None) != (bounds is None)
         grids = [
-            None if one is None else self.grids[one] for one in (density, color, emission_grid)
+            None if one is None else self.grids[one]
+            for one in (density, color, emission_grid, velocity)
         ]
         self.volumes.append(
             {"to_world": to_world, "density": grids[0], "color": grids[1], "glow": grids[2],
-             "bounds": bounds, **options}
+             "velocity": grids[3], "bounds": bounds, **options}
         )  # fmt: skip
         return len(self.volumes) - 1
 

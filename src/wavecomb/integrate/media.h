@@ -38,7 +38,8 @@ struct Passage {
   const SampleKey<F>& key;
   uint32_t depth;
   const Vec3<F>&o, &d;
-  const F& t;  ///< infinite where the scene ends
+  const F& t;   ///< infinite where the scene ends
+  F time{0.f};  ///< of the shutter, where something moves
 };
 
 /// What becomes of a path on a passage.

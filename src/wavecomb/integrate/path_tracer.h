@@ -101,11 +101,11 @@ class PathTracer {
         const Flight<F> flight = fly(key, depth, path, hit);
         if constexpr (Media::kShines)
           if (media_.shines())
-            add_glow(
-                clean<F>(path.throughput *
-                             media_.template emission<F>(
-                                 {settings_.sampler, key, depth, path.o, path.dir, hit.t}, true),
-                         clamp_limit(settings_, depth)));
+            add_glow(clean<F>(
+                path.throughput *
+                    media_.template emission<F>(
+                        {settings_.sampler, key, depth, path.o, path.dir, hit.t, time}, true),
+                clamp_limit(settings_, depth)));
         path.throughput = path.throughput * flight.weight;
         note_way(depth, flight, path.throughput);
         if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
@@ -213,8 +213,9 @@ class PathTracer {
       if (context_.knows_inside())
         return media_.fly_inside(key, depth, settings_.sampler, rays_.keys(), rays_.time(), path,
                                  hit, inside_);
-    return media_.template fly<F>({settings_.sampler, key, depth, path.o, path.dir, hit.t},
-                                  path.throughput, true);
+    return media_.template fly<F>(
+        {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()}, path.throughput,
+        true);
   }
 
   void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {
@@ -252,21 +253,21 @@ class PathTracer {
     return {material - scene.volumes.first_material, 0, material, false};
   }
 
-  /// What the shadow ray of `v` brings, of a light of `group`: if free, as much as comes through,
-  /// else what the shadow's colour leaves.
+  /// What the shadow ray of `v` brings, of a light of `group`: as much as comes through volumes,
+  /// if it is free and through what fills meshes, else as the shadow's colour leaves of that.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;
     if constexpr (Media::kAny) {
       const F t = v.shadow_tfar * (1.f / kShadowReach);
       c = c * media_.template transmittance<F>(
-                  {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t}, true);
+                  {settings_.sampler, key, depth, v.shadow_o, v.shadow_d, t, rays_.time()}, true);
       if constexpr (Media::kStreams)
-        if (context_.knows_inside())
+        if (is_free && context_.knows_inside())
           c = c *
               media_.pass_inside(rays_.keys(), rays_.time(), inside_, v.shadow_o, v.shadow_d, t);
     }
-    if (!is_free) c = v.direct * v.shade;
+    if (!is_free) c = c * v.shade;
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
     if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Free flights, transmittance and emission along ways through volumes.
+/// Free flights and transmittance along ways through volumes.
 ///
 /// Null-scattering (Miller, Georgiev and Jarosz, "A null-scattering path integral formulation of
 /// light transport", 2019): extinction is filled up with collisions that change nothing, to a
@@ -13,6 +13,7 @@
 #pragma once
 
 #include "wavecomb/medium/even_flights.h"
+#include "wavecomb/medium/moved_lookup.h"
 #include "wavecomb/medium/ways.h"
 
 namespace wavecomb {
@@ -36,6 +37,28 @@ struct Way {
   }
 };
 
+namespace detail {
+
+/// Seconds at which the lanes of a visitor look at a volume that moves.
+template <typename F>
+class WaySeconds {
+ public:
+  /// `times`: Ways::times.
+  WaySeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
+  void start(const UInt<F>& way, const Mask<F>& lanes) {
+    if (v_.moves && times_)
+      seconds_ = select(lanes, seconds_at<F>(v_, gather<F>(times_, way, lanes)), seconds_);
+  }
+  const F& operator()() const { return seconds_; }
+
+ private:
+  const VolumeRecord& v_;
+  const float* times_;
+  F seconds_{0.f};
+};
+
+}  // namespace detail
+
 // ---- flights -----------------------------------------------------------------------------------
 
 namespace detail {
@@ -46,8 +69,10 @@ class FlightVisitor {
   using U = UInt<F>;
 
  public:
-  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightKeeps keeps)
-      : v_(v), material_(material), flights_(flights), keeps_(keeps) {}
+  /// `times`: Ways::times.
+  FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightKeeps keeps,
+                const float* times)
+      : v_(v), seconds_(v, times), material_(material), flights_(flights), keeps_(keeps) {}
 
   void start(const U& way, const Mask<F>& lanes) {
     const U hero = gather<U>(flights_.hero, way, Mask<U>(lanes));
@@ -56,10 +81,11 @@ class FlightVisitor {
     of_hero_ = select(lanes, own, of_hero_);
     ratio_ = select<F>(lanes, Color<F>(F(1.f)), ratio_);
     stopped_ = stopped_ & not_(lanes);
+    seconds_.start(way, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& x, const Vec3<F>& p, const F& majorant,
                   CollisionNumbers<F>& numbers) {
-    const F density = grid_value<F>(v_.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
+    const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
     const F real = min(F(density * of_hero_), F(1.f));
     const Mask<F> stops = lanes & (numbers.next(lanes) < real);
     if (!v_.is_grey) {
@@ -91,6 +117,7 @@ class FlightVisitor {
 
  private:
   const VolumeRecord& v_;
+  WaySeconds<F> seconds_;
   uint32_t material_;
   const Flights& flights_;
   FlightKeeps keeps_;
@@ -108,8 +135,8 @@ template <typename F>
 inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, const Flights& flights,
                    FlightKeeps keeps, VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[i];
-  FlightVisitor<F> visitor(v, volumes.first_material + i, flights, keeps);
-  each_collision<F>(v.density, v.most_extinction, i, ways, counts, visitor);
+  FlightVisitor<F> visitor(v, volumes.first_material + i, flights, keeps, ways.times);
+  each_collision<F>(flown_cells(v), v.most_extinction, i, ways, counts, visitor);
 }
 
 }  // namespace detail
@@ -181,7 +208,7 @@ inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
   using U = UInt<F>;
   constexpr size_t kLanes = kWidth<F>;
   const Way<F> way(p, VertexSet::kFlight);
-  const PacketWays<F> packet(p.o, p.d, p.t, way.seed, way.r.z, active);
+  const PacketWays<F> packet(p.o, p.d, p.t, way.seed, way.r.z, p.time, active);
   alignas(64) float t[kLanes], ratio[3][kLanes], scale[3][kLanes], scratch[2 * kLanes];
   alignas(64) uint32_t material[kLanes], hero[kLanes];
   Ways ways = packet.ways();
@@ -214,16 +241,18 @@ class TransmittanceVisitor {
   static constexpr float kLittle = 0.1f;
 
  public:
-  TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3])
-      : v_(v), columns_(product) {}
+  /// `times`: Ways::times.
+  TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3], const float* times)
+      : v_(v), seconds_(v, times), columns_(product) {}
 
   void start(const U& way, const Mask<F>& lanes) {
     const auto column = [&](int k) { return gather<F>(columns_[k], way, lanes); };
     product_ = select<F>(lanes, Color<F>(column(0), column(1), column(2)), product_);
+    seconds_.start(way, lanes);
   }
   Mask<F> collide(const Mask<F>& lanes, const F& /*x*/, const Vec3<F>& p, const F& majorant,
                   CollisionNumbers<F>& numbers) {
-    const F density = grid_value<F>(v_.density.grid, p, lanes) / select(lanes, majorant, F(1.f));
+    const F density = density_at<F>(v_, p, seconds_(), lanes) / select(lanes, majorant, F(1.f));
     const auto kept = [&](float extinction) { return max(F(1.f - density * extinction), F(0.f)); };
     Color<F> now =
         product_ * Color<F>(kept(v_.extinction[0]), kept(v_.extinction[1]), kept(v_.extinction[2]));
@@ -240,6 +269,7 @@ class TransmittanceVisitor {
 
  private:
   const VolumeRecord& v_;
+  WaySeconds<F> seconds_;
   float* const (&columns_)[3];
   Color<F> product_{F(0.f)};
 };
@@ -258,66 +288,22 @@ inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
       pass_evenly<F>(v, ways, product, counts);
       continue;
     }
-    detail::TransmittanceVisitor<F> visitor(v, product);
-    each_collision<F>(v.density, v.most_extinction, i, ways, counts, visitor);
+    detail::TransmittanceVisitor<F> visitor(v, product, ways.times);
+    each_collision<F>(flown_cells(v), v.most_extinction, i, ways, counts, visitor);
   }
 }
 
-/// That of one way of each lane.
+/// That of one way of each lane, at `time` of the shutter.
 template <typename F>
 inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
                                       const Vec3<F>& o, const Vec3<F>& d, const F& most,
-                                      const Mask<F>& active, VolumeCounts& counts) {
-  const PacketWays<F> packet(o, d, most, way.seed, way.r.z, active);
+                                      const F& time, const Mask<F>& active, VolumeCounts& counts) {
+  const PacketWays<F> packet(o, d, most, way.seed, way.r.z, time, active);
   alignas(64) float product[3][kWidth<F>];
   for (auto& one : product) store(one, F(1.f));
   float* const columns[3] = {product[0], product[1], product[2]};
   transmittance_through<F>(volumes, packet.ways(), columns, counts);
   return {load<F>(product[0]), load<F>(product[1]), load<F>(product[2])};
-}
-
-// ---- emission ----------------------------------------------------------------------------------
-
-/// Radiance that one volume sends along a way, by a point of it with density proportional to the
-/// grid's greatest values of its cells, and the transmittance of all volumes up to there.
-template <typename F>
-inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& way,
-                            const Vec3<F>& o, const Vec3<F>& d, const F& most,
-                            const Mask<F>& active, VolumeCounts& counts) {
-  const VolumeRecord& v = volumes.volumes[index];
-  const auto each_cell = [&](const auto& visit) {
-    for (BrickWalk<F> walk(v.glow, o, d, most, active); any(walk.on());) {
-      visit(walk, F(walk.most() * (walk.leave() - walk.x())));
-      walk.next_cell(walk.on());
-    }
-  };
-  F total(0.f);
-  each_cell([&](const BrickWalk<F>& walk, const F& share) {
-    total = select(walk.on(), F(total + share), total);
-  });
-  const Mask<F> shines = active & (total > 0.f);
-  if (none(shines)) return Color<F>(F(0.f));
-  CollisionNumbers<F> numbers;
-  numbers.start(way.branch(kMostVolumes).seed, index, shines);
-  const F wanted = (index == 0 ? way.r.w : numbers.next(shines)) * total;
-  F before(0.f), x(0.f), greatest(0.f);
-  Vec3<F> p(F(0.f));
-  each_cell([&](const BrickWalk<F>& walk, const F& share) {
-    // The last cell that begins before what is wanted, so that rounding loses none.
-    const Mask<F> here = walk.on() & (share > 0.f) & (before <= wanted);
-    const F fraction = clamp(F((wanted - before) / select(here, share, F(1.f))), F(0.f), F(1.f));
-    const F at = fma(fraction, F(walk.leave() - walk.x()), walk.x());
-    x = select(here, at, x);
-    greatest = select(here, walk.most(), greatest);
-    p = select<F>(here, walk.at(at), p);
-    before = select(walk.on(), F(before + share), before);
-  });
-  const Color<F> value = grid_color<F>(v.glow.grid, p, shines);
-  const F weight = total / select(shines & (greatest > 0.f), greatest, F(1.f));
-  const Color<F> emission{F(v.emission[0]), F(v.emission[1]), F(v.emission[2])};
-  const Color<F> through =
-      transmittance_through<F>(volumes, way.branch(index), o, d, x, shines, counts);
-  return select<F>(shines, value * emission * weight * through, Color<F>(F(0.f)));
 }
 
 }  // namespace wavecomb

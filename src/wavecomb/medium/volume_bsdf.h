@@ -6,8 +6,8 @@
 #include "wavecomb/core/math.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/material/bsdf.h"
-#include "wavecomb/medium/grid_lookup.h"
 #include "wavecomb/medium/henyey_greenstein.h"
+#include "wavecomb/medium/moved_lookup.h"
 
 namespace wavecomb {
 
@@ -89,8 +89,7 @@ class VolumeBsdf : public BsdfTraits {
       const uint32_t index = first_active<U>(volume, Mask<U>(rest));
       const VolumeRecord& r = volumes.volumes[index];
       const Mask<F> here = rest & Mask<F>(volume == U(index));
-      const Color<F> tint =
-          grid_color<F>(r.color.grid, bricks_point<F>(r.color.to_bricks, p), here);
+      const Color<F> tint = tint_at<F>(r, p, v.hit.time, here);
       const Color<F> own{F(r.albedo[0]), F(r.albedo[1]), F(r.albedo[2])};
       albedo = select<F>(here, own * tint, albedo);
       g = select(here, F(r.anisotropy), g);

@@ -17,6 +17,7 @@ struct Ways {
   const uint32_t* seed;  ///< what all random numbers of a way are hashes of
   const float* first;    ///< but for the first distance in the first volume: a number in [0, 1)
   size_t count;
+  const float* times = nullptr;  ///< of the shutter; null where nothing moves
 };
 
 /// Numbers of a way through one volume, one after the other. Each lane counts its own.
@@ -131,19 +132,19 @@ class PacketWays {
  public:
   /// Lanes that are not active have a way of no length.
   PacketWays(const Vec3<F>& o, const Vec3<F>& d, const F& most, const U& seed, const F& first,
-             const Mask<F>& active) {
-    const F* const columns[8] = {&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &first, nullptr};
-    for (size_t k = 0; k < 7; ++k) store(columns_[k], *columns[k]);
-    store(columns_[7], select(active, most, F(0.f)));
+             const F& time, const Mask<F>& active) {
+    const F* const columns[8] = {&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &first, &time};
+    for (size_t k = 0; k < 8; ++k) store(columns_[k], *columns[k]);
+    store(columns_[8], select(active, most, F(0.f)));
     store(seed_, seed);
   }
   Ways ways() const {
-    return {columns_[0], columns_[1], columns_[2], columns_[3], columns_[4],
-            columns_[5], columns_[7], seed_,       columns_[6], kLanes};
+    return {columns_[0], columns_[1], columns_[2], columns_[3], columns_[4], columns_[5],
+            columns_[8], seed_,       columns_[6], kLanes,      columns_[7]};
   }
 
  private:
-  alignas(64) float columns_[8][kLanes];
+  alignas(64) float columns_[9][kLanes];
   alignas(64) uint32_t seed_[kLanes];
 };
 

@@ -95,7 +95,8 @@ uint64_t hash_geometry(const Scene& scene) {
   }
   for (const Volume& v : scene.volumes()) {
     h.add(v.box[0], v.box[1], v.to_world, v.extinction, v.albedo, v.emission, v.anisotropy);
-    for (const VolumeField* field : {&v.density, &v.color, &v.glow}) {
+    if (v.velocity.grid) h.add(v.seconds[0], v.seconds[1]);
+    for (const VolumeField* field : {&v.density, &v.color, &v.glow, &v.velocity}) {
       if (!field->grid) continue;
       const GridView grid = field->grid->view();
       h.add(field->index_to_object, grid.components, grid.background, grid.is_half ? 1u : 0u);

@@ -70,17 +70,21 @@ bool is_glass(const Material& m, const GraphSet& graphs) {
 
 }  // namespace
 
-bool asks_for_interiors(const Material& m) {
+bool asks_for_interiors(const Material& m, bool among_volumes) {
   if (!is_solid(m)) return false;
   InteriorMedium<float> medium{};
   set_medium(m.openpbr, medium);
-  if (m.openpbr.transmission_weight > 0 && is_any(medium.scattering)) return true;
+  const bool counts = is_any(medium.scattering) ||
+                      (among_volumes && m.graph == kNoGraph && is_any(medium.absorption));
+  if (m.openpbr.transmission_weight > 0 && counts) return true;
   return m.openpbr.nested_priority != 0 || (is_clear(m) && is_any(medium.absorption));
 }
 
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs) {
-  if (std::ranges::none_of(materials, asks_for_interiors)) return {};
+                                                  const GraphSet& graphs, bool among_volumes) {
+  if (std::ranges::none_of(materials,
+                           [&](const Material& m) { return asks_for_interiors(m, among_volumes); }))
+    return {};
   std::vector<InteriorMedium<float>> all(materials.size());
   for (size_t i = 0; i < all.size(); ++i) {
     const Material& m = materials[i];

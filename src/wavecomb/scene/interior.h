@@ -47,10 +47,12 @@ struct InteriorView {
 };
 
 /// Whether a material needs paths to know what they are inside of: it scatters, has a priority, or
-/// bounds an absorbing medium that does not refract.
-bool asks_for_interiors(const Material& material);
+/// bounds an absorbing medium that does not refract. In a scene of volumes (`among_volumes`) it
+/// does, too, where it absorbs: a path that a volume scatters inside of it has come part of its way
+/// before.
+bool asks_for_interiors(const Material& material, bool among_volumes);
 /// The media of all materials; none where no material asks for them.
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs);
+                                                  const GraphSet& graphs, bool among_volumes);
 
 }  // namespace wavecomb

@@ -10,6 +10,7 @@
 #include "wavecomb/scene/light_table.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene_checks.h"
+#include "wavecomb/scene/volume_motion.h"
 #include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {
@@ -224,10 +225,14 @@ SceneBytes Scene::bytes() const {
          set.triangle_uvs, set.pick_bins, set.powers, set.portals, set.portal_groups, set.shapings,
          set.ies, set.ies_numbers, set.filters, set.shadows, set.motions, set.motion_steps) +
       lights_->tree_bytes() + g.names.bytes();
-  std::set<const VolumeGrid*> grids;
-  for (const Volume& volume : g.volumes)
-    for (const VolumeField* field : {&volume.density, &volume.color, &volume.glow})
+  std::set<const void*> grids;
+  for (const Volume& volume : g.volumes) {
+    if (volume.motion && grids.insert(volume.motion.get()).second)
+      b.volumes += volume.motion->bytes();
+    for (const VolumeField* field :
+         {&volume.density, &volume.color, &volume.glow, &volume.velocity})
       if (field->grid && grids.insert(field->grid.get()).second) b.volumes += field->grid->bytes();
+  }
   for (const Distribution2D& d : set.distributions) b.records += of(d.cumulative, d.coarse);
   return b;
 }

@@ -13,6 +13,7 @@
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
 #include "wavecomb/scene/scene_limits.h"
+#include "wavecomb/scene/volume_motion.h"
 
 namespace wavecomb {
 
@@ -194,6 +195,13 @@ uint32_t SceneBuilder::add_mesh_light(Light light) {
 
 uint32_t SceneBuilder::add_volume(Volume volume) {
   check_volume(volume);
+  if (volume.moves()) {
+    const auto known = std::find_if(volumes_.rbegin(), volumes_.rend(), [&](const Volume& other) {
+      return other.motion && moves_alike(other, volume);
+    });
+    volume.motion =
+        known != volumes_.rend() ? known->motion : std::make_shared<const VolumeMotion>(volume);
+  }
   volumes_.push_back(std::move(volume));
   if (volumes_.size() > kMostVolumes)
     throw Error("more than " + with_commas(kMostVolumes) + " volumes, " +

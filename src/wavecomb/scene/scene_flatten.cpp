@@ -162,7 +162,9 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     materials_.push_back(white);
   }
   // And collisions in what fills meshes.
-  if (std::ranges::any_of(materials_, asks_for_interiors)) {
+  if (std::ranges::any_of(materials_, [&](const Material& m) {
+        return asks_for_interiors(m, !volumes_.empty());
+      })) {
     geometry->inside_material = static_cast<uint32_t>(materials_.size());
     Material inside;
     inside.name = "inside of meshes";

@@ -137,7 +137,10 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     has_presence = has_presence || m.needs_presence();
     has_emission = has_emission || m.emits();
   }
-  if (inside_material != kInheritMaterial) interiors = make_interiors(shaded, *graphs);
+  if (inside_material == kInheritMaterial) return;
+  // What collides in meshes is shaded by a material of that program, too.
+  const auto in_volumes = std::ranges::count(materials, ProgramId::kVolume, &Material::program);
+  interiors = make_interiors(shaded, *graphs, in_volumes > 1);
 }
 
 }  // namespace wavecomb

@@ -3,6 +3,7 @@
 /// without changing it.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -108,7 +109,10 @@ struct SceneGeometry {
   /// InteriorView::event_material; kInheritMaterial: no material asked what paths are inside of.
   uint32_t inside_material = kInheritMaterial;
   std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
-  bool moves() const { return mesh_motions.size() > 1 || !steps.empty(); }
+  bool moves() const {
+    return mesh_motions.size() > 1 || !steps.empty() ||
+           std::ranges::any_of(volumes, &Volume::moves);
+  }
   AttributeView attributes() const {
     if (mesh_attributes.empty()) return {};
     return {attribute_records.data(), mesh_attributes.data()};

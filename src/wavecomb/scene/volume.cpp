@@ -6,69 +6,22 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/scene/scene_checks.h"
+#include "wavecomb/scene/volume_motion.h"
+#include "wavecomb/scene/wide_map.h"
 
 namespace wavecomb {
 namespace {
 
-/// A map in double precision: rows of A, each followed by the translation.
-struct WideMap {
-  double m[3][4];
-
-  explicit WideMap(const Affine& a) {
-    for (int i = 0; i < 3; ++i) {
-      const double translation = i == 0 ? a.t.x : (i == 1 ? a.t.y : a.t.z);
-      const double row[4] = {a.row[i].x, a.row[i].y, a.row[i].z, translation};
-      std::copy(row, row + 4, m[i]);
-    }
-  }
-  /// The map that first applies `b`.
-  WideMap after(const WideMap& b) const {
-    WideMap r = *this;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 4; ++j)
-        r.m[i][j] = m[i][0] * b.m[0][j] + m[i][1] * b.m[1][j] + m[i][2] * b.m[2][j] +
-                    (j == 3 ? m[i][3] : 0);
-    return r;
-  }
-  double cofactor(int i, int j) const {
-    const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
-    return m[a][c] * m[b][d] - m[a][d] * m[b][c];
-  }
-  double determinant() const {
-    return m[0][0] * cofactor(0, 0) + m[0][1] * cofactor(0, 1) + m[0][2] * cofactor(0, 2);
-  }
-  WideMap inverse() const {
-    WideMap r = *this;
-    const double det = determinant();
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) r.m[i][j] = cofactor(j, i) / det;
-      r.m[i][3] = -(r.m[i][0] * m[0][3] + r.m[i][1] * m[1][3] + r.m[i][2] * m[2][3]);
-    }
-    return r;
-  }
-};
-
-/// Bricks of a grid to voxel indices, or the unit cube to the box.
-Affine bricks_to_space(const VolumeField& field, const std::array<Vec3<float>, 2>& box) {
-  Affine a;
-  if (!field.grid) {
-    const Vec3<float> size = box[1] - box[0];
-    a.row[0].x = size.x;
-    a.row[1].y = size.y;
-    a.row[2].z = size.z;
-    a.t = box[0];
-    return a;
-  }
-  a.row[0].x = a.row[1].y = a.row[2].z = kBrickEdge;
-  const auto& first = field.grid->first_voxel();
-  a.t = {static_cast<float>(first[0]), static_cast<float>(first[1]), static_cast<float>(first[2])};
-  return a;
-}
-
+/// Bricks of a grid, or the unit cube of the box, to the world.
 WideMap bricks_to_world(const Volume& v, const VolumeField& field) {
-  const WideMap own(bricks_to_space(field, v.box));
-  const WideMap object = field.grid ? WideMap(field.index_to_object).after(own) : own;
-  return WideMap(v.to_world).after(object);
+  if (field.grid) return WideMap(v.to_world).after(bricks_to_object(field));
+  const Vec3<float> size = v.box[1] - v.box[0];
+  Affine box;
+  box.row[0].x = size.x;
+  box.row[1].y = size.y;
+  box.row[2].z = size.z;
+  box.t = v.box[0];
+  return WideMap(v.to_world).after(WideMap(box));
 }
 
 PlacedGrid placed_grid(const Volume& v, const VolumeField& field) {
@@ -78,9 +31,55 @@ PlacedGrid placed_grid(const Volume& v, const VolumeField& field) {
   } else {
     std::fill_n(placed.grid.size, 3, 1u);
   }
-  const WideMap inverse = bricks_to_world(v, field).inverse();
-  for (int i = 0; i < 12; ++i) placed.to_bricks[i] = static_cast<float>(inverse.m[i / 4][i % 4]);
+  bricks_to_world(v, field).inverse().put(placed.to_bricks);
   return placed;
+}
+
+/// The cells that a field of the volume is flown through by.
+PlacedGrid placed_cells(const Volume& v, const VolumeField& field, const MovedCells& cells) {
+  PlacedGrid placed;
+  placed.grid.most = cells.most.data();
+  std::copy_n(cells.size.begin(), 3, placed.grid.size);
+  bricks_to_world(v, field).after(cells.to_bricks()).inverse().put(placed.to_bricks);
+  return placed;
+}
+
+/// How a field is looked up from the space that `to_bricks` leads from to its bricks.
+FieldDrift drift_of(const Volume& v, const VolumeField& field, const WideMap& to_bricks) {
+  const WideMap object = bricks_to_object(field);
+  FieldDrift drift{};
+  to_bricks.put(drift.to_bricks);
+  bricks_to_object(v.velocity).inverse().after(object).after(to_bricks).put(drift.to_velocity);
+  WideMap moves = object.inverse();
+  for (auto& row : moves.m) row[3] = 0;
+  moves.put(drift.per_second);
+  return drift;
+}
+
+void put_motion(const Volume& v, VolumeRecord& r) {
+  r.moves = v.motion != nullptr;
+  if (!r.moves) return;
+  r.velocity = v.velocity.grid->view();
+  const VolumeField& glow = v.glow.grid ? v.glow : v.density;
+  r.density_cells = placed_cells(v, v.density, v.motion->density());
+  r.glow_cells = placed_cells(v, glow, v.motion->glow());
+  r.density_drift = drift_of(v, v.density, v.motion->density().to_bricks());
+  r.glow_drift = drift_of(v, glow, v.motion->glow().to_bricks());
+  if (v.color.grid) r.color_drift = drift_of(v, v.color, bricks_to_world(v, v.color).inverse());
+  r.seconds_open = v.seconds[0];
+  r.seconds_span = v.seconds[1] - v.seconds[0];
+}
+
+void check_velocity(const std::string& name, const Volume& v) {
+  if (!v.velocity.grid) return;
+  const GridView grid = v.velocity.grid->view();
+  if (grid.components != 3 || grid.background != 0)
+    throw Error(name + " has a velocity grid of " + std::to_string(grid.components) +
+                " components and background " + std::to_string(grid.background) +
+                "; give one of three, and 0");
+  if (!v.density.grid) throw Error(name + " has a velocity, but no density grid; give one");
+  if (!std::isfinite(v.seconds[0]) || !std::isfinite(v.seconds[1]))
+    throw Error(name + " moves over seconds that are not finite; give finite ones");
 }
 
 void check_field(const std::string& name, const char* what, const VolumeField& field,
@@ -131,6 +130,8 @@ void check_volume(const Volume& v) {
   check_field(name, "density", v.density, v);
   check_field(name, "color", v.color, v);
   check_field(name, "emission", v.glow, v);
+  check_velocity(name, v);
+  check_field(name, "velocity", v.velocity, v);
 }
 
 VolumeRecord make_volume_record(const Volume& v) {
@@ -150,15 +151,20 @@ VolumeRecord make_volume_record(const Volume& v) {
   r.is_grey = v.extinction.x == v.extinction.y && v.extinction.y == v.extinction.z;
   r.anisotropy = v.anisotropy;
   r.emits = v.emits();
+  put_motion(v, r);
   return r;
 }
 
 std::array<Vec3<float>, 8> volume_corners(const Volume& v) {
   std::array<Vec3<float>, 8> corners;
   const VolumeField& field = v.density.grid || !v.glow.grid ? v.density : v.glow;
-  const WideMap map = bricks_to_world(v, field);
+  WideMap map = bricks_to_world(v, field);
   uint32_t size[3] = {1, 1, 1};
   if (field.grid) std::copy_n(field.grid->view().size, 3, size);
+  if (v.motion) {
+    map = map.after(v.motion->density().to_bricks());
+    std::copy_n(v.motion->density().size.begin(), 3, size);
+  }
   for (int i = 0; i < 8; ++i) {
     const double at[3] = {i & 1 ? size[0] : 0.0, i & 2 ? size[1] : 0.0, i & 4 ? size[2] : 0.0};
     float p[3];

@@ -39,13 +39,15 @@ struct GridBricks {
   std::span<const uint16_t> halves;  ///< the same as halves
   uint32_t components = 1;
   float background = 0;
+  bool is_signed = false;  ///< values may be below 0: velocities
 };
 
 /// Voxels in bricks, with a table of where they are. Immutable.
 class VolumeGrid {
  public:
-  /// Throws Error with one line for numbers that are negative or not finite, bricks that are
-  /// doubled or not at multiples of 8, and grids that are too large to be numbered.
+  /// Throws Error with one line for numbers that are negative (unless all have signs) or not
+  /// finite, bricks that are doubled or not at multiples of 8, and grids that are too large to be
+  /// numbered.
   explicit VolumeGrid(const GridBricks& bricks);
 
   GridView view() const;
@@ -53,8 +55,9 @@ class VolumeGrid {
   const std::array<int32_t, 3>& first_voxel() const { return first_; }
   size_t brick_count() const { return voxel_words_.size() / words_per_brick(); }
   size_t bytes() const;
-  /// Greatest value.
+  /// Greatest value; of what has signs, regardless of them.
   float most() const { return greatest_; }
+  bool is_signed() const { return is_signed_; }
   const std::vector<uint32_t>& table() const { return table_; }
   const std::vector<uint32_t>& voxel_words() const { return voxel_words_; }
 
@@ -66,6 +69,7 @@ class VolumeGrid {
   uint32_t components_;
   bool is_half_;
   float background_;
+  bool is_signed_;
   float greatest_ = 0;
   std::vector<uint32_t> table_;
   std::vector<float> most_;
@@ -78,16 +82,23 @@ struct VolumeField {
   Affine index_to_object;
 };
 
+class VolumeMotion;
+
 /// One volume. At a point, with the values of its fields there,
 ///   extinction sigma_t = extinction * density     per unit of world length, per channel
 ///   albedo             = albedo * color           share of it that is scattered
 ///   emitted radiance   = emission * (emission field, or density)   per unit of world length
-/// Scattering follows Henyey and Greenstein.
+/// Scattering follows Henyey and Greenstein. With a velocity field v what is at p at the time t is
+/// what the fields have at p - v(p) t.
 struct Volume {
   std::string name;
   VolumeField density;  ///< one component; none: 1 everywhere in the box
   VolumeField color;    ///< none: 1
   VolumeField glow;     ///< none: as density
+  /// Three components with signs, in the volume's own space over a second; none: it stands still.
+  VolumeField velocity;
+  std::array<float, 2> seconds{0, 0};          ///< t where the shutter opens and closes
+  std::shared_ptr<const VolumeMotion> motion;  ///< made by SceneBuilder::add_volume
   std::array<Vec3<float>, 2> box{Vec3<float>(0.f),
                                  Vec3<float>(0.f)};  ///< own space; where there is no density field
   Affine to_world;
@@ -95,12 +106,20 @@ struct Volume {
   float anisotropy = 0;  ///< mean cosine of the scattering angle, in (-1, 1)
 
   bool emits() const { return emission.x > 0 || emission.y > 0 || emission.z > 0; }
+  bool moves() const { return velocity.grid && (seconds[0] != 0 || seconds[1] != 0); }
 };
 
 /// A field as kernels read it: x_bricks = A x_world + t, rows of A each followed by t's component.
 struct PlacedGrid {
   GridView grid;
   float to_bricks[12] = {};
+};
+
+/// How a field that moves is looked up: from one space, of cells or the world.
+struct FieldDrift {
+  float to_velocity[12];  ///< to bricks of the velocity grid
+  float to_bricks[12];    ///< to bricks of the field
+  float per_second[12];   ///< from velocities to bricks of the field; translation 0
 };
 
 /// A volume as kernels read it. All lanes of a packet look at one volume at a time, so records are
@@ -114,6 +133,13 @@ struct VolumeRecord {
   float anisotropy;
   bool is_grey;  ///< extinction is the same in all channels
   bool emits;
+  bool moves;  ///< if so, it is flown through by cells of their own, which bound what comes by
+
+  PlacedGrid density_cells, glow_cells;  ///< without a table
+  GridView velocity;
+  FieldDrift density_drift, glow_drift;  ///< from the spaces of these cells
+  FieldDrift color_drift;                ///< from the world
+  float seconds_open, seconds_span;
 };
 
 /// Volumes that a scene may have: kernels look at one after the other.

@@ -58,16 +58,16 @@ class BrickSource {
                        : kNoBrick;
       }
     }
-    /// The bits of component c of a voxel of the cell, each index below kBrickRow. Values are not
-    /// negative, so that bits are ordered as they are.
+    /// The bits of component c of a voxel of the cell, each index below kBrickRow. But for their
+    /// signs, bits are ordered as values are.
     uint32_t bits(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
       const uint32_t brick = near_[x / kBrickEdge | y / kBrickEdge << 1 | z / kBrickEdge << 2];
       if (brick == kNoBrick) return background_;
       const size_t voxel =
           ((x % kBrickEdge) * kBrickEdge + y % kBrickEdge) * kBrickEdge + z % kBrickEdge;
       const size_t i = (size_t{brick} * kInner + voxel) * b_.components + c;
-      if (!b_.halves.empty()) return b_.halves[i] & 0x7fffu;
-      return float_bits<float>(b_.floats[i]) & 0x7fffffffu;
+      if (!b_.halves.empty()) return b_.halves[i] & (b_.is_signed ? 0xffffu : 0x7fffu);
+      return float_bits<float>(b_.floats[i]) & (b_.is_signed ? 0xffffffffu : 0x7fffffffu);
     }
 
    private:
@@ -83,18 +83,20 @@ class BrickSource {
 };
 
 void check_values(const GridBricks& b) {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  const float least = b.is_signed ? -kMost : 0.f;
   const auto check = [&](const auto& values, const auto& as_float) {
     const bool good = std::all_of(values.begin(), values.end(), [&](auto v) {
       const float x = as_float(v);
-      return x >= 0 && x <= std::numeric_limits<float>::max();
+      return x >= least && x <= kMost;
     });
     if (!good)
-      throw Error("grid '" + b.name +
-                  "' has values that are negative or not finite; mend the file");
+      throw Error("grid '" + b.name + "' has values that are " +
+                  (b.is_signed ? "" : "negative or ") + "not finite; mend the file");
   };
   check(b.floats, [](float x) { return x; });
   check(b.halves, [](uint16_t x) { return half_to_float<float>(uint32_t{x}); });
-  if (!(b.background >= 0 && b.background <= std::numeric_limits<float>::max()))
+  if (!(b.background >= 0 && b.background <= kMost))
     throw Error("grid '" + b.name + "' has a background that is negative or not finite; mend it");
 }
 
@@ -105,7 +107,10 @@ size_t VolumeGrid::words_per_brick() const {
 }
 
 VolumeGrid::VolumeGrid(const GridBricks& b)
-    : components_(b.components), is_half_(!b.halves.empty()), background_(b.background) {
+    : components_(b.components),
+      is_half_(!b.halves.empty()),
+      background_(b.background),
+      is_signed_(b.is_signed) {
   const size_t count = b.origins.size() / 3;
   const std::string name = "grid '" + b.name + "'";
   if (b.components != 1 && b.components != 3)
@@ -139,13 +144,15 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
   most_.assign(cells, background_);
   const size_t words = words_per_brick();
   const uint32_t background = value_bits(background_, is_half_);
+  const uint32_t magnitude = is_half_ ? 0x7fffu : 0x7fffffffu;
 
   // Which cells have anything, and their greatest value; then their voxels.
   const auto fill = [&](size_t cell, uint32_t* out) {
     const BrickSource::Corner corner(source, {static_cast<uint32_t>(cell % size_[0]),
                                               static_cast<uint32_t>(cell / size_[0] % size_[1]),
                                               static_cast<uint32_t>(cell / size_[0] / size_[1])});
-    uint32_t most = background, least = background;
+    uint32_t most = background;
+    bool differs = false;
     size_t i = 0;
     for (uint32_t z = 0; z < kBrickRow; ++z)
       for (uint32_t y = 0; y < kBrickRow; ++y)
@@ -158,10 +165,10 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
               else
                 out[i] = bits;
             }
-            most = std::max(most, bits);
-            least = std::min(least, bits);
+            most = std::max(most, bits & magnitude);
+            differs = differs || bits != background;
           }
-    if (!out && most != least) {
+    if (!out && differs) {
       table_[cell] = 0;
       most_[cell] = value_of(most, is_half_);
     }

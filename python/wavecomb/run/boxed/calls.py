@@ -218,7 +218,7 @@ class Call:
         return {name: _known(kinds, name)(value, arrays) for name, value in body.items()}
 
 
-GRIDS = ("density", "color", "emission_grid")
+GRIDS = ("density", "color", "emission_grid", "velocity")
 """Arguments of ``add_volume`` that are grids: numbers of ``make_volume_grid``."""
 
 _MESH: dict[str, Kind] = {
@@ -307,7 +307,7 @@ CALLS: dict[str, Call] = {
             "origins": array("<i4", 2), "values": array("<f2 <f4", 4, 5),
             "index_to_object": _MATRIX, "background": number, "name": text,
         },
-        {},
+        {"is_signed": flag},
         "volume grids",
     ),
     "add_volume": Call(
@@ -315,6 +315,7 @@ CALLS: dict[str, Call] = {
         {
             **dict.fromkeys(GRIDS, maybe(whole)),
             "bounds": row(COLOUR, COLOUR), "anisotropy": number, "name": text,
+            "seconds": row(number, number),
             **dict.fromkeys(("extinction", "albedo", "emission"), COLOUR),
         },
         "volumes",

@@ -112,9 +112,7 @@ class GroupBuilder:
         self.placer = GroupPlacer(builder, self.mesh_lights, report, framed)
         self.worn = InstanceMaterials(traversal, materials, report)
         self.looks = InstanceLooks(traversal, materials, report)
-        reads = VolumeReader(
-            stage, builder, self.time, materials.working, report, self.motion is not None
-        )
+        reads = VolumeReader(stage, builder, self.time, materials.working, report, self.motion)
         self.volumes = VolumePlacer(reads, report, framed)
         self._groups: dict[Hashable, Group] = {}
         self._known: dict[Sdf.Path, UsdShade.Material] = {}

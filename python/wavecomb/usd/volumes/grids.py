@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +69,16 @@ class GridTable:
                 return field
         return None
 
+    def first_vector(self, fields: Mapping[str, Field], names: Sequence[str]) -> Field | None:
+        """The first field of vectors that has one of these names, or whose grid has it."""
+        for name in names:
+            for field in fields.values():
+                head = self._head(field)
+                known = head is not None and name in (field.name.lower(), head.name.lower())
+                if known and head is not None and head.is_vector:
+                    return field
+        return None
+
     def densest(self, fields: Mapping[str, Field]) -> Field | None:
         """The first field of numbers, which is none of temperatures if there is another."""
         scalar = []
@@ -84,7 +94,8 @@ class GridTable:
 
         Args:
             field: Of a volume.
-            use: "density", "colour", "emission", or "temperature", which becomes emission.
+            use: "density", "colour", "emission", "temperature", which becomes emission, or
+                "velocity".
             kelvin: What 1 in a grid of temperatures means.
 
         Raises:
@@ -152,6 +163,12 @@ class GridTable:
         if found.values.ndim == 5 and use in ("density", "temperature"):
             self._report.missing(f"vectors as {use} (left out)", field.prim)
             return None
+        if found.values.ndim != 5 and use == "velocity":
+            self._report.missing("numbers as velocity (left out)", field.prim)
+            return None
+        if use == "velocity" and found.kind == "staggered":
+            what = f"staggered grid {head.name!r}: taken for one of the middles of its voxels"
+            self._report.note(what, field.prim)
         self._check_sign(found, named, use, field)
         if use == "colour" and found.greatest > 1:
             self._report.note("colour above 1 of a volume: taken for 1", field.prim)
@@ -163,12 +180,13 @@ class GridTable:
             values.nbytes + found.origins.nbytes,
         )  # fmt: skip
         name = self._report.place(field.prim)
-        handle = self._handed_over(found.origins, values, matrix, background, name)
+        signs = {"is_signed": True} if use == "velocity" else {}
+        handle = self._handed_over(found.origins, values, matrix, background, name, **signs)
         return Grid(handle, _corners(found.box, matrix), facts)
 
     def _check_sign(self, found: vdb.Bricks, named: str, use: str, field: Field) -> None:
         """Refuses a grid of negative values, unless it is by next to nothing."""
-        if not found.negative:
+        if not found.negative or use == "velocity":
             return
         if found.kind == "level set" and use == "density":
             raise WavecombError(f"{named} is a level set; convert it to a fog volume")
@@ -201,7 +219,7 @@ class GridTable:
                 rgb = from_rec709(radiance(part * kelvin), self._working)
                 made[at : at + _CHUNK] = np.maximum(rgb, 0)
             return made
-        if values.ndim == 5 and self._working != "rec709":
+        if values.ndim == 5 and use != "velocity" and self._working != "rec709":
             rgb = from_rec709(np.asarray(values, np.float32), self._working)
             return np.clip(rgb, 0, 1 if use == "colour" else None)
         return values
@@ -213,6 +231,7 @@ class GridTable:
         matrix: NDArray[np.float64],
         background: float,
         name: str,
+        **signs: bool,
     ) -> Any:
         """The grid as the builder has it: in this process, or in the one that builds the scene."""
         make = getattr(self._builder, "make_volume_grid", None)
@@ -220,7 +239,7 @@ class GridTable:
             from wavecomb import _core
 
             make = _core.VolumeGrid
-        return make(origins, values, matrix, background, name)
+        return make(origins, values, matrix, background, name, **signs)
 
 
 def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.float64]:

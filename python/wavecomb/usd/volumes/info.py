@@ -12,7 +12,7 @@ class GridFacts:
     """A grid of a volume.
 
     Attributes:
-        use: "density", "colour", "emission" or "temperature".
+        use: "density", "colour", "emission", "temperature" or "velocity".
         field: Name of the relationship.
         file: Where it is read from.
         grid: Its name there.

@@ -12,6 +12,7 @@ from pxr import Usd, UsdGeom, UsdVol
 
 from wavecomb import vdb
 from wavecomb.picture.working_space import from_rec709
+from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.looks.assign import Draw
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.fields import Field, read_fields
@@ -19,6 +20,7 @@ from wavecomb.usd.volumes.grids import Grid, GridTable
 from wavecomb.usd.volumes.info import GridFacts
 from wavecomb.usd.volumes.look import BLACK, Colour, VolumeLook
 from wavecomb.usd.volumes.material import VolumeLooks
+from wavecomb.usd.volumes.motion import VelocityReader
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -27,7 +29,6 @@ GLOW = 1e-4
 """Emission times the size of a volume from which it is taken for a lamp."""
 
 _MOST_ANISOTROPY = 0.999
-_VELOCITY = ("velocity", "vel", "v")
 
 
 @dataclass(frozen=True)
@@ -61,13 +62,13 @@ class VolumeReader:
         time: Usd.TimeCode,
         working: str,
         report: LoadReport,
-        is_blurred: bool = False,
+        motion: Motion | None = None,
     ) -> None:
-        """``is_blurred``: the shutter is open for a while."""
+        """``motion``: None where the shutter is open for no time."""
         self._time = time
         self._working = working
         self._report = report
-        self._is_blurred = is_blurred
+        self._velocities = VelocityReader(stage, motion, report)
         self._grids = GridTable(builder, working, report)
         self._looks = VolumeLooks(time, UsdGeom.GetStageMetersPerUnit(stage), report)
         self.glow = False
@@ -83,7 +84,6 @@ class VolumeReader:
         if not fields and UsdVol.Volume(prim).GetFieldPaths():
             return None  # which was said
         look = self._looks.of(draw.material, prim)
-        self._say_still(prim, fields)
         if fields and not vdb.is_there():
             self._report.missing(f"Volume without {vdb.ABSENT}: left out", prim.GetPath())
             return None
@@ -104,6 +104,9 @@ class VolumeReader:
         colour = self._named(fields, look.colour, "colour")
         use = "temperature" if look.kelvin else "emission"
         glow = self._named(fields, look.glow, use, look.kelvin) if any(look.emission) else None
+        velocity = self._velocities.find(prim, fields, self._grids, self._time)
+        if density is not None and velocity is not None:
+            options |= {"velocity": velocity.grid.handle, "seconds": velocity.seconds}
         emission = look.emission if glow is not None or not look.glow else BLACK
         options |= {
             "color": None if colour is None else colour.handle,
@@ -114,7 +117,8 @@ class VolumeReader:
             "emission": self._working_colour(emission),
             "name": self._report.place(prim.GetPath()),
         }
-        used = tuple(grid.facts for grid in (density, colour, glow) if grid is not None)
+        blown = None if velocity is None else velocity.grid
+        used = tuple(grid.facts for grid in (density, colour, glow, blown) if grid is not None)
         size = float(np.ptp(corners, axis=0).max())
         glows = max(emission) * size > GLOW
         self.glow = self.glow or glows
@@ -154,13 +158,3 @@ class VolumeReader:
             what = f"anisotropy {look.anisotropy:g} of a volume: {limited:g} taken"
             self._report.warn(what, look.name or prim.GetPath())
         return limited
-
-    def _say_still(self, prim: Usd.Prim, fields: dict[str, Field]) -> None:
-        """Says what of a volume would be blurred."""
-        if not self._is_blurred:
-            return
-        if any(field.changes for field in fields.values()):
-            what = "volumes whose files change while the shutter is open (still)"
-            self._report.missing(what, prim.GetPath())
-        if any(name.lower() in _VELOCITY for name in fields):
-            self._report.missing("velocity blur of volumes (still)", prim.GetPath())

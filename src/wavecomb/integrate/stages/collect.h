@@ -96,9 +96,11 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       if constexpr (Media::kAny) {
         if constexpr (Media::kShines)
           if (media.shines()) {
+            const float* const times = wave.times.floats(0);
+            const F when = times ? load<F>(times + i) : F(0.f);
             const Color<F> c = clean<F>(
                 path.throughput * media.template emission<F>(
-                                      {settings.sampler, path.key, depth, o, d, t}, active),
+                                      {settings.sampler, path.key, depth, o, d, t, when}, active),
                 clamp_limit(settings, depth));
             const Mask<F> bright = active & not_(is_black(c));
             add_radiance<F>(wave.pool.radiance, slot, c, bright);

@@ -108,24 +108,24 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
     Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
     Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
-    const Color<F> direct = c;
     if constexpr (Media::kAny) {
       if constexpr (Media::kStreams) {
         c = c * media.template passed<F>(wave, i);
       } else {
-        const auto path = load_row<PathRow, F>(wave.pool.paths, slot, active);
+        const Mask<F> asked = wave.pool.shades ? first_lanes<F>(q.size - i) : active;
+        const auto path = load_row<PathRow, F>(wave.pool.paths, slot, asked);
         const Vec3<F> o{load<F>(q.ox + i), load<F>(q.oy + i), load<F>(q.oz + i)};
         const Vec3<F> d{load<F>(q.dx + i), load<F>(q.dy + i), load<F>(q.dz + i)};
         const F t = load<F>(q.tfar + i) * (1.f / kShadowReach);
         c = c * media.template transmittance<F>(
-                    {context.settings->sampler, path.key, depth, o, d, t}, active);
+                    {context.settings->sampler, path.key, depth, o, d, t}, asked);
       }
     }
     if (wave.pool.shades) [[unlikely]] {
       // Shadows of a colour: what is in the way leaves some of the light.
       const Mask<F> blocked = first_lanes<F>(q.size - i) & not_(active);
       const Color<F> shade = load_row<RadianceRow, F>(wave.pool.shades, slot, blocked).sum;
-      c = select<F>(blocked, direct * shade, c);
+      c = select<F>(blocked, c * shade, c);
       active = active | (blocked & (max_component(shade) > 0.f));
     }
     add_radiance<F>(wave.pool.radiance, slot, c, active);
