@@ -64,7 +64,8 @@ void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, fl
     }
   }
   for (uint32_t prim = 0; prim < mesh.primitive_count(); ++prim) {
-    const CurveHits hits = intersect_curve(mesh, {prim}, CurveRay(ray.o, ray.d), tfar, CurveQuery::kAll);
+    const CurveHits hits =
+        intersect_curve(mesh, {prim}, CurveRay(ray.o, ray.d), tfar, CurveQuery::kAll);
     look(prim, may[prim] != 0, hits.begin() != hits.end());
   }
 }

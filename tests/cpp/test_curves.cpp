@@ -178,7 +178,8 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
                              : mesh.is_ribbon() ? brute_ribbon(exact, o, unit(d))
                                                 : brute_tube(exact, o, unit(d))) /
                             length;
-        const CurveHits found = intersect_curve(mesh, {prim}, CurveRay(fo, fd), kInf, CurveQuery::kFirst);
+        const CurveHits found =
+            intersect_curve(mesh, {prim}, CurveRay(fo, fd), kInf, CurveQuery::kFirst);
         const bool hit = found.begin() != found.end();
         hits += hit;
         if (hit != (want < 1e20)) {

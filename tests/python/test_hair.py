@@ -225,8 +225,12 @@ def test_white_hair_under_a_white_sky_is_white(kind: str) -> None:
 
 def test_lamps_are_what_each_brings_alone() -> None:
     """Of several lamps a vertex asks for one out of three; of one there is nothing to choose."""
-    lamps = [((1.5, 1, 2), 0.3, (9, 6, 3)), ((-2, 0, -2), 0.5, (2, 4, 9)), ((0, 3, 1), 0.1, (90,) * 3),
-             ((0, -2.5, -1), 0.4, (0, 5, 0))]  # fmt: skip
+    lamps = [
+        ((1.5, 1, 2), 0.3, (9, 6, 3)),
+        ((-2, 0, -2), 0.5, (2, 4, 9)),
+        ((0, 3, 1), 0.1, (90, 90, 90)),
+        ((0, -2.5, -1), 0.4, (0, 5, 0)),
+    ]
     material = {"base_color": (0.8, 0.5, 0.2), "roughness": 0.25, "azimuthal_roughness": 0.3}
 
     def blocks(some: Sequence[Any], seeds: int) -> Any:

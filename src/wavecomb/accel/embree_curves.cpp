@@ -37,9 +37,8 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
     const float& tfar = RTCRayN_tfar(rays, n, i);
     if (!ray || !ray->is(o, d)) ray.emplace(o, d);
     const auto meet = [&](const CurvePiece& piece) {
-      for (const CurveHit& hit :
-           intersect_curve(*curves.mesh, piece, *ray, tfar, query, RTCRayN_time(rays, n, i),
-                           curves.is_fibre)) {
+      for (const CurveHit& hit : intersect_curve(*curves.mesh, piece, *ray, tfar, query,
+                                                 RTCRayN_time(rays, n, i), curves.is_fibre)) {
         if (curves.is_filtered && !is_met(*context, inst, args.geomID, curves.id, piece.prim, hit.u,
                                           hit.v, RTCRayN_id(rays, n, i)))
           continue;

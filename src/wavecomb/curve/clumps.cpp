@@ -230,7 +230,8 @@ Bounds CurveClumps::bounds(uint32_t clump) const {
 uint32_t CurveClumps::may_meet(uint32_t clump, const CurveRay& ray, float tfar) const {
   using F = ClumpLanes;
   const Clump& c = clumps_[clump];
-  const float from[3] = {c.low[0] - ray.origin[0], c.low[1] - ray.origin[1], c.low[2] - ray.origin[2]};
+  const float from[3] = {c.low[0] - ray.origin[0], c.low[1] - ray.origin[1],
+                         c.low[2] - ray.origin[2]};
   alignas(32) float radii[kPieces];
   for (uint32_t k = 0; k < kPieces; ++k) radii[k] = static_cast<float>(c.radius[k]);
   const F radius = load<F>(radii) * c.step;

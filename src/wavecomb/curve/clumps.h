@@ -58,8 +58,8 @@ class CurveClumps {
 
   /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 16 bits: those of
   /// the first are the lower halves of cells[axis][k], those of the second the upper ones. Its
-  /// radius about the line between them is step * radius[k]. Its number is that of its segment times
-  /// kNodes, and its node.
+  /// radius about the line between them is step * radius[k]. Its number is that of its segment
+  /// times kNodes, and its node.
   struct alignas(32) Clump {
     std::array<std::array<uint32_t, kPieces>, 3> cells;
     std::array<uint32_t, kPieces> number;

@@ -376,7 +376,7 @@ class SegmentTest {
   static constexpr double kLeafRounding = 4e-6;  ///< of sums of products in float, over their terms
   static constexpr int kSteps = 40, kRibbonSteps = 100;
   static constexpr double kNear = 1e-9;  ///< steps that are no more leave the extreme as it is
-  static constexpr double kFar = 2;  ///< a step beyond either end
+  static constexpr double kFar = 2;      ///< a step beyond either end
   /// Sine of the angle by which ends reach beyond the seam, so that none shows a gap.
   static constexpr double kSeam = 1e-3;
 

@@ -58,9 +58,9 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 /// Hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of a primitive of a mesh
 /// of curves or points. Where a tube goes on in the next segment, the end that
 /// lies in it is not hit. `time`: in [0, 1] over the mesh's steps. `outside`: what is met from
-/// inside is left out. Of a piece: those on it, and maybe others; they are the same numbers as those
-/// that its primitive gives.
-CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& ray, float tfar,
-                          CurveQuery query, float time = 0, bool outside = false);
+/// inside is left out. Of a piece: those on it, and maybe others; they are the same numbers as
+/// those that its primitive gives.
+CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& ray,
+                          float tfar, CurveQuery query, float time = 0, bool outside = false);
 
 }  // namespace wavecomb

@@ -108,7 +108,7 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
           l.distance,
           at.throughput * f_cos * l.weight * w,
           w,
-          lit & l.valid & at.is_consistent(l.wi, wi),
+          Mask<F>(lit & l.valid & at.is_consistent(l.wi, wi)),
           light,
           set,
           reach};
@@ -119,12 +119,12 @@ inline constexpr uint32_t kFibreCandidates = 3;
 
 /// One of several points, x_i, chosen by the brightness g of what each brings if it is seen, c_i:
 ///   c = c_k sum_i g_i / (n g_k),   k with probability g_k / sum_i g_i
-/// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for Global
-/// Illumination", 2005). Its mean is that of one point for any densities and weights in c, so MIS
-/// keeps those of one. Where rays are dear, as among strands, a shadow ray to the lamp that counts
-/// is worth three evaluations (docs/decisions/light-candidates.md). `first` is of the numbers `r`;
-/// the others' are r moved: over all lights evenly, and on them by the lattice of R2 (M. Roberts,
-/// "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+/// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for
+/// Global Illumination", 2005). Its mean is that of one point for any densities and weights in c,
+/// so MIS keeps those of one. Where rays are dear, as among strands, a shadow ray to the lamp that
+/// counts is worth three evaluations (docs/decisions/light-candidates.md). `first` is of the
+/// numbers `r`; the others' are r moved: over all lights evenly, and on them by the lattice of R2
+/// (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
 template <typename F, typename Candidate>
 WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
                                            const Candidate& candidate) {
@@ -141,8 +141,8 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
   F g = brightness(first), sum = g;
   for (uint32_t k = 1; k < kFibreCandidates; ++k) {
     const auto n = static_cast<float>(k);
-    const LightCandidate<F> other = candidate(Sample4<F>{
-        moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
+    const LightCandidate<F> other = candidate(
+        Sample4<F>{moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
     const F h = brightness(other);
     sum += h;
     // One number does for all: what is left of it is as even.
