@@ -2,12 +2,11 @@
 #include "wavecomb/curve/intersect.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 
 #include "wavecomb/curve/bezier.h"
-#include "wavecomb/curve/capsules.h"
+#include "wavecomb/curve/leaves.h"
 #include "wavecomb/curve/segment.h"
 
 namespace wavecomb {
@@ -18,27 +17,6 @@ using namespace curve_math;
 uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
-
-using LeafLanes = FloatP<8>;
-
-/// What the control points of a piece weigh at its leaves' ends.
-struct LeafWeights {
-  alignas(64) float at[4][16] = {};
-
-  explicit constexpr LeafWeights(int halvings) {
-    const int n = 1 << halvings;
-    for (int i = 0; i <= n; ++i) {
-      const float u = static_cast<float>(i) / static_cast<float>(n), w = 1 - u;
-      at[0][i] = w * w * w;
-      at[1][i] = 3 * w * w * u;
-      at[2][i] = 3 * w * u * u;
-      at[3][i] = u * u * u;
-    }
-  }
-};
-
-constexpr std::array<LeafWeights, 4> kLeafWeights = {LeafWeights(0), LeafWeights(1), LeafWeights(2),
-                                                     LeafWeights(3)};
 
 /// The values of a mesh's points at a time, bit for bit those of detail::MovingRows.
 class PointsAt {
@@ -178,33 +156,9 @@ class SegmentTest {
     search(b, middle, u1, halvings - 1);
   }
 
-  /// The same for all leaves of a piece of a tube at once, in float.
+  /// The same for all leaves of a piece of a tube at once.
   void search_leaves(const Bezier& piece, double r, double u0, double u1, int halvings) {
-    using F = LeafLanes;
-    const LeafWeights& weights = kLeafWeights[halvings];
-    Vec3<F> a, b;
-    double size = 0, deep = 0;
-    const auto ends = [&](double V::* axis, F& at_a, F& at_b) {
-      at_a = at_b = F(0.f);
-      for (int k = 0; k < 4; ++k) {
-        const F p(static_cast<float>(piece.p[k].*axis));
-        at_a = fma(load<F>(&weights.at[k][0]), p, at_a);
-        at_b = fma(load<F>(&weights.at[k][1]), p, at_b);
-      }
-    };
-    ends(&V::x, a.x, b.x);
-    ends(&V::y, a.y, b.y);
-    ends(&V::z, a.z, b.z);
-    for (const V& p : piece.p) {
-      size = std::max(size, std::abs(p.x) + std::abs(p.y));
-      deep = std::max(deep, std::abs(p.z));
-    }
-    const double far = kLeafRounding * (deep + r);
-    const auto wide = static_cast<float>((1 + kLeafRounding) * (r + bulge_));
-    uint32_t left = lane_bits<F>(not_(passes_capsules<F>(
-        a, b, F(wide), F(static_cast<float>(kLeafRounding * (size + r))),
-        F(static_cast<float>(z_near_ - far)), F(static_cast<float>(z_far_ * 1.00001 + far)))));
-    left &= (1u << (1 << halvings)) - 1;
+    uint32_t left = leaves_near(piece, halvings, r, bulge_, z_near_, z_far_);
     const double step = (u1 - u0) / (1 << halvings);
     for (; left != 0; left &= left - 1) {
       const double from = u0 + std::countr_zero(left) * step;
@@ -372,8 +326,6 @@ class SegmentTest {
 
   static constexpr double kStraight = 0.025;  ///< of the radius
   static constexpr int kMostHalvings = 9, kRibbonHalvings = 3;
-  static constexpr int kLeafHalvings = 3;
-  static constexpr double kLeafRounding = 4e-6;  ///< of sums of products in float, over their terms
   static constexpr int kSteps = 40, kRibbonSteps = 100;
   static constexpr double kNear = 1e-9;  ///< steps that are no more leave the extreme as it is
   static constexpr double kFar = 2;      ///< a step beyond either end
