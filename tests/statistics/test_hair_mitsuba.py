@@ -2,7 +2,7 @@
 """Hair against Mitsuba 3's `hair`: a fibre, a bundle and a head agree to within noise.
 
 A fibre and a bundle are straight and end outside of the picture: ends differ by design. Those of a
-head's hair are in it, and thin.
+head's hair are in it, and taper to a tenth: round ends of its whole width are 0.15 % of the picture.
 """
 
 from __future__ import annotations
@@ -33,8 +33,17 @@ def colour(absorption: float, azimuthal: float) -> float:
     return math.exp(-math.sqrt(absorption) * divisor)
 
 
-def fibres(kind: str) -> tuple[Any, float]:
-    """Control points of cubic B-splines, (n, k, 3), and their radius."""
+def fibres(kind: str) -> tuple[Any, Any]:
+    """Control points of cubic B-splines, (n, k, 3), and the radius of each of a spline's."""
+    points, radius = splines(kind)
+    radii = np.full(points.shape[1], radius)
+    if kind == "head":
+        radii[-4:] *= (0.55, 0.1, 0.1, 0.1)
+    return points, radii
+
+
+def splines(kind: str) -> tuple[Any, float]:
+    """Control points, and the radius."""
     if kind == "fibre":
         return line(np.array([[-3.0, -2.0, 0.4]]), np.array([[3.0, 2.0, -0.4]])), 0.07
     if kind == "head":
@@ -77,11 +86,13 @@ def stage(kind: str, roughness: tuple[float, float]) -> Any:
         cuticle_tilt=TILT,
         ior=1.55,
     )
-    points, radius = fibres(kind)
+    points, radii = fibres(kind)
     layout = lay_out(np.full(len(points), points.shape[1]), "bspline", "nonperiodic")
     controls = layout.controls(points.reshape(-1, 3), "vertex")
-    radii = np.full(len(controls), radius, np.float32)
-    curves = native.add_curves("cubic-tube", controls, layout.segment_words(), radii, material=hair)
+    widths = layout.controls(np.tile(radii, len(points))[:, None], "vertex")
+    curves = native.add_curves(
+        "cubic-tube", controls, layout.segment_words(), np.float32(widths[:, 0]), material=hair
+    )
     native.add_to_group(0, curves)
     for x, z, turn in ((1.6, 3.0, 0.0), (-1.9, -3.0, math.pi)):
         lamp = np.diag([math.cos(turn), 1.0, math.cos(turn), 1.0])
@@ -116,9 +127,12 @@ def test_hair(
     """A fibre alone, smooth and rough; and light that goes from fibre to fibre, and to a head."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
-    points, radius = fibres(kind)
+    points, radii = fibres(kind)
     file = tmp_path / "fibres.txt"
-    rows = ["\n".join(f"{x} {y} {z} {radius}" for x, y, z in strand) for strand in points]
+    rows = [
+        "\n".join(f"{x} {y} {z} {r}" for (x, y, z), r in zip(strand, radii, strict=True))
+        for strand in points
+    ]
     file.write_text("\n\n".join(rows) + "\n")
 
     class WithFibres(MitsubaScene):
