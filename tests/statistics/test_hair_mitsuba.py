@@ -2,7 +2,7 @@
 """Hair against Mitsuba 3's `hair`: a fibre, a bundle and a head agree to within noise.
 
 A fibre and a bundle are straight and end outside of the picture: ends differ by design. Those of a
-head's hair are in it, and taper to a tenth: round ends of its whole width are 0.15 % of the picture.
+head's hair are in it, and taper to a tenth: round ends of all its width are 0.15 % of the picture.
 """
 
 from __future__ import annotations
