@@ -222,6 +222,64 @@ def test_doors_of_a_spot_are_by_its_cone(tmp_path):
     assert (got[:, :8] == 0).all() and (got[:, 8:] > 0).all()
 
 
+KARMA = 'def LightFilter "{0}" {{ uniform token lightFilter:shaderId = "{1}"\n{2}\n}}\n'
+CONE = POINT + "\nfloat inputs:shaping:cone:angle = 36.86989764584402"
+"""Its square is 6 wide on the floor, 4 away: all of it."""
+
+
+def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):
+    own = "custom float barndoorleft = 0.5\ncustom float barndoorbottomedge = 0.5"
+    with_own = picture(tmp_path, FLOOR + lamp("SphereLight", f"{CONE}\n{own}"), spp=16)
+    body = "float inputs:left = 0.5\nfloat inputs:bottomedge = 0.5"
+    doors = KARMA.format("Doors", "karma:kma_lfilter_barndoor", body)
+    got = picture(
+        tmp_path,
+        FLOOR + lamp("SphereLight", f"{CONE}\nrel light:filters = </Doors>") + doors,
+        spp=16,
+    )
+    assert (got == with_own).all()
+    free = picture(tmp_path, FLOOR + lamp("SphereLight", CONE), spp=16)
+    lit = free[:, :, 0] > 0
+    shares = got[:, :, 0] / np.where(lit, free[:, :, 0], 1)
+    # The left half is dark; from the bottom, half of the square brightens, smoothly.
+    assert (shares[:, :8] == 0).all() and lit.sum() > 100
+    y = (7.5 - np.arange(16)) * 0.25 + 3
+    t = np.clip(y / 6 / 0.5, 0, 1)[:, None] * np.ones((1, 8))
+    fade = t * t * (3 - 2 * t)
+    assert shares[:, 8:][lit[:, 8:]] == pytest.approx(fade[lit[:, 8:]], abs=0.02)
+
+
+def test_karmas_gobo_lies_over_the_cone(tmp_path):
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[0, 0] = (255, 0, 0)  # above, to the left
+    write_image(tmp_path / "slide.png", pixels, "uint8")
+    body = "asset inputs:texture = @slide.png@\ncolor3f inputs:tint = (0.5, 1, 1)"
+    light = lamp("SphereLight", CONE + "\nrel light:filters = </Gobo>")
+    got = picture(tmp_path, FLOOR + light + KARMA.format("Gobo", "kma_lfilter_gobo", body))
+    free = picture(tmp_path, FLOOR + lamp("SphereLight", CONE))
+    # A texel's middle is at a quarter of the square.
+    assert got[1:3, 1:3, 0].mean() / free[1:3, 1:3, 0].mean() == pytest.approx(0.5, rel=0.1)
+    assert got[8:, 8:].max() < 0.15 * got.max() and got[:, :, 1:].max() == 0
+
+
+@pytest.mark.parametrize("kind", ["SphereLight", "DomeLight", "DistantLight"])
+def test_gels_multiply_all_light(tmp_path, kind):
+    gel = KARMA.format(
+        "Gel", "kma_lfilter_gel", "color3f inputs:tint = (1, 0.5, 0)\nfloat inputs:exposure = 1"
+    )
+    mult = """def PxrIntMultLightFilter "Mult" { float inputs:ri:light:intensity = 0.25
+        float inputs:ri:light:saturation = 0
+        float inputs:ri:light:diffuse = 0.5
+    }"""
+    body = POINT if kind == "SphereLight" else ""
+    both = "\nrel light:filters = [</Gel>, </Mult>]"
+    free = picture(tmp_path, FLOOR + lamp(kind, body))
+    got = picture(tmp_path, FLOOR + lamp(kind, body + both) + gel + mult)
+    grey = 0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)  # through both, and half as diffuse
+    lit = free[:, :, 0] > 0
+    assert got[lit] / free[lit] == pytest.approx(np.full((lit.sum(), 3), grey), rel=1e-3)
+
+
 def test_what_is_not_done_is_listed(tmp_path):
     _, loaded = load(
         tmp_path,

@@ -3,8 +3,8 @@
 
 Filters have no schema of their own in UsdLux: what one is, its prim's type says, or what
 ``lightFilter:shaderId`` names, and its inputs are called as the renderer has it whose filter it is.
-Read are RenderMan's barns and cookies, which stand where their prim is, and Arnold's barn doors,
-gobos and decay.
+Read are RenderMan's barns and cookies, which stand where their prim is, Arnold's barn doors,
+gobos and decay, and Karma's barn doors (which a light may have itself, too) and gobos.
 """
 
 from __future__ import annotations
@@ -12,14 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
+from wavecomb.usd.lights.filter_inputs import FilterInputs, filter_prims, kind_of, plain_kind
+from wavecomb.usd.lights.gels import GELS
 from wavecomb.usd.looks.colour_space import space_of
-from wavecomb.usd.looks.network import number, word
+from wavecomb.usd.looks.network import number
 from wavecomb.usd.looks.texture import TextureTable, asset_file
 from wavecomb.usd.stage.report import LoadReport
 
@@ -29,13 +31,9 @@ if TYPE_CHECKING:
 Line = tuple[float, float, float]
 """a, b, c of a x + b y + c."""
 
-_PREFIXES = (
-    "inputs:", "inputs:ri:light:", "inputs:ri:lightFilter:", "inputs:arnold:", "arnold:",
-    "primvars:arnold:", "ri:light:", "ri:lightFilter:", "",
-)  # fmt: skip
-"""What inputs of filters begin with, by who wrote them."""
-
 _OPEN: Line = (0.0, 0.0, 1.0)
+_FLAPS = {"left": (1.0, 0.0), "right": (-1.0, 0.0), "bottom": (0.0, 1.0), "top": (0.0, -1.0)}
+"""Karma's, and what of (x, y) grows away from each."""
 _SHARP = 1e5
 """Steps in a window's size over which a hard edge falls."""
 
@@ -85,81 +83,86 @@ class FilterReader:
         self._time = time
         self._textures = textures
         self._report = report
-        self._readers: dict[str, Callable[[Usd.Prim, Usd.Prim], Filter | None]] = {
+        self._readers: dict[str, Callable[[FilterInputs, Usd.Prim], Filter | None]] = {
             "pxrbarnlightfilter": self._barn, "pxrbarn": self._barn,
             "pxrcookielightfilter": self._cookie, "pxrcookie": self._cookie,
             "arnoldbarndoor": self._doors, "barndoor": self._doors,
             "arnoldgobo": self._gobo, "gobo": self._gobo,
             "arnoldlightdecay": self._decay, "lightdecay": self._decay,
+            "kmalfilterbarndoor": self._flaps, "kmalfiltergobo": self._slide,
         }  # fmt: skip
 
     def of(self, light: Usd.Prim, kind: str) -> tuple[Filter, ...]:
-        """What is read of a light's ``light:filters``; the rest is listed."""
-        relationship = light.GetRelationship("light:filters")
-        targets = relationship.GetForwardedTargets() if relationship else []
-        if targets and kind not in ("rect", "disk", "sphere", "cylinder"):
+        """What is read of a light's ``light:filters`` and of its own doors; the rest is listed.
+
+        Gels are not among them: ``gels``.
+        """
+        prims = [(path, prim) for path, prim in filter_prims(light) if not _gel(prim)]
+        doors = FilterInputs(light, self._time)
+        has_doors = any(doors.number(f"barndoor{flap}", 0.0) > 0 for flap in _FLAPS)
+        if (prims or has_doors) and kind not in ("rect", "disk", "sphere", "cylinder"):
             self._report.missing(f"light filters of {kind} lights", light.GetPath())
             return ()
-        found = []
-        for target in targets:
-            prim = light.GetStage().GetPrimAtPath(target)
-            if not prim:
-                self._report.warn(f"light filter {target} is not there", light.GetPath())
+        found = [self._flaps(doors, light, "barndoor")] if has_doors else []
+        for path, prim in prims:
+            if prim is None:
+                self._report.warn(f"light filter {path} is not there", light.GetPath())
                 continue
-            name = _kind(prim)
-            reader = self._readers.get(name.lower().replace("_", "").rsplit(":", 1)[-1])
+            reader = self._readers.get(plain_kind(prim))
             if reader is None:
-                self._report.missing(f"light filter {name or prim.GetTypeName()}", prim.GetPath())
+                name = kind_of(prim) or prim.GetTypeName()
+                self._report.missing(f"light filter {name}", prim.GetPath())
                 continue
-            one = reader(prim, light)
+            inputs = FilterInputs(prim, self._time)
+            one = reader(inputs, light)
             if one is not None:
-                found.append(replace(one, density=self._number(prim, "density", 1.0)))
+                found.append(replace(one, density=inputs.number("density", 1.0, "effect")))
         return tuple(found)
 
     # ---- kinds -----------------------------------------------------------------------------
 
-    def _barn(self, prim: Usd.Prim, light: Usd.Prim) -> Filter:
+    def _barn(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
         """A window at the prim's own origin, whose edge lies outside."""
-        if word(self._value(prim, "barnMode"), "physical") != "physical":
-            self._report.missing("analytic light barns (as physical ones)", prim.GetPath())
-        if self._number(prim, "radius", 0.0) > 0:
-            self._report.missing("round corners of light barns (square)", prim.GetPath())
-        half = 0.5 * self._number(prim, "width", 1.0) * self._number(prim, "scaleWidth", 1.0)
-        tall = 0.5 * self._number(prim, "height", 1.0) * self._number(prim, "scaleHeight", 1.0)
-        edge = self._number(prim, "edgeThickness", self._number(prim, "edge", 0.0))
+        if inputs.word("barnMode", "physical") != "physical":
+            self._report.missing("analytic light barns (as physical ones)", inputs.prim.GetPath())
+        if inputs.number("radius", 0.0) > 0:
+            self._report.missing("round corners of light barns (square)", inputs.prim.GetPath())
+        half = 0.5 * inputs.number("width", 1.0) * inputs.number("scaleWidth", 1.0)
+        tall = 0.5 * inputs.number("height", 1.0) * inputs.number("scaleHeight", 1.0)
+        edge = inputs.number("edgeThickness", inputs.number("edge", 0.0))
         sides = []
         for name, x, y, room in (
             ("Left", 1.0, 0.0, half), ("Right", -1.0, 0.0, half),
             ("Bottom", 0.0, 1.0, tall), ("Top", 0.0, -1.0, tall),
         ):  # fmt: skip
-            room += self._number(prim, f"refine{name}", 0.0)
-            thick = edge * self._number(prim, f"edge{name}", 1.0)
+            room += inputs.number(f"refine{name}", 0.0)
+            thick = edge * inputs.number(f"edge{name}", 1.0)
             sides.append(_side(x, y, room + thick, thick, max(half, tall)))
-        return Filter(_before(prim, light, self._time), 1.0, sides)
+        return Filter(_before(inputs.prim, light, self._time), 1.0, sides)
 
-    def _cookie(self, prim: Usd.Prim, light: Usd.Prim) -> Filter | None:
+    def _cookie(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
         """A picture at the prim's own origin, as seen from where light comes; black beyond it."""
-        texture = self._texture(prim, "textureMap", self._word(prim, "tileMode", "off"))
+        texture = self._texture(inputs, inputs.word("tileMode", "off"), "textureMap")
         if texture is None:
             return None
-        w, h = (max(self._number(prim, name, 1.0), 1e-6) for name in ("width", "height"))
+        w, h = (max(inputs.number(name, 1.0), 1e-6) for name in ("width", "height"))
         return Filter(
-            _before(prim, light, self._time), 1.0,
+            _before(inputs.prim, light, self._time), 1.0,
             picture=((1 / w, 0.0, 0.5), (0.0, 1 / h, 0.5)), texture=texture,
         )  # fmt: skip
 
-    def _doors(self, prim: Usd.Prim, light: Usd.Prim) -> Filter:
+    def _doors(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
         """Flaps over the square around a spot light's cone, from 0 at its left and top to 1."""
-        away, size = self._cone(prim, light)
+        away, size = self._cone(inputs, light)
         usual = {"top": 0.0, "left": 0.0, "bottom": 1.0, "right": 1.0}
         ends = {"top": ("left", "right"), "bottom": ("left", "right")}
         sides = []
         for flap, shut in usual.items():
             first, last = (
-                self._number(prim, f"barndoor_{flap}_{end}", shut)
+                inputs.number(f"barndoor_{flap}_{end}", shut)
                 for end in ends.get(flap, ("top", "bottom"))
             )
-            edge = self._number(prim, f"barndoor_{flap}_edge", 0.0)
+            edge = inputs.number(f"barndoor_{flap}_edge", 0.0)
             # (across, along) = what the flap moves by, and what its ends are at; in the square.
             across, along = (
                 ((0.0, -0.5 / size, 0.5), (0.5 / size, 0.0, 0.5))
@@ -173,56 +176,74 @@ class FilterReader:
             sides.append(_OPEN if first == last == shut else _scaled((a, b, c), edge, 1.0))
         return Filter(np.eye(4), away, sides)
 
-    def _gobo(self, prim: Usd.Prim, light: Usd.Prim) -> Filter | None:
+    def _gobo(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
         """A picture over the square around a spot light's cone."""
-        texture = self._texture(prim, "slidemap", self._word(prim, "swrap", "clamp"))
+        texture = self._texture(inputs, inputs.word("swrap", "clamp"), "slidemap")
         if texture is None:
             return None
-        away, size = self._cone(prim, light)
-        angle = math.radians(self._number(prim, "rotate", 0.0))
+        away, size = self._cone(inputs, light)
+        angle = math.radians(inputs.number("rotate", 0.0))
         cos, sin = math.cos(angle), math.sin(angle)
-        s, t = (self._number(prim, name, 1.0) for name in ("sscale", "tscale"))
+        s, t = (inputs.number(name, 1.0) for name in ("sscale", "tscale"))
         k = 0.5 / size
         u: Line = (k * cos * s, k * sin * s, 0.5)
         v: Line = (-k * sin * t, k * cos * t, 0.5)
         return Filter(np.eye(4), away, picture=(u, v), texture=texture)
 
-    def _decay(self, prim: Usd.Prim, light: Usd.Prim) -> Filter:
+    def _decay(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
         decay = [0.0] * 4
         for i, name in enumerate(("near", "far")):
-            if self._value(prim, f"use_{name}_atten"):
-                decay[2 * i] = self._number(prim, f"{name}_start", 0.0)
-                decay[2 * i + 1] = self._number(prim, f"{name}_end", 0.0)
+            if inputs.value(f"use_{name}_atten"):
+                decay[2 * i] = inputs.number(f"{name}_start", 0.0)
+                decay[2 * i + 1] = inputs.number(f"{name}_end", 0.0)
         return Filter(np.eye(4), decay=(decay[0], decay[1], decay[2], decay[3]))
+
+    def _flaps(self, inputs: FilterInputs, light: Usd.Prim, before: str = "") -> Filter:
+        """Karma's doors: of 0 they are open, of 1 across the whole cone; edges likewise."""
+        if inputs.value("invert", "invertblockers", "invert_blockers"):
+            self._report.missing("inverted light doors (as they are)", inputs.prim.GetPath())
+        away, size = self._cone(inputs, light)
+        sides = []
+        for flap, (x, y) in _FLAPS.items():
+            shut, edge = (
+                max(inputs.number(f"{before}{flap}{end}", 0.0), 0.0) for end in ("", "edge")
+            )
+            sides.append(
+                _scaled((x * 0.5 / size, y * 0.5 / size, 0.5 - shut), edge, 1.0)
+                if shut > 0 or edge > 0
+                else _OPEN
+            )
+        return Filter(np.eye(4), away, sides)
+
+    def _slide(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
+        """Karma's gobo: a picture over the square around a spot light's cone."""
+        for name in ("blur", "invert", "invertcolor"):
+            if inputs.value(name):
+                self._report.missing(f"{name} of a light's gobo", inputs.prim.GetPath())
+        wrap = {"streak": "clamp", "decal": "black"}.get(
+            inputs.word("wrap", "decal", "wrapmode", "wrap_mode"), "periodic"
+        )
+        texture = self._texture(inputs, wrap, "texture", "map", "texturemap")
+        if texture is None:
+            return None
+        away, size = self._cone(inputs, light)
+        lines = []
+        for i, axis in enumerate("uv"):
+            scale = inputs.number(f"{axis}scale", 1.0, f"{axis}_scale")
+            offset = inputs.number(f"{axis}offset", 0.0, f"{axis}_offset")
+            k = 0.5 / (size * scale) if abs(scale) > 1e-6 else 0.5 / size
+            lines.append((0.0 if i else k, k if i else 0.0, 0.5 - offset))
+        return Filter(np.eye(4), away, picture=(lines[0], lines[1]), texture=texture)
 
     # ---- inputs ----------------------------------------------------------------------------
 
-    def _attribute(self, prim: Usd.Prim, name: str) -> Usd.Attribute | None:
-        for prefix in _PREFIXES:
-            attribute = prim.GetAttribute(prefix + name)
-            if attribute and (attribute.HasAuthoredValue() or attribute.HasAuthoredConnections()):
-                return attribute
-        return None
-
-    def _value(self, prim: Usd.Prim, name: str) -> Any:
-        attribute = self._attribute(prim, name)
-        return None if attribute is None else attribute.Get(self._time)
-
-    def _number(self, prim: Usd.Prim, name: str, default: float) -> float:
-        value = self._value(prim, name)
-        return default if value is None else number(value, default)
-
-    def _word(self, prim: Usd.Prim, name: str, default: str) -> str:
-        value = self._value(prim, name)
-        return default if value is None else word(value, default)
-
-    def _cone(self, prim: Usd.Prim, light: Usd.Prim) -> tuple[float, float]:
+    def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
         """A distance at which the light is small; half the side of the square around its cone."""
         attribute = light.GetAttribute("inputs:shaping:cone:angle")
         angle = number(attribute.Get(self._time), 90.0) if attribute else 90.0
         if not angle < 89.0:
             self._report.missing(
-                "doors of lights without a cone (as of 45 degrees)", prim.GetPath()
+                "doors of lights without a cone (as of 45 degrees)", inputs.prim.GetPath()
             )
             angle = 45.0
         sizes = [light.GetAttribute(f"inputs:{name}") for name in ("radius", "width", "height")]
@@ -230,22 +251,21 @@ class FilterReader:
         away = 10.0 * max(abs(extent), 0.1)
         return away, away * math.tan(math.radians(max(angle, 0.1)))
 
-    def _texture(self, prim: Usd.Prim, name: str, wrap: str) -> int | None:
+    def _texture(self, inputs: FilterInputs, wrap: str, *names: str) -> int | None:
         """The id of a file that an input names, or the image that is connected to it."""
-        attribute = self._attribute(prim, name)
+        attribute = inputs.attribute(*names)
         if attribute is not None and attribute.HasAuthoredConnections():
             sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(attribute))
             node = sources[0].GetPrim() if sources else None
-            attribute = None
-            for one in ("filename", "file"):
-                if node is not None and attribute is None:
-                    attribute = self._attribute(node, one)
+            attribute = node and FilterInputs(node, self._time).attribute("filename", "file")
         value = attribute.Get(self._time) if attribute is not None else None
         path = asset_file(value, attribute) if value is not None else ""
         if not path or self._textures is None:
-            self._report.missing(f"light filter without a file for {name}", prim.GetPath())
+            self._report.missing(
+                f"light filter without a file for {names[0]}", inputs.prim.GetPath()
+            )
             return None
-        image = self._textures.image(path, prim.GetPath())
+        image = self._textures.image(path, inputs.prim.GetPath())
         if image is None:
             return None
         over = {"periodic": "repeat", "tile": "repeat", "mirror": "mirror", "clamp": "clamp"}
@@ -254,13 +274,9 @@ class FilterReader:
         return self._textures.add(path, image, tag, edge, edge, is_colour=True)
 
 
-def _kind(prim: Usd.Prim) -> str:
-    """What a filter is."""
-    name = str(prim.GetTypeName())
-    if name in ("LightFilter", "PluginLightFilter", ""):
-        attribute = prim.GetAttribute("lightFilter:shaderId")
-        name = word(attribute.Get(), "") if attribute else ""
-    return name
+def _gel(prim: Usd.Prim | None) -> bool:
+    """Whether it is nothing but a gel, which ``gels`` reads."""
+    return prim is not None and plain_kind(prim) in GELS
 
 
 def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float64]:

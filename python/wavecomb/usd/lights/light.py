@@ -22,6 +22,7 @@ from wavecomb.light_table import (
 from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.filters import Filter, FilterReader
+from wavecomb.usd.lights.gels import Gel, gel_of
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.colour_space import linear_colour, space_of
 from wavecomb.usd.looks.network import colour, number
@@ -147,7 +148,8 @@ class LightReader:
 
     def _common(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
         """Options that lights of all kinds have."""
-        radiance = self._colour(prim)
+        gel = gel_of(prim, self.time)
+        radiance = self._colour(prim, gel)
         if not all(0 <= value < 1e30 for value in radiance):
             self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
             radiance = (0.0, 0.0, 0.0)
@@ -160,6 +162,7 @@ class LightReader:
         if self.links and not self._get(prim, "shadow:enable", True):
             options["shadow_link"] = self.links.nothing()
         options.update(self._plain(prim, MESH if kind == "mesh" else kind))
+        options.update(gel.multiplied(options))
         return options
 
     def _plain(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
@@ -194,8 +197,8 @@ class LightReader:
         value = attribute.Get(self.time)
         return default if value is None else value
 
-    def _colour(self, prim: Usd.Prim) -> tuple[float, float, float]:
-        """Colour * intensity * 2^exposure * colour temperature."""
+    def _colour(self, prim: Usd.Prim, gel: Gel) -> tuple[float, float, float]:
+        """Colour * intensity * 2^exposure * colour temperature, through gels."""
         # What is not finite stays so, and is warned of.
         bad = math.nan
         authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
@@ -209,7 +212,8 @@ class LightReader:
         if self._get(prim, "enableColorTemperature", False):
             kelvin = number(self._get(prim, "colorTemperature", 6500.0), 6500.0)
             tint = blackbody(kelvin)
-        rgb = [float(c * t * power) for c, t in zip(base, tint, strict=True)]
+        r, g, b = (float(c * t * power) for c, t in zip(base, tint, strict=True))
+        rgb = gel.over((r, g, b))
         working = "rec709" if self.textures is None else self.textures.working
         r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
         if min(authored) >= 0:  # what the working space cannot hold is at its edge
