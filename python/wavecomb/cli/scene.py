@@ -30,7 +30,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
         "wavecomb scene lights -o street.usdc --lights 10000",
         "wavecomb scene smoke -o smoke.usdc --voxels 500",
         "wavecomb scene head -o head.usdc --strands 1000000",
-        "wavecomb scene mixed -o plain.usdc --plain",
+        "wavecomb scene mixed -o plain.usdc --plain --lamps",
     ),
 )
 @click.argument("name", required=False, shell_complete=_names)
@@ -54,6 +54,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     "--programs", type=click.IntRange(1, 5), metavar="N", help="spread: kinds of materials, 1 to 5."
 )
 @click.option("--lights", type=click.IntRange(min=1), metavar="N", help="lights: how many.")
+@click.option("--lamps", is_flag=True, help="mixed, dragon: a key, a fill and a dim dome.")
 @click.option("--strands", type=click.IntRange(min=1), metavar="N", help="fur, head: how many.")
 @click.option(
     "--voxels",

@@ -20,6 +20,7 @@ from wavecomb.scenes.drinks import build_drinks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
+from wavecomb.scenes.kitchen import build_kitchen
 from wavecomb.scenes.lights import build_lights
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
@@ -56,6 +57,7 @@ SCENES: dict[str, SceneInfo] = {
     "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
     "studio": SceneInfo("90 objects, a key, a fill and a dim dome", 0.1, build_studio),
     "room": SceneInfo("a dining room, lit through a door ajar", 1.0, build_room),
+    "kitchen": SceneInfo("a kitchen where nearly all is glossy", 1.0, build_kitchen),
     "smoke": SceneInfo("smoke over an ember, a grid: see --voxels", 1.0, build_smoke),
     "clouds": SceneInfo("clouds over the sea, a grid: see --voxels", 100.0, build_clouds),
     "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),

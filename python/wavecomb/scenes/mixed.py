@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two experiment stages: 90 instanced objects and a mirror in the evening sun."""
+"""The two experiment stages: 90 instanced objects and a mirror in the evening sun.
+
+Or, with ``SceneOptions.lamps``, lit as most stages are: a key, a fill, and a dim, even dome.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ def _dealt(names: list[str], count: int, rng: np.random.Generator) -> list[str]:
     return dealt[:count]
 
 
-def _set(writer: StageWriter, aspect: float) -> None:
+def _set(writer: StageWriter, options: SceneOptions) -> None:
     """Ground, mirror, lights and camera."""
     writer.material("Floor", looks.FLOOR)
     half = _GROUND_HALF
@@ -82,8 +85,14 @@ def _set(writer: StageWriter, aspect: float) -> None:
     writer.polygons("/World/Set/Mirror", mirror, [[0, 1, 2, 3]], "Mirror")
     _frame(writer, mirror)
 
-    writer.rect_light("Ceiling", (2.0, 15.0, -8.0), 20.0, 10.0, (2.6, 2.5, 2.35))
-    writer.dome_light("Sky", 0.0)
+    if options.lamps:
+        writer.rect_light("Key", (-7.0, 14.0, 8.0), 4.0, 4.0, (46.0, 44.0, 41.0), -52.0)
+        writer.rect_light("Fill", (13.0, 11.0, 12.0), 5.0, 5.0, (5.0, 5.4, 6.2), -42.0)
+        writer.even_dome("Dome", 0.12)
+    else:
+        writer.rect_light("Ceiling", (2.0, 15.0, -8.0), 20.0, 10.0, (2.6, 2.5, 2.35))
+        writer.dome_light("Sky", 0.0)
+    aspect = options.aspect or 16.0 / 9.0
     writer.camera((0.9, 5.6, 15.2), (0.0, 1.1, -9.5), 55.0, aspect)
 
 
@@ -118,7 +127,7 @@ def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
 
 def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> None:
     rng = np.random.default_rng([options.seed, 90])
-    _set(writer, options.aspect or 16.0 / 9.0)
+    _set(writer, options)
     dragon_looks = dict(_DRAGON_LOOKS)
     if not with_teapots:
         dragon_looks.update(

@@ -30,6 +30,7 @@ class SceneOptions:
         shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
             which is none, geometrically.
         lights: How many ``lights`` has.
+        lamps: Whether ``mixed`` and ``dragon`` are lit by a key, a fill and a dim dome.
         strands: How many ``fur`` and ``head`` have.
         voxels: Along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
@@ -50,6 +51,7 @@ class SceneOptions:
     texture_mb: float = 16.0
     shader_cost: float = 1.0
     lights: int = 1000
+    lamps: bool = False
     strands: int = 100_000
     voxels: int = 160
     plain: bool = False

@@ -116,11 +116,16 @@ LOOKS: dict[str, MaterialInfo] = {
 """Every material of the room by name."""
 
 
-def write_looks(writer: StageWriter, options: SceneOptions) -> None:
-    """Adds all materials and the images that they read."""
+def write_textures(writer: StageWriter, options: SceneOptions) -> None:
+    """Lets materials name the room's images."""
     for name, info in ROOM_TEXTURES.items():
         size = max(_LEAST_SIZE, info.size * options.texture_size // _FULL_SIZE)
         scaled = TextureInfo(info.make, size, info.colour, info.channels, info.normal)
         writer.define_texture(name, scaled)
+
+
+def write_looks(writer: StageWriter, options: SceneOptions) -> None:
+    """Adds all materials and the images that they read."""
+    write_textures(writer, options)
     for name, material in LOOKS.items():
         writer.material(name, material)

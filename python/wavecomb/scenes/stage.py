@@ -313,6 +313,11 @@ class StageWriter:
         light.CreateIntensityAttr(intensity)
         light.AddRotateYOp().Set(turn_degrees)
 
+    def even_dome(self, name: str, radiance: float) -> None:
+        """Adds an environment that is white all around."""
+        light = UsdLux.DomeLight.Define(self.stage, f"/World/Lights/{name}")
+        light.CreateIntensityAttr(radiance)
+
     def camera(
         self,
         position: Sequence[float],

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pxr import UsdLux
 
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.options import SceneOptions
@@ -56,6 +55,5 @@ def build_studio(writer: StageWriter, options: SceneOptions) -> None:
         )
     writer.rect_light("Key", (-3.0, 11.0, 6.0), 3.0, 3.0, (13.0, 12.6, 12.0), -62.0)
     writer.rect_light("Fill", (9.0, 10.0, 14.0), 4.0, 4.0, (2.6, 2.8, 3.2), -40.0)
-    dome = UsdLux.DomeLight.Define(writer.stage, "/World/Lights/Dome")
-    dome.CreateIntensityAttr(0.12)
+    writer.even_dome("Dome", 0.12)
     writer.camera((0.0, 9.0, 19.0), (0.0, 0.5, -1.0), 50.0, options.aspect or 1.0)
