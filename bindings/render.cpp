@@ -210,14 +210,15 @@ size_t picture_bytes(const Picture& p) {
 Result render(const std::shared_ptr<const Scene>& scene, nb::handle settings,
               const nb::object& progress, const nb::object& policy, const nb::object& costs,
               RayRecording* recorder, const nb::object& watcher, const nb::object& state,
-              double interval) {
+              double interval, const nb::object& learned) {
   std::unique_ptr<WavefrontRenderer> renderer;
   return run_render(
       [&](const Settings& s) -> WavefrontRenderer& {
         renderer = std::make_unique<WavefrontRenderer>(scene, s.threads);
         return *renderer;
       },
-      *scene, {settings, progress, policy, costs, recorder, watcher, state, interval});
+      *scene,
+      {settings, progress, policy, costs, recorder, watcher, state, interval, true, learned});
 }
 
 }  // namespace
@@ -249,6 +250,11 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
     resumed = nb::cast<nb::dict>(a.state);
     options.resume = resumed_from(resumed);
   }
+  if (!a.learned.is_none()) {
+    const auto given = nb::cast<nb::bytes>(a.learned);
+    const auto* first = reinterpret_cast<const std::byte*>(given.c_str());
+    options.learned.assign(first, first + given.size());
+  }
   {
     const nb::gil_scoped_release release;
     settings.check();
@@ -256,6 +262,7 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
     result.picture = ready.render(settings, options);
     result.statistics = ready.statistics();
     result.profile = ready.cost_profile();
+    if (result.statistics.guiding.paths > 0) result.learned = ready.packed_learned();
   }
   return result;
 }
@@ -280,6 +287,8 @@ void bind_render(nb::module_& m) {
       .def_prop_ro("manifests", &manifests_dict)
       .def_prop_ro("deep", [](nb::handle_t<Result> self) { return deep_pair(self); })
       .def_prop_ro("cancelled", [](const Result& r) { return r.statistics.cancelled; })
+      .def_prop_ro("learned",
+                   [](const Result& r) { return nb::bytes(r.learned.data(), r.learned.size()); })
       .def_prop_ro("costs", [](const Result& r) { return from_profile(r.profile); })
       .def_prop_ro("stats", [](const Result& r) {
         return statistics_dict(r.statistics, r.settings, picture_bytes(r.picture));
@@ -287,7 +296,8 @@ void bind_render(nb::module_& m) {
 
   m.def("render", &render, "scene"_a, "settings"_a, "progress"_a = nb::none(),
         "policy"_a = nb::none(), "costs"_a = nb::none(), "recorder"_a = nb::none(),
-        "watcher"_a = nb::none(), "state"_a = nb::none(), "interval"_a = 0.1);
+        "watcher"_a = nb::none(), "state"_a = nb::none(), "interval"_a = 0.1,
+        "learned"_a = nb::none());
   m.def("aov_table", &aov_table);
   m.def("crypto_id", [](const std::string& name) { return crypto_id(name); });
   m.def("lane_widths", &lane_widths);

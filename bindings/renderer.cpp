@@ -20,10 +20,10 @@ namespace {
 
 Result render(WavefrontRenderer& renderer, nb::handle settings, const nb::object& progress,
               const nb::object& policy, const nb::object& costs, const nb::object& watcher,
-              const nb::object& state, double interval, bool picture) {
+              const nb::object& state, double interval, bool picture, const nb::object& learned) {
   return run_render(
       [&](const Settings&) -> WavefrontRenderer& { return renderer; }, *renderer.scene(),
-      {settings, progress, policy, costs, nullptr, watcher, state, interval, picture});
+      {settings, progress, policy, costs, nullptr, watcher, state, interval, picture, learned});
 }
 
 void edit(WavefrontRenderer& renderer, const nb::object& camera, const nb::dict& materials,
@@ -99,7 +99,7 @@ void bind_renderer(nb::module_& m) {
            "lights"_a = nb::dict())
       .def("render", &render, "settings"_a, "progress"_a = nb::none(), "policy"_a = nb::none(),
            "costs"_a = nb::none(), "watcher"_a = nb::none(), "state"_a = nb::none(),
-           "interval"_a = 0.1, "picture"_a = true)
+           "interval"_a = 0.1, "picture"_a = true, "learned"_a = nb::none())
       .def("stop", &WavefrontRenderer::stop)
       .def("twin", &WavefrontRenderer::twin)
       .def("pick", &pick_at, "x"_a, "y"_a, "width"_a, "height"_a)

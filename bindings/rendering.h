@@ -4,7 +4,9 @@
 
 #include <nanobind/nanobind.h>
 
+#include <cstddef>
 #include <functional>
+#include <vector>
 
 #include "wavecomb/render/ray_recording.h"
 #include "wavecomb/render/renderer.h"
@@ -15,6 +17,7 @@ struct Result {
   wavecomb::RenderStatistics statistics;
   wavecomb::CostProfile profile;
   nanobind::dict settings;
+  std::vector<std::byte> learned;  ///< wavecomb::packed_training(); empty: nothing
 };
 
 /// What render() is called with; None where nothing is given.
@@ -25,6 +28,7 @@ struct RenderArguments {
   nanobind::object watcher, state;
   double interval;
   bool wants_picture = true;
+  nanobind::object learned = nanobind::none();
 };
 
 /// Renders `scene` by what `renderer` gives, which is called without the GIL once the arguments are

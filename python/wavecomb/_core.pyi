@@ -700,6 +700,9 @@ class Result:
         """Samples of each pixel (height, width), and R, G, B, A, Z, ZBack of all samples (n, 6),
         pixel by pixel, the nearest first; None unless the AOV deep was asked for."""
     @property
+    def learned(self) -> bytes:
+        """What guided it, for `learned` of another render of such a scene; empty: nothing did."""
+    @property
     def manifests(self) -> dict[str, dict[str, int]]:
         """Cryptomatte level -> name -> id, of all that the picture holds."""
     @property
@@ -758,6 +761,7 @@ def render(
     watcher: Any = None,
     state: dict[str, Any] | None = None,
     interval: float = 0.1,
+    learned: bytes | None = None,
 ) -> Result:
     """Renders; calls progress(samples_done, samples_total) every `interval` seconds on the calling
     thread (GIL held); returning False cancels, and the result holds what was done.
@@ -768,7 +772,7 @@ def render(
     the wavefront integrator. watcher: as run.watcher.Watcher: progress(status) is called like
     progress and answers None, "snapshot" or "stop"; snapshot(snapshot) gets the snapshots that were
     asked for and one at the end. state: of a snapshot of a render with the same settings, to go on
-    from."""
+    from. learned: of another Result, to be guided by in place of what would be learned."""
 
 class Renderer:
     """A scene ready to be rendered, and to be changed.
@@ -818,6 +822,7 @@ class Renderer:
         state: dict[str, Any] | None = None,
         interval: float = 0.1,
         picture: bool = True,
+        learned: bytes | None = None,
     ) -> Result:
         """As render(), of the scene as it is. picture: False leaves all layers of the result None,
         for a watcher that takes what it needs of snapshots; a render that is stopped ends sooner

@@ -15,6 +15,7 @@ from wavecomb.load_options import LoadOptions, split
 from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import catchers, live
+from wavecomb.run.learned import check_taught, learned_of
 from wavecomb.run.settings import DEFAULT_SIZE, check_memory, prepare
 from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
@@ -107,6 +108,7 @@ def render(
     checkpoint: str | os.PathLike[str] | None = None,
     every: float = 120.0,
     resume: str | os.PathLike[str] | None = None,
+    learn_from: str | os.PathLike[str] | bytes | Picture | None = None,
     isolate: bool | None = None,
     **options: Any,
 ) -> Picture:
@@ -130,6 +132,8 @@ def render(
         every: Seconds between checkpoints.
         resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
             is, bit for bit, that of a render that nothing stopped.
+        learn_from: With ``guiding``: a picture, or what its ``save_learned`` wrote, whose field
+            guides this render, too. Nothing is learned anew then.
         isolate: As in ``load``; for a path only.
         **options: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed, adaptive,
             noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera,
@@ -179,12 +183,17 @@ def render(
             )
         chosen = catchers.with_alpha(chosen)
         names = aov_names.with_others(names, [catchers.LAYER])
+    learned = learned_of(learn_from)
+    if learned is not None:
+        check_taught(chosen, "learn_from")
     again = loaded if loaded is source else None
     told, asked = (progress, False) if callable(progress) else (None, progress)
     space = "rec709" if loaded is None else loaded.working_space
     with live.watching(asked, space) as shown:
         watcher, state = _keeping(scene, chosen, names, stage, checkpoint, every, resume, shown)
-        result, is_built = _render(scene, again, chosen, told, own, profile, watcher, state)
+        result, is_built = _render(
+            scene, again, chosen, told, own, profile, watcher, state, learned
+        )
     stats = make_stats(result, stage=stage, loaded=loaded, is_built=is_built)
     picture = picture_of(result, stats, scene=scene, aovs=names)
     if not has_catchers or picture.cancelled:
@@ -194,7 +203,9 @@ def render(
         size = chosen.width, chosen.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": chosen.threads, **how})
         scene = load(str(stage), options, isolate=isolate).scene
-        return _render(scene, None, catchers.of_catchers(chosen), None, own, None, None, None)[0]
+        return _render(
+            scene, None, catchers.of_catchers(chosen), None, own, None, None, None, learned
+        )[0]
 
     return catchers.caught(picture, of_catchers)
 
@@ -296,12 +307,14 @@ def _render(
     costs: dict[str, dict[str, float]] | None,
     watcher: Watcher | None,
     state: dict[str, Any] | None,
+    learned: bytes | None,
 ) -> tuple[Result, bool]:
     """Also whether a hierarchy was built. again: the stage, where it may be rendered once more."""
     from wavecomb import _core
 
     if again is None:
-        named: dict[str, Any] = {"watcher": watcher, "state": state}
+        named: dict[str, Any] = {"watcher": watcher, "state": state, "learned": learned}
         return _core.render(scene, settings, progress, policy, costs, **named), True
     with again.renderer(settings.threads) as (renderer, is_new):
-        return renderer.render(settings, progress, policy, costs, watcher, state), is_new
+        result = renderer.render(settings, progress, policy, costs, watcher, state, learned=learned)
+        return result, is_new

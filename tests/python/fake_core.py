@@ -122,6 +122,7 @@ class Fake:
         costs: Any = None,
         watcher: Any = None,
         state: Any = None,
+        learned: Any = None,
     ) -> Any:
         if self.fail is not None:
             raise self.fail
@@ -165,6 +166,7 @@ class Fake:
             aovs={},
             manifests={},
             deep=None,
+            learned=b"",
             costs={"materials": {"Gold": 50.0, "Chalk": 25.5}, "textures": {"wood.png": 60.0}},
             stats={
                 "settings": settings.to_dict(),

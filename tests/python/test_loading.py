@@ -316,3 +316,17 @@ print(json.dumps([name for name in ("OpenImageIO", "rich") if name in sys.module
         )
         found[force] = json.loads(run.stdout)
     assert found == {"": [], "1": ["rich"]}
+
+
+@LINUX
+@pytest.mark.slow
+def test_what_a_frame_does_not_need_is_not_in_memory() -> None:
+    """Other frames of a cache, other payloads than those of a mask: 60 MB each."""
+    pytest.importorskip("wavecomb._core")
+    command = [sys.executable, "benchmarks/large_stages.py", "--gb", "0.06", "--points", "20000"]
+    root = Path(__file__).resolve().parents[2]
+    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
+    for line, name in zip(run.stdout.splitlines()[1:], ("cache", "parts"), strict=True):
+        kind, size, _, peak, _, alone = line.replace(",", "").split()
+        assert kind == name and float(size) > 0.05
+        assert float(peak) - float(alone) < 16, line

@@ -17,6 +17,7 @@ from wavecomb.cli.render import picture_options
 from wavecomb.cli.row_options import Real
 from wavecomb.cli.setting_options import SettingCommand
 from wavecomb.errors import WavecombError
+from wavecomb.run.learned import BEFORE
 
 if TYPE_CHECKING:
     from wavecomb.farm.spec import Spec
@@ -142,10 +143,11 @@ def submit_command(
         prepared, asked, every=every or 120.0, tries=tries, lease_s=lease, hang_s=hang,
         slow=slow, strict=strict, assets=assets, maps=parse_maps(maps), isa=isa,
     )  # fmt: skip
-    spec = complete(spec, tiles=cut, workers=who.count, chunk=chunk)
+    learned = prepared.learning.given
+    spec = complete(spec, tiles=cut, workers=who.count, chunk=chunk, is_taught=learned is not None)
     listed = ask_assets(asked.stage, _stage_words(asked.source)) if strict else None
     path = job or default_folder(asked.output, asked.stage, asked.output_dir)
-    folder = create(spec, path, listed)
+    folder = create(spec, path, listed, learned=learned)
     threads = int(spec.shots[0].settings.get("threads") or 0)
     if who.kind == "none":
         _say_folder(folder, as_json)
@@ -161,6 +163,16 @@ def _check_options(asked: Asked) -> None:
         ("--resume", purpose.resume, "`wavecomb farm resume` goes on with a job"),
         ("--preview", purpose.preview, "`wavecomb farm status` shows how far it is"),
         ("--costs", asked.costs_file, "a file would be written by all workers; give --costs model"),
+        (
+            "--learn-from",
+            asked.learn_from if asked.learn_from == BEFORE else None,
+            "frames go to any worker in any order; give a file",
+        ),
+        (
+            "--learn-to",
+            asked.learn_to,
+            "a render keeps it, of one picture, and --learn-from gives it to the job",
+        ),
         ("--deep", asked.deep, "tiles of deep pictures are not put together; give it to render"),
         ("--film-memory", asked.film_memory, "--tiles say what a worker holds"),
         ("--progress", purpose.progress if purpose.progress == "json" else None, "give --json"),

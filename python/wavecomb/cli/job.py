@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import signal
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.cli.aovs import AovOptions
@@ -16,6 +16,7 @@ from wavecomb.cli.purpose import PurposeOptions
 from wavecomb.cli.shots import Shot
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill
+from wavecomb.run.learned import Learning
 
 if TYPE_CHECKING:
     from wavecomb.cli.reporting import Reporter
@@ -58,6 +59,7 @@ class Job:
     exposure: float
     tone_map: Any
     film_memory: float | None = None
+    learning: Learning = field(default_factory=Learning)
 
     def run(
         self,
@@ -108,7 +110,11 @@ class Job:
                 is_stopped=lambda: interrupt.requested,
                 warn=lambda line: warn([line]),
             )
-            result = shot.render(settings, None, None, self.profile, watcher=watcher, state=state)
+            result = shot.render(
+                settings, None, None, self.profile, watcher=watcher, state=state,
+                learned=self.learning.given,
+            )  # fmt: skip
+            self.learning.take(result)
             stats = shot.stats(result, seconds)
             picture = picture_of(result, stats, scene=loaded.scene, aovs=aovs)
             if loaded.catchers and not result.cancelled:
@@ -126,7 +132,10 @@ class Job:
         def render(how: Mapping[str, str]) -> Any:
             shot.load(None, **how)
             watcher = Watcher(is_stopped=is_stopped, warn=lambda line: warn([line]))
-            return shot.render(catchers.of_catchers(settings), None, None, None, watcher=watcher)
+            return shot.render(
+                catchers.of_catchers(settings), None, None, None, watcher=watcher,
+                learned=self.learning.given,
+            )  # fmt: skip
 
         with_shadows = catchers.caught(picture, render)
         return replace(picture, cancelled=True) if is_stopped() else with_shadows
@@ -164,7 +173,10 @@ class Job:
                     is_stopped=lambda: interrupt.requested,
                     warn=lambda line: warn([line]),
                 )
-                return shot.render_part(band, None, None, self.profile, watcher=watcher, state=None)
+                return shot.render_part(
+                    band, None, None, self.profile, watcher=watcher, state=None,
+                    learned=self.learning.given,
+                )  # fmt: skip
 
             def picture_in(result: Any, stats: dict[str, Any]) -> Picture:
                 of_all = {**stats, "settings": settings}
@@ -176,6 +188,7 @@ class Job:
 
             with contextlib.suppress(_NotKept), files:
                 for result in render_bands(render, self.settings, rows, bar):
+                    self.learning.take(result)
                     parts.append(shot.stats(result, 0.0))
                     costs = result.costs
                     if result.cancelled and not (keeps_stopped and _any_samples(parts)):

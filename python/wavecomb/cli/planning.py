@@ -18,6 +18,7 @@ from wavecomb.cli.reporting import Reporter, make_reporter
 from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
+from wavecomb.run.learned import BEFORE, ENDING, Learning, check_taught, learned_of
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
@@ -44,6 +45,8 @@ class Asked:
         tone_map: --tone-map.
         quiet: --quiet.
         costs: --costs.
+        learn_from: --learn-from.
+        learn_to: --learn-to.
         frames: --frames.
         skip_existing: --skip-existing.
         film_memory: --film-memory.
@@ -65,6 +68,8 @@ class Asked:
     tone_map: Any
     quiet: bool
     costs: str | None
+    learn_from: str | None
+    learn_to: str | None
     frames: str | None
     skip_existing: bool
     film_memory: float | None
@@ -83,7 +88,8 @@ class Asked:
             name: options.pop(name)
             for name in (
                 "stage", "output", "output_dir", "png", "deep", "stats_file", "size", "spp",
-                "exposure", "tone_map", "quiet", "costs", "frames", "skip_existing", "film_memory",
+                "exposure", "tone_map", "quiet", "costs", "learn_from", "learn_to", "frames",
+                "skip_existing", "film_memory",
             )
         }  # fmt: skip
         chosen = {name: value for name, value in options.items() if value is not None}
@@ -97,13 +103,27 @@ class Asked:
 
     def written(self) -> tuple[str | None, ...]:
         """Files that are written, with places for the frame."""
-        own = (self.output, self.png, self.deep, self.stats_file, self.costs_file)
+        own = (self.output, self.png, self.deep, self.stats_file, self.costs_file, self.learn_to)
         return (*own, self.purpose.preview, self.purpose.checkpoint_file)
 
     @property
     def whole(self) -> str:
         """An option that needs all of the picture at once; empty: there is none."""
         return self.purpose.whole or ("" if self.deep is None else "--deep")
+
+    def learning(self) -> Learning:
+        """What the pictures start from. Raises WavecombError where that cannot be read."""
+        if self.learn_from != BEFORE:
+            return Learning(learned_of(self.learn_from))
+        if self.frames is None:
+            raise WavecombError("--learn-from before: is for sequences: give --frames, too")
+        return Learning(follows=True)
+
+    def check_learning(self, settings: Any) -> None:
+        """Raises WavecombError where nothing is learned with such settings."""
+        for option, given in (("--learn-from", self.learn_from), ("--learn-to", self.learn_to)):
+            if given is not None:
+                check_taught(settings, f"{option} {given}")
 
     def check_deep(self) -> None:
         """Raises WavecombError where a deep picture is asked for as a layer."""
@@ -137,6 +157,7 @@ class Prepared:
         source: Options of the stage, those of a checkpoint included.
         resumed: The checkpoint to go on from.
         jobs: A plan, its frames and its job for each product.
+        learning: What all jobs start from.
         opened: Held until the stage is loaded, so that its layers are read once.
         reporter: Of all jobs.
     """
@@ -144,6 +165,7 @@ class Prepared:
     source: StageOptions
     resumed: Checkpoint | None
     jobs: list[tuple[Plan, tuple[float, ...] | None, Job]]
+    learning: Learning
     opened: Any
     reporter: Reporter
 
@@ -167,7 +189,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
             if plan is not None:
                 plan.check_place(here)
             at_frame = purpose if frame is None else purpose_at(purpose, frame)
-            _check_outputs(asked.stage, here, at_frame, asked.costs_file)
+            _check_outputs(asked, here, at_frame)
         return numbers
 
     asked.check_deep()
@@ -183,6 +205,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     if asked.costs is not None and asked.costs_file is None:
         chosen["costs"] = asked.costs
     profile = _read_costs(asked.costs_file)
+    learning = asked.learning()
     chosen |= purpose.settings(asked.spp, resumed)
     if asked.size is not None:
         chosen["width"], chosen["height"] = asked.size
@@ -210,12 +233,13 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         )
         shows_errors = keeps_error(settings) and aovs == aov_names.DEFAULT
         further = (*("denoised",) * purpose.denoise, *aov_names.ERRORS * shows_errors)
+        asked.check_learning(settings)
         layers.check(plan.names.output, (*aovs, *further))
         if layers.split:
             plan.check_split((*aovs, *further), numbers)
         return Job(
             asked.stage, settings, aovs, profile, layers, reporter, asked.exposure,
-            asked.tone_map, asked.film_memory,
+            asked.tone_map, asked.film_memory, learning,
         )  # fmt: skip
 
     # All is checked before the first is rendered.
@@ -224,7 +248,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         (plan, numbers, job_of(plan, numbers))
         for plan, numbers in zip(plans, all_numbers, strict=True)
     ]
-    return Prepared(source, resumed, jobs, opened, reporter)
+    return Prepared(source, resumed, jobs, learning, opened, reporter)
 
 
 def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
@@ -237,9 +261,7 @@ def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
-def _check_outputs(
-    stage: str, names: Names, purpose: PurposeOptions, costs_file: str | None
-) -> None:
+def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
     """Everything that can be known to fail before the work begins."""
     from wavecomb.picture.files import check_writable
 
@@ -248,7 +270,8 @@ def _check_outputs(
         (names.png, "--png", ".png"),
         (names.deep, "--deep", ".exr"),
         (names.stats, "--stats", None),
-        (costs_file, "--costs", None),
+        (asked.costs_file, "--costs", None),
+        (asked.learn_to, "--learn-to", ENDING),
         (purpose.preview, "--preview", ".png"),
         (purpose.checkpoint_file, "--checkpoint", None),
     ]
@@ -261,7 +284,7 @@ def _check_outputs(
                 f"--costs {name}: must be one of {', '.join(sources)}, "
                 "or a file whose name ends in .json"
             )
-    seen = {os.path.realpath(stage): "the stage"}
+    seen = {os.path.realpath(asked.stage): "the stage"}
     for name, option, _ in outputs:
         if name is None:
             continue

@@ -19,6 +19,7 @@ from wavecomb.cli.row_options import Real
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.cli.setting_options import SettingCommand, setting_options
 from wavecomb.cli.shots import Shot, Still
+from wavecomb.run.learned import save_learned
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -89,6 +90,18 @@ def picture_options(command: F) -> F:
                 "[default: auto]",
             ),
             click.option(
+                "--learn-from",
+                metavar="FILE|before",
+                help="With --guiding: what another render has learned, in place of learning it; "
+                "before: each of --frames starts from the one before it.",
+            ),
+            click.option(
+                "--learn-to",
+                type=click.Path(),
+                metavar="FILE.learned",
+                help="Keeps what guided this render, for --learn-from.",
+            ),
+            click.option(
                 "--film-memory",
                 type=Real(0, above=True),
                 metavar="MB",
@@ -148,6 +161,7 @@ def render_command(**options: Any) -> None:
     jobs, source, resumed, reporter = (
         prepared.jobs, prepared.source, prepared.resumed, prepared.reporter,
     )  # fmt: skip
+    learning = prepared.learning
     opened, prepared.opened = prepared.opened, None
     shared = open_frames(jobs[0][2], source) if len(jobs) > 1 and asked.frames is None else None
     for plan, numbers, job in jobs:
@@ -157,6 +171,8 @@ def render_command(**options: Any) -> None:
             last, _ = render_sequence(job, numbers, plan.names, here, purpose, asked.skip_existing)
             if last is not None and costs_file is not None:
                 _save_costs(costs_file, last)
+            if last is not None and asked.learn_to is not None:
+                save_learned(asked.learn_to, learning.last)
             continue
         shot: Shot = Still(here, stage, job.settings, opened)
         if shared is not None:
@@ -171,6 +187,9 @@ def render_command(**options: Any) -> None:
         if costs_file is not None:
             _save_costs(costs_file, done)
             files.append(costs_file)
+        if asked.learn_to is not None and done.stopped is None:
+            save_learned(asked.learn_to, learning.last)
+            files.append(asked.learn_to)
         reporter.finished(done, done.report, files)
         if done.stopped is not None:
             kept = f"{plan.names.output} holds what was done"

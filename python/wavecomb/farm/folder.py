@@ -40,6 +40,8 @@ from wavecomb.farm.spec import Spec, Task
 
 TODO, BUSY, DONE, FAILED = "todo", "busy", "done", "failed"
 STATES = (TODO, BUSY, DONE, FAILED)
+LEARNED = "field.learned"
+"""A file of what guides all pictures."""
 _FOLDERS = (*STATES, "copies", "results", "logs", "workers", "parts")
 
 
@@ -100,6 +102,11 @@ class Folder:
                 f"{os.fspath(path)}: is no folder of a job; `farm submit` makes one"
             )
         self.spec = Spec.of(read_json(file), str(file))
+
+    @property
+    def learned(self) -> Path:
+        """What guides all pictures, where a job is given that."""
+        return self.path / LEARNED
 
     @classmethod
     def create(

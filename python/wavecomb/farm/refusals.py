@@ -38,13 +38,16 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
     return ""
 
 
-def is_better_whole(settings: Mapping[str, Any]) -> bool:
-    """Whether each tile costs much beside its own pixels: a border, a field, all light paths."""
+def is_better_whole(settings: Mapping[str, Any], is_taught: bool = False) -> bool:
+    """Whether each tile costs much beside its own pixels: a border, a field, all light paths.
+
+    ``is_taught``: the field is given.
+    """
+    learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"
     return (
         bool(settings.get("adaptive"))
         or settings.get("transport") in ("light", "bdpt", "auto")
-        or settings.get("guiding", "off") != "off"
-        or (settings.get("roulette") == "efficient")
+        or (learns and not is_taught)
     )
 
 

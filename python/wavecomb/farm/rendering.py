@@ -22,6 +22,7 @@ from wavecomb.farm.tiling import Rectangle, border, grown, most_looks
 from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run.bands import without_samples
 from wavecomb.run.checkpoint import Checkpoint, check_fits, load_checkpoint, make_header
+from wavecomb.run.learned import load_learned
 from wavecomb.run.sequence import Frames
 from wavecomb.run.settings import check_memory
 from wavecomb.run.watcher import CheckpointSink, Reporter, Watcher
@@ -112,6 +113,7 @@ class Renderer:
         self._open: tuple[int, Frames] | None = None
         self._loaded: tuple[tuple[int, float | None], LoadedStage] | None = None
         self._warned: set[str] = set()
+        self._given: bytes | None = None
 
     def close(self) -> None:
         """Lets the stage go."""
@@ -227,11 +229,19 @@ class Renderer:
             sinks, reporter=self._reporter, is_stopped=self._is_stopped, warn=self._log
         )
         state = None if before is None else before.state
-        result = frames.render(settings, costs=self._spec.costs, watcher=watcher, state=state)
+        result = frames.render(
+            settings, costs=self._spec.costs, watcher=watcher, state=state, learned=self._learned()
+        )
         if result.cancelled:
             raise Stopped
         stats = {**frames.stats(result, resumed_s=seconds), "stage": self._spec.stage}
         return picture_of(result, stats, scene=loaded.scene, aovs=shot.aovs), frames
+
+    def _learned(self) -> bytes | None:
+        """What guides all pictures of the job, if it was given that."""
+        if self._given is None and self._folder.learned.exists():
+            self._given = load_learned(self._folder.learned)
+        return self._given
 
     def _load(self, frames: Frames, task: Task, shot: Shot) -> LoadedStage:
         """The stage for a task; tiles of one picture share it."""

@@ -8,14 +8,16 @@ import re
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.fetching import pack
-from wavecomb.farm.folder import Folder
+from wavecomb.farm.folder import LEARNED, Folder
 from wavecomb.farm.refusals import check_reproducible, check_tiles, is_better_whole, needs_whole
 from wavecomb.farm.spec import MAX_TASKS, Shot, Spec
 from wavecomb.farm.tiling import choose_tiles
+from wavecomb.run.learned import save_learned
 
 FEWEST_CHUNKS = 4
 """For each worker, so that they end at about the same time."""
@@ -43,7 +45,14 @@ def default_folder(output: str | None, stage: str, output_dir: str | None = None
     return os.path.join(folder, f"{stem or 'pictures'}.farm")
 
 
-def complete(spec: Spec, *, tiles: tuple[int, int] | None, workers: int, chunk: int | None) -> Spec:
+def complete(
+    spec: Spec,
+    *,
+    tiles: tuple[int, int] | None,
+    workers: int,
+    chunk: int | None,
+    is_taught: bool = False,
+) -> Spec:
     """A job with its tiles and chunks.
 
     Args:
@@ -51,6 +60,7 @@ def complete(spec: Spec, *, tiles: tuple[int, int] | None, workers: int, chunk: 
         tiles: Columns and rows; None: as is best.
         workers: That are expected; 0: nobody knows.
         chunk: Pictures of a chunk; None: as is best.
+        is_taught: Whether its pictures are given what guides them.
 
     Raises:
         WavecombError: A farm cannot render it.
@@ -62,7 +72,8 @@ def complete(spec: Spec, *, tiles: tuple[int, int] | None, workers: int, chunk: 
     count, workers = len(spec.pictures), workers or UNKNOWN_WORKERS
     if tiles is None:
         whole = any(
-            needs_whole(shot.settings) or is_better_whole(shot.settings) for shot in spec.shots
+            needs_whole(shot.settings) or is_better_whole(shot.settings, is_taught)
+            for shot in spec.shots
         )
         tiles = choose_tiles([shot.region for shot in spec.shots], count, workers, whole)
     if chunk is None:
@@ -78,7 +89,11 @@ def complete(spec: Spec, *, tiles: tuple[int, int] | None, workers: int, chunk: 
 
 
 def create(
-    spec: Spec, path: str, assets: Mapping[str, Any] | None, stage: str | None = None
+    spec: Spec,
+    path: str,
+    assets: Mapping[str, Any] | None,
+    stage: str | None = None,
+    learned: bytes | None = None,
 ) -> Folder:
     """Writes the folder of a job.
 
@@ -87,6 +102,7 @@ def create(
         path: Of the folder.
         assets: Of ``list_assets``; None: nobody looked.
         stage: Its name in errors.
+        learned: What guides all pictures; None: each learns for itself.
 
     Raises:
         WavecombError: Files are missing; there are no pictures; the folder is there.
@@ -98,11 +114,17 @@ def create(
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         raise WavecombError(f"{stage or spec.stage}: {missing[0]}{more} (--no-strict goes on)")
     files = {} if assets is None else {"assets.json": dict(assets)}
-    if spec.assets != "copy":
-        return Folder.create(path, spec, files)
-    if assets is None:
+    copied = spec.assets == "copy"
+    if copied and assets is None:
         raise WavecombError("--assets copy: needs to know all files: leave out --no-strict")
-    return Folder.create(path, spec, files, lambda folder: pack(folder, assets["files"]))
+
+    def fill(folder: Path) -> None:
+        if learned is not None:
+            save_learned(folder / LEARNED, learned)
+        if copied and assets is not None:
+            pack(folder, assets["files"])
+
+    return Folder.create(path, spec, files, fill)
 
 
 def shot_of(

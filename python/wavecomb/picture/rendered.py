@@ -39,6 +39,7 @@ class Picture:
         denoised: (height, width, 3), the beauty without its noise; None unless asked for.
         stats: What was done and how long it took; docs/statistics.md has the schema.
         cancelled: Progress asked to stop; the picture holds what was done.
+        learned: What guided the render, for another to start from; empty: nothing was learned.
         costs: What shading took, by name of material and texture: a profile that another render
             can start from.
         aovs: Further AOVs by name, (height, width) or (height, width, channels): docs/aovs.md.
@@ -60,6 +61,7 @@ class Picture:
     stats: dict[str, Any] = field(default_factory=dict, repr=False)
     cancelled: bool = False
     costs: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
+    learned: bytes = field(default=b"", repr=False)
     aovs: dict[str, NDArray[np.float32]] = field(default_factory=dict, repr=False)
     manifests: dict[str, dict[str, int]] = field(default_factory=dict, repr=False)
     deep: DeepPicture | None = field(default=None, repr=False)
@@ -188,6 +190,16 @@ class Picture:
         metadata = self.file_metadata()
         return self.deep.save(path, half=half, metadata=metadata, window=self.window())
 
+    def save_learned(self, path: str | os.PathLike[str]) -> None:
+        """Writes what guided the render, for ``learn_from`` of another; whole or not at all.
+
+        Raises:
+            WavecombError: Nothing was learned.
+        """
+        from wavecomb.run.learned import save_learned
+
+        save_learned(path, self.learned)
+
     def shown(self) -> NDArray[Any]:
         """The colours of a PNG, linear Rec.709: the denoised picture where there is one."""
         from wavecomb.picture.working_space import to_rec709
@@ -260,6 +272,7 @@ def picture_of(
         stats=stats,
         cancelled=result.cancelled,
         costs=result.costs,
+        learned=result.learned,
         aovs=result.aovs,
         manifests=result.manifests,
         deep=deep_of(result.deep),

@@ -146,13 +146,16 @@ class Frames:
         *,
         watcher: Any = None,
         state: Any = None,
+        learned: bytes | None = None,
     ) -> Result:
         """Renders what was loaded last; the arguments are those of ``_core.render``."""
         assert self._loaded is not None
         self._is_built = self._renderer is None
         if self._renderer is None:
             self._renderer = _core.Renderer(self._loaded.scene, settings.threads)
-        return self._renderer.render(settings, progress, policy, costs, watcher, state)
+        return self._renderer.render(
+            settings, progress, policy, costs, watcher, state, learned=learned
+        )
 
     def stats(self, result: Result, **options: Any) -> dict[str, Any]:
         """``make_stats`` of what was rendered last; options: further ones of it."""

@@ -271,13 +271,15 @@ GuideGrid grid_of(const Scene& scene) {
   return {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}};
 }
 
+bool is_taught(const Settings& settings) {
+  return settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
+}
+
 GuideTraining train_guide(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
                           const std::function<bool()>& stopped) {
   const Settings& settings = *render.settings;
   const uint64_t budget = training_paths(settings, means.threads);
-  const bool learns =
-      settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
-  if (!learns || settings.max_depth == 0 || budget == 0) return {};
+  if (!is_taught(settings) || settings.max_depth == 0 || budget == 0) return {};
   return Trainer(render, scene, means, budget, stopped).train();
 }
 

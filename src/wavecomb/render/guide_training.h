@@ -47,6 +47,9 @@ GuideView view_of(const GuideTraining& training);
 /// The grid of a scene's field.
 GuideGrid grid_of(const Scene& scene);
 
+/// Whether a render with such settings is guided, or told where paths end, by what is learned.
+bool is_taught(const Settings& settings);
+
 /// How training paths are run.
 struct TrainingMeans {
   uint32_t lanes, threads, wave_size;

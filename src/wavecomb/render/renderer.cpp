@@ -145,6 +145,11 @@ std::optional<Pick> WavefrontRenderer::pick(float x, float y, uint32_t width,
   return wavecomb::pick(*scene, *accel, x, y, width, height);
 }
 
+std::vector<std::byte> WavefrontRenderer::packed_learned() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->learned ? packed_training(*impl_->learned->training) : std::vector<std::byte>();
+}
+
 std::optional<LearnedPlace> WavefrontRenderer::learned(float x, float y, uint32_t width,
                                                        uint32_t height) const {
   const std::optional<Pick> seen = pick(x, y, width, height);
@@ -235,6 +240,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   PassState pass;
   std::vector<std::byte> learned_before;
   if (options.resume) learned_before = options.resume(film, pass);
+  if (learned_before.empty() && is_taught(settings)) learned_before = options.learned;
   const uint64_t pixels = settings.rendered().pixels();
   const uint32_t wave_size = wave_size_for(settings, pixels);
   SceneView scene_view = scene.view();

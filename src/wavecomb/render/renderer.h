@@ -56,6 +56,9 @@ struct RenderOptions {
   /// Fills the empty film and the pass with what a snapshot of a render with these settings held,
   /// and gives the packed_training() of that; empty: it is learned again.
   std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
+  /// packed_training() of a render of such a scene, which guides this one in place of what it would
+  /// learn; empty: it learns. What resume() gives comes first.
+  std::vector<std::byte> learned{};
   /// Replaces the one that the settings name.
   const SchedulingPolicy* policy = nullptr;
   /// Costs to start from, for the order and for roulette; what it does not know is measured on
@@ -102,6 +105,9 @@ class WavefrontRenderer {
   /// What the render that goes on, or else the last one, has learned of the surface that pick()
   /// finds. Nothing where there is none, or before anything was learned.
   std::optional<LearnedPlace> learned(float x, float y, uint32_t width, uint32_t height) const;
+
+  /// packed_training() of the last render() that was not stopped before it began.
+  std::vector<std::byte> packed_learned() const;
 
   /// Costs after the last render().
   const CostProfile& cost_profile() const;
