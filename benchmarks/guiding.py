@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What guiding and the roulette that was learned bring: efficiency to a render without them.
+"""What is learned brings: efficiency of a render to one without.
 
     .venv/bin/python benchmarks/guiding.py room cornell --spp 64 --seeds 5
+    .venv/bin/python benchmarks/guiding.py mixed-lamps kitchen lights --ways power off auto light
 
-Renders each stage with every combination of ``--guiding`` and ``--roulette``, several seeds in
-turns. Stages are generated ones, written as exporters do (``--plain``), or files. relMSE is that of
+Renders each stage in each way, several seeds in turns; the first way is what others are compared
+with. ``power`` is without anything learned, ``off`` the defaults, of which shares of lights are
+learned. Stages are generated ones, written as exporters do (``--plain``), with ``-lamps`` behind
+their names lit by a key, a fill and a dim dome; or files. relMSE is that of
 one picture: the variance over the seeds at each pixel over the square of the mean of all pictures,
 plus 0.01; every combination has the same mean. Efficiency is 1 / (relMSE x seconds); seconds are of
 the processor and have the training in them, so that other work on the machine counts little.
@@ -23,18 +26,23 @@ from sitting import RESULTS, stage_file, summary, write_result
 import wavecomb
 
 WAYS: dict[str, dict[str, str]] = {
+    "power": {"light_weights": "power", "light_selection": "power"},
     "off": {},
     "roulette": {"roulette": "efficient"},
     "guiding": {"guiding": "on", "roulette": "throughput"},
     "both": {"guiding": "on"},
     "auto": {"guiding": "auto"},
+    "light": {"transport": "auto"},
+    "pixels": {"allocate": "error"},
 }
 
 
 def load(name: str, folder: Path) -> Any:
     """The scene of a generated stage, or of a file."""
     is_file = Path(name).suffix != ""
-    path = Path(name) if is_file else stage_file(folder / f"{name}.usdc", name, plain=True)
+    scene, _, lamps = name.partition("-lamps")
+    options = {"plain": True, "lamps": name != scene and not lamps}
+    path = Path(name) if is_file else stage_file(folder / f"{name}.usdc", scene, **options)
     return wavecomb.load(path).scene
 
 
@@ -84,7 +92,8 @@ def main() -> None:
     """Runs the sitting."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+")
-    parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=list(WAYS))
+    usual = ["off", "roulette", "guiding", "both", "auto"]
+    parser.add_argument("--ways", nargs="+", default=usual, choices=list(WAYS))
     parser.add_argument("--spp", type=int, nargs="+", default=[64])
     parser.add_argument("--size", type=int, nargs=2, default=[240, 160])
     parser.add_argument("--seeds", type=int, default=5)
