@@ -41,6 +41,7 @@ class CyclesSettings:
         max_depth: Scattering vertices, as Wavecomb counts them.
         threads: Of the render.
         light_tree: Chooses lights by a tree; else alike.
+        shadow_caustics: Light of lamps through glass is found by walks on the glass (MNEE).
         pattern: Cycles' name of a sampler: TABULATED_SOBOL, BLUE_NOISE, SOBOL_BURLEY.
     """
 
@@ -49,6 +50,7 @@ class CyclesSettings:
     max_depth: int
     threads: int
     light_tree: bool = True
+    shadow_caustics: bool = False
     pattern: str = "TABULATED_SOBOL"
 
 
@@ -59,6 +61,7 @@ class CyclesScene:
         """``folder``: where the files of volumes are."""
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.recorded = recorded
+        self._shadow_caustics = settings.shadow_caustics
         self.scene = bpy.context.scene
         self._images = Images(recorded)
         self._materials: dict[int, Any] = {}
@@ -222,6 +225,7 @@ class CyclesScene:
             data.angle = np.radians(light.get("angle", 0.53))
             solid = np.pi * np.sin(data.angle / 2.0) ** 2
             power = radiance * (1.0 if light.get("normalize") or solid == 0.0 else solid)
+        data.cycles.is_caustics_light = self._shadow_caustics
         data.energy = float(max(power))
         data.color = tuple(float(v) for v in power / max(float(max(power)), 1e-30))
         self._object(kind, data, rows).visible_camera = True
@@ -240,7 +244,11 @@ class CyclesScene:
                 made[key].materials[0] = self._material(placed.material)
             elif key not in made:
                 made[key] = shapes[placed.mesh] = self._mesh(mesh, placed.material)
-            self._object("object", made[key], placed.transform)
+            thing = self._object("object", made[key], placed.transform)
+            if self._shadow_caustics:
+                is_glass = self.recorded.materials[placed.material].get("program") == "dielectric"
+                thing.cycles.is_caustics_caster = is_glass
+                thing.cycles.is_caustics_receiver = not is_glass
 
     def _object(self, name: str, data: Any, rows: Matrix) -> Any:
         made = bpy.data.objects.new(name, data)

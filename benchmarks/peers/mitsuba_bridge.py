@@ -92,7 +92,7 @@ class PeerSettings:
         rr_depth: Vertices before roulette; by default none.
         instancing: Shape groups, as far as Mitsuba allows them; else all is copied.
         sampler: Mitsuba's name of one.
-        integrator: Mitsuba's name of one, where there are volumes.
+        integrator: Mitsuba's name of one, where there are volumes; or ptracer, paths from lights.
     """
 
     width: int
@@ -118,7 +118,9 @@ class MitsubaScene:
             "type": "scene",
             **media.entries,
             "integrator": {
-                "type": settings.integrator if recorded.volumes else "path",
+                "type": settings.integrator
+                if recorded.volumes or settings.integrator == "ptracer"
+                else "path",
                 "max_depth": settings.max_depth + 1,
                 "rr_depth": settings.rr_depth,
             },

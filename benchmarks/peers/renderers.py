@@ -50,11 +50,18 @@ RENDERERS = {
         {"variant": "llvm_ad_rgb", "sampler": "multijitter", "integrator": "volpath"},
         warm=True,
     ),
+    "mitsuba-llvm-ptracer": Renderer(
+        "mitsuba", {"variant": "llvm_ad_rgb", "integrator": "ptracer"}, warm=True
+    ),
     "cycles": Renderer("cycles", {"light_tree": True}, (9, 36)),
     "cycles-no-tree": Renderer("cycles", {"light_tree": False}, (9, 36)),
+    "cycles-shadow-caustics": Renderer(
+        "cycles", {"light_tree": True, "shadow_caustics": True}, (9, 36)
+    ),
 }
-USUAL = tuple(name for name in RENDERERS if name != "mitsuba-llvm-volpath")
-"""Without that for volumes alone."""
+_APART = ("mitsuba-llvm-volpath", "mitsuba-llvm-ptracer", "cycles-shadow-caustics")
+USUAL = tuple(name for name in RENDERERS if name not in _APART)
+"""Without those for volumes and for caustics alone."""
 
 
 @dataclass(frozen=True)
