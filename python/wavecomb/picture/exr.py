@@ -60,6 +60,8 @@ _COLOURS = (
 )
 """Layers that are half where halves are asked for, with those of lights and expressions."""
 _EXACT = ("position", "material_id", "instance_id", "motion", "depth_nearest", "distance")
+ALPHA = "A"
+"""The layer that is the alpha channel of R, G and B."""
 BAND = 64
 """Rows that are made ready and written at once: four blocks of an EXR file."""
 

@@ -80,8 +80,10 @@ class GrowingFiles:
             sheet, file = self._sheets[name]
             file.add(sheet.values(its_layers))
         if self._display is not None:
+            alpha = band.aovs["alpha"] if band.has_alpha else None
+            shown = band.shown()
             self._display.add(
-                display(band.shown(), exposure=self._exposure, tone_map=self._tone_map)
+                display(shown, exposure=self._exposure, tone_map=self._tone_map, alpha=alpha)
             )
 
     def __exit__(
@@ -127,6 +129,6 @@ class GrowingFiles:
             self.written.append(name)
         if self._png is not None:
             part = self._parts.enter_context(replacing(self._png))
-            spec = png_spec(self._height, band.beauty.shape[1])
+            spec = png_spec(self._height, band.beauty.shape[1], has_alpha=band.has_alpha)
             self._display = RowFile(part, spec, self._png)
             self.written.append(self._png)

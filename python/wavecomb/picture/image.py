@@ -45,6 +45,7 @@ def write_png(
     *,
     exposure: float = 0.0,
     tone_map: Transfer = "clamp",
+    alpha: NDArray[Any] | None = None,
 ) -> None:
     """Writes an 8-bit sRGB picture; whole or not at all.
 
@@ -53,16 +54,20 @@ def write_png(
         rgb: Linear Rec.709, (height, width, 3).
         exposure: In stops: the picture is multiplied by 2^exposure first.
         tone_map: "clamp" cuts at 1; "neutral" rolls highlights off towards white. See ``display``.
+        alpha: (height, width), that the colours are multiplied by; None: the picture is opaque.
     """
     name = os.fspath(path)
     if Path(name).suffix.lower() != ".png":
         raise ValueError(f"{name}: the name of a PNG file must end in .png")
     linear = _colours(rgb)
     bands = (
-        display(linear[rows], exposure=exposure, tone_map=tone_map)
+        display(
+            linear[rows], exposure=exposure, tone_map=tone_map,
+            alpha=None if alpha is None else alpha[rows],
+        )
         for rows in bands_of(linear.shape[0])
-    )
-    write_bands(name, png_spec(*linear.shape[:2]), bands)
+    )  # fmt: skip
+    write_bands(name, png_spec(*linear.shape[:2], has_alpha=alpha is not None), bands)
 
 
 def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> None:
@@ -73,11 +78,13 @@ def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> N
     write_bands(name, spec, (pixels[rows] for rows in bands_of(pixels.shape[0])))
 
 
-def png_spec(height: int, width: int) -> Any:
+def png_spec(height: int, width: int, *, has_alpha: bool = False) -> Any:
     """What OpenImageIO is told of a PNG file of 8-bit sRGB colours."""
     import OpenImageIO as oiio
 
-    spec = oiio.ImageSpec(width, height, 3, "uint8")
+    spec = oiio.ImageSpec(width, height, 4 if has_alpha else 3, "uint8")
+    if has_alpha:  # PNG's colours are not multiplied by it, and ours are not by then
+        spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("oiio:ColorSpace", "sRGB")
     spec.attribute("Software", "Wavecomb")
     return spec
@@ -91,9 +98,13 @@ def _colours(rgb: NDArray[Any]) -> NDArray[Any]:
 
 
 def display(
-    rgb: NDArray[Any], *, exposure: float = 0.0, tone_map: Transfer = "clamp"
+    rgb: NDArray[Any],
+    *,
+    exposure: float = 0.0,
+    tone_map: Transfer = "clamp",
+    alpha: NDArray[Any] | None = None,
 ) -> NDArray[np.uint8]:
-    """Linear Rec.709 -> 8-bit sRGB.
+    """Linear Rec.709 -> 8-bit sRGB; with ``alpha``, which the colours are divided by, RGBA.
 
     Pixels with a NaN become magenta, so that they are seen; infinities are clamped.
     """
@@ -101,6 +112,9 @@ def display(
     broken = np.isnan(linear).any(axis=2)
     linear = np.nan_to_num(linear, nan=0.0, posinf=_HALF_MAX, neginf=0.0)
     linear = np.clip(linear * np.float32(2.0**exposure), 0.0, np.float32(1e30))
+    if alpha is not None:
+        covered = np.clip(np.nan_to_num(alpha), 0.0, 1.0).astype(np.float32)[:, :, None]
+        linear = np.divide(linear, covered, out=linear, where=covered > 0)
     if tone_map == "neutral":
         linear = _neutral(linear)
     elif tone_map != "clamp":
@@ -108,7 +122,10 @@ def display(
     encoded = srgb_from_linear(np.clip(linear, 0.0, 1.0))
     pixels: NDArray[np.uint8] = np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
     pixels[broken] = _NAN_COLOUR
-    return pixels
+    if alpha is None:
+        return pixels
+    shares = np.where(np.asarray(broken)[:, :, None], np.float32(1.0), covered)
+    return np.concatenate([pixels, np.floor(shares * 255.0 + 0.5).astype(np.uint8)], axis=2)
 
 
 def _neutral(rgb: Array) -> Array:
@@ -180,7 +197,7 @@ def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
     """Reads a picture by layers, as ``write_exr`` names them: {"beauty": (h, w, 3), ...}.
 
-    A layer is the part of a channel's name before the last dot. R, G, B, A and Y without a dot are
+    A layer is the part of a channel's name before the last dot. R, G, B and Y without a dot are
     "beauty"; any other channel without a dot is a layer of its own.
     """
     pixels, names = _read(path)
@@ -188,7 +205,7 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
     for k, name in enumerate(names):
         layer, dot, _ = name.rpartition(".")
         if not dot:
-            layer = "beauty" if name in {"R", "G", "B", "A", "Y"} else name
+            layer = "beauty" if name in {"R", "G", "B", "Y"} else name
         groups.setdefault(layer, []).append(k)
     order = {letter: k for k, letter in enumerate(["R", "G", "B", "A"])}
     for ids in groups.values():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture import cryptomatte
-from wavecomb.picture.exr import Compression, Window, check_options, is_exact, write_exr
+from wavecomb.picture.exr import ALPHA, Compression, Window, check_options, is_exact, write_exr
 from wavecomb.picture.files import replacing_all
 
 if TYPE_CHECKING:
@@ -153,6 +153,8 @@ def aov_of(layer: str) -> str:
     >>> aov_of("CryptoObject01"), aov_of("depth")
     ('crypto_object', 'depth')
     """
+    if layer == ALPHA:
+        return "beauty"
     for aov, name in cryptomatte.LEVELS.items():
         if cryptomatte.is_crypto(layer) and layer.startswith(name):
             return aov

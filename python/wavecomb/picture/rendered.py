@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb.picture.exr import ALPHA
 from wavecomb.run import aovs as aov_names
 
 if TYPE_CHECKING:
@@ -83,10 +84,15 @@ class Picture:
             "variance": self.variance,
         }
         out: dict[str, NDArray[Any]] = {}
+        more = dict(self.aovs)
+        if self.has_alpha:
+            out = {"beauty": self.beauty, ALPHA: more["alpha"]}
+            if "alpha" not in self.chosen:
+                del more["alpha"]
         wanted = set(self.chosen or {**arrays, **self.aovs}) | {"denoised"}
         if self.chosen == aov_names.DEFAULT:
             wanted |= {"error", "variance"}
-        for name, array in {**arrays, **self.aovs}.items():
+        for name, array in {**arrays, **more}.items():
             may_be_kept_only = name in arrays or name in aov_names.GUIDES
             if array is None or (may_be_kept_only and name not in wanted):
                 continue
@@ -94,6 +100,11 @@ class Picture:
                 cryptomatte.layers(name, array) if name in cryptomatte.LEVELS else {name: array}
             )
         return out
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether it goes over another: it was rendered with the setting ``alpha``."""
+        return bool(self.stats.get("settings", {}).get("alpha")) and "alpha" in self.aovs
 
     def with_denoised(self, *, threads: int = 0) -> Picture:
         """The picture with its layer ``denoised``, by Open Image Denoise; the beauty stays.
@@ -166,7 +177,8 @@ class Picture:
                 window=self.window(),
             )
         if kind == ".png":
-            write_png(path, self.shown(), exposure=exposure, tone_map=tone_map)
+            alpha = self.aovs["alpha"] if self.has_alpha else None
+            write_png(path, self.shown(), exposure=exposure, tone_map=tone_map, alpha=alpha)
             return [Path(path)]
         raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
 

@@ -72,6 +72,8 @@ def make_settings(
     from wavecomb import _core
     from wavecomb.errors import WavecombError
 
+    if settings.get("alpha"):
+        aovs = aov_names.with_others(tuple(aovs), ["alpha"])
     beyond = 2 * int(settings.get("overscan", 0))
     width, height = (int(edge) + beyond for edge in size)
     if not (1 <= width <= MAX_EDGE and 1 <= height <= MAX_EDGE):

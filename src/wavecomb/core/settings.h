@@ -118,6 +118,8 @@ struct Settings {
   Allocate allocate = Allocate::kEven;
   /// The most seconds that rendering may take; 0: no limit. What is done by then is the picture.
   float time_limit = 0;
+  /// The camera itself sees no domes and distant lights, so that the picture goes over another.
+  bool alpha = false;
   bool error = false;  ///< keep errors and variances where nothing else asks for them
   /// The pixels that are rendered; all others have no samples. Without: all. A pixel of it is the
   /// same as in the whole picture, but in adaptive renders, which see errors within it only.

@@ -142,6 +142,9 @@ std::vector<SettingInfo> picture_settings() {
           "How textures are filtered."),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
                                "Samples every bounce that is not a mirror's by cosine."),
+      row<&S::alpha>("alpha", "Alpha",
+                     "Where the camera sees a dome or a distant light the picture is clear, with "
+                     "an alpha channel."),
       row<&S::error>("error", "Errors", "Keeps errors and variances where nothing else asks."),
       number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
                            "Pixels that are rendered beyond each edge of the picture."),

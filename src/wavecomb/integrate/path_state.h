@@ -28,7 +28,8 @@ struct ShadeSettings {
   bool schlick_fresnel;
   bool cosine_sampling;
   bool filters_textures_whole;
-  bool connects;  ///< vertices of camera paths and of paths from lights, where those are joined
+  bool shows_sky;  ///< to the camera itself: domes and distant lights
+  bool connects;   ///< vertices of camera paths and of paths from lights, where those are joined
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -41,7 +42,11 @@ struct ShadeSettings {
         schlick_fresnel(s.schlick_fresnel),
         cosine_sampling(s.cosine_sampling),
         filters_textures_whole(s.texture_filter == TextureFilter::kWhole),
+        shows_sky(!s.alpha),
         connects(s.connects()) {}
+
+  /// Whether paths that leave the scene after `depth` vertices see what is around it.
+  bool sees_sky(uint32_t depth) const { return shows_sky || depth > 0; }
 
   /// For paths from lights, whose every vertex the camera looks at.
   ShadeSettings of_light_paths() const {

@@ -112,6 +112,7 @@ class PathTracer {
       }
       path.cone_width = fma(path.cone_spread, hit.t, cone_at_origin);
       if (hit.inst == kNoHit) {
+        if (!settings_.sees_sky(depth)) return depth;
         radiance_.sum += environment_emission<F>(scene, settings_, depth, path, true);
         if (aovs_.wants_lights())
           aovs_.add_environment<F>(scene, settings_, depth, kSlot, path, true);

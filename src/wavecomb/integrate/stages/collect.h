@@ -134,7 +134,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     }
     if (const Mask<F> ended = missed | shape; !kFromLights && any(ended)) {
       Color<F> c(F(0.f));
-      if (any(missed))
+      const bool is_lit = any(missed) && settings.sees_sky(depth);
+      if (is_lit)
         c = select<F>(missed, environment_emission<F>(scene, settings, depth, state, missed), c);
       if (any(shape)) {
         const U light = load<U>(hits.geom + i);
@@ -142,7 +143,7 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
       }
       add_radiance<F>(wave.pool.radiance, slot, c, ended & not_(is_black(c)));
       if (wave.aovs.wants_lights()) {
-        if (any(missed)) wave.aovs.add_environment<F>(scene, settings, depth, slot, state, missed);
+        if (is_lit) wave.aovs.add_environment<F>(scene, settings, depth, slot, state, missed);
         if (any(shape)) wave.aovs.add_light<F>(slot, load<U>(hits.geom + i), c, shape);
       }
     }
