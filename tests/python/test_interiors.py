@@ -186,6 +186,34 @@ def test_fog_in_a_mesh_is_fog() -> None:
     assert np.all(np.abs(mesh.mean(axis=0) - volume.mean(axis=0)) < 4.0 * error)
 
 
+def thin_fog(as_mesh: bool, seed: int) -> Any:
+    """A lamp in thin fog, which fills a mesh or is a volume, seen from outside."""
+    builder = wavecomb.SceneBuilder()
+    sigma = np.full(3, 0.05)
+    low, high = (-2.0, -2.0, -2.0), (2.0, 2.0, 2.0)
+    if as_mesh:
+        layers = {**absorbing(sigma), "transmission_scatter": tuple(sigma)}
+        box(builder, low, high, filled(builder, 1.0, **layers))
+    else:
+        builder.add_volume(
+            np.eye(4), bounds=(low, high), extinction=tuple(sigma), albedo=(1, 1, 1)
+        )
+    lamp = np.eye(4)
+    lamp[3, 0] = 3.0  # beside what is seen
+    builder.add_light("sphere", lamp, color=(20, 18, 15), radius=0.2)
+    return seen_from_above(builder, spp=32, size=16, depth=4, seed=seed)
+
+
+def test_fog_in_a_mesh_has_no_more_noise() -> None:
+    """The first distance is spread over a pixel's samples, though it is not drawn at the camera."""
+    mesh, volume = (
+        np.array([thin_fog(as_mesh, seed) for seed in range(8)]) for as_mesh in (True, False)
+    )
+    ratio = mesh.var(axis=0, ddof=1).mean() / volume.var(axis=0, ddof=1).mean()
+    assert np.allclose(mesh.mean(axis=(0, 1)), volume.mean(axis=(0, 1)), rtol=0.05)
+    assert ratio < 1.3
+
+
 def scene() -> Any:
     """A glass of a cloudy liquid that reaches into its walls, fog about it, and a floor."""
     builder = wavecomb.SceneBuilder()
@@ -325,3 +353,16 @@ def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
     assert layers["transmission_scatter_anisotropy"] == 0.25
     assert layers["nested_priority"] == 3
     assert "transmission" not in said(loaded) and "priority" not in said(loaded)
+
+
+def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
+    """Light that was scattered in it meets none; without a volume nothing is said of that."""
+    from usd_recorder import load, said
+
+    volume = 'def Volume "V" { float3[] extent = [(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)] }\n'
+    what = "unseen by light that was scattered there"
+    scene, loaded = load(tmp_path, LIQUID + volume)
+    assert scene.volumes and f"{what}: /M" in said(loaded).replace(" at ", ": ")
+    clear = LIQUID.replace("(0.1, 0.2, 0.3)", "(0, 0, 0)")
+    for text in (LIQUID, clear + volume):
+        assert what not in said(load(tmp_path, text)[1])

@@ -44,7 +44,8 @@ inline void Interiors::draw(Rays<F>& r, const Inside<F>& inside, const F& u,
                            select(r.s.hero == U(1u), m.scattering.y, m.scattering.z));
   const Mask<F> some = lanes & (of_hero > 0.f);
   const F length = max(F(-log(F(1.f - u)) / select(some, of_hero, F(1.f))), F(1e-30f));
-  r.s.rest = select(lanes, select(some, min(length, F(kFar)), F(kFar)), r.s.rest);
+  const F none_drawn = max(r.s.rest, F(kFar));
+  r.s.rest = select(lanes, select(some, min(length, F(kFar)), none_drawn), r.s.rest);
 }
 
 template <typename F>
@@ -120,7 +121,8 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
   const Mask<F> goes_on = met.passes | (walks & not_(died));
   if (any(goes_on)) {
     s.number = select(Mask<U>(goes_on), s.number + 1u, s.number);
-    draw<F>(r, inside, walk_numbers<F>(s.seed, s.number).x, goes_on);
+    const F first = F(s.rest * (1.f / kFar)) - 1.f, other = walk_numbers<F>(s.seed, s.number).x;
+    draw<F>(r, inside, select(s.rest > kFar, first, other), goes_on);
   }
   inside.store_in(l);
   const Mask<F> done = r.active & not_(goes_on);

@@ -106,7 +106,8 @@ class Interiors {
   /// on the other side.
   template <typename F>
   Met<F> meet(Rays<F>& r, Inside<F>& inside, const Bound<F>& now, const Mask<F>& lanes) const;
-  /// Draws how far it is to the next collision, with number `u`.
+  /// Draws how far it is to the next collision, with number `u`. Where nothing scatters there is
+  /// none, and a first number that waits stays.
   template <typename F>
   void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
   /// Walks on from a collision; gives the lanes that do not.
@@ -182,8 +183,16 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
     Rays<F> r;
     r.who = lane_index<F>() + static_cast<uint32_t>(i);
     r.active = active;
-    r.s = {three(rays.o), three(rays.d), path.throughput, F(0.f),      F(sum.x + sum.y + sum.z),
-           F(kFar),       begins.seed,   U(0u),           begins.hero, U(0u)};
+    r.s = {three(rays.o),
+           three(rays.d),
+           path.throughput,
+           F(0.f),
+           F(sum.x + sum.y + sum.z),
+           F(kFar * F(1.f + begins.first)),
+           begins.seed,
+           U(0u),
+           begins.hero,
+           U(0u)};
     inside.store_in(r.l);
     r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
     r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
