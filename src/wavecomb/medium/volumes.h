@@ -33,7 +33,8 @@ class Volumes : public WalksBelow {
                                    is_drawn_by_lamps)
                    ? &context.scene.lights
                    : nullptr),
-        interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts) {}
+        interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts,
+                   context.settings->equiangular && has_lamps(context.scene.lights)) {}
 
   /// `fly` of the reference where paths know what they are inside of: of the path in `path`, whose
   /// row is `inside` and whose ray, of `keys`, has hit `hit`. Both may be others afterwards.
