@@ -153,6 +153,7 @@ nb::dict texture_store_dict(const StoreStatistics& s) {
   d["file_bytes"] = s.file_bytes;
   d["resident_bytes"] = s.resident_bytes;
   d["peak_bytes"] = s.peak_bytes;
+  d["grid_bytes"] = s.grid_bytes;
   d["loads"] = s.loads;
   d["releases"] = s.releases;
   d["load_s"] = s.load_s;

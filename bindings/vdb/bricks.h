@@ -100,6 +100,14 @@ uint64_t count_bricks(const Tree& tree) {
   return count;
 }
 
+/// The line that says that something takes more bytes than there is room for.
+inline std::string room_text(const std::string& what, uint64_t bytes, uint64_t most_bytes) {
+  char text[160];
+  std::snprintf(text, sizeof(text), "%s takes %.1f GB; there is room for %.1f GB", what.c_str(),
+                1e-9 * static_cast<double>(bytes), 1e-9 * static_cast<double>(most_bytes));
+  return text;
+}
+
 /// Throws TooLarge where bricks take more than they may.
 inline void check_size(uint64_t bricks, const BrickFormat& format, uint64_t most_bytes) {
   if (bricks <= most_bytes / format.brick_bytes()) return;
@@ -193,11 +201,13 @@ Bricks collect(const Grid& grid, const BrickOptions& options) {
   tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
   for (; tile; ++tile) {
     const openvdb::CoordBBox box = tile.getBoundingBox();
+    const openvdb::Coord first = box.min();
+    const int edge = box.dim().x();
     const Value value = *tile;
-    for (int x = box.min().x(); x <= box.max().x(); x += kBrickEdge)
-      for (int y = box.min().y(); y <= box.max().y(); y += kBrickEdge)
-        for (int z = box.min().z(); z <= box.max().z(); z += kBrickEdge)
-          writer.add({x, y, z}, [&](uint32_t) { return value; });
+    for (int x = 0; x < edge; x += kBrickEdge)
+      for (int y = 0; y < edge; y += kBrickEdge)
+        for (int z = 0; z < edge; z += kBrickEdge)
+          writer.add(first.offsetBy(x, y, z), [&](uint32_t) { return value; });
   }
   return writer.take();
 }

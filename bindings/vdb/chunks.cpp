@@ -9,16 +9,10 @@
 #include <openvdb/io/Compression.h>
 
 #include <cstdint>
-#include <cstring>
 #include <istream>
 #include <memory>
 
-// By their prototypes: the libraries are OpenVDB's, and their headers need not be installed.
-extern "C" {
-int blosc_decompress_ctx(const void* from, void* to, size_t size, int threads);
-int uncompress(unsigned char* to, unsigned long* size, const unsigned char* from,
-               unsigned long from_size);
-}
+#include "packed.h"
 
 namespace {
 
@@ -54,24 +48,15 @@ OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
 namespace io {
 
-/// A buffer of Blosc begins with 16 bytes that name its sizes.
 void bloscFromStream(std::istream& is, char* data, size_t bytes) {
   read_chunk(is, data, bytes, [&](const unsigned char* packed, uint64_t length) {
-    constexpr uint64_t kHead = 16;
-    uint32_t unpacked_size = 0, packed_size = 0;
-    if (length < kHead) return false;
-    std::memcpy(&unpacked_size, packed + 4, sizeof(unpacked_size));
-    std::memcpy(&packed_size, packed + 12, sizeof(packed_size));
-    if (unpacked_size != bytes || packed_size > length) return false;
-    return blosc_decompress_ctx(packed, data, bytes, 1) == static_cast<int>(bytes);
+    return vdb::unpack_blosc(packed, length, data, bytes);
   });
 }
 
 void unzipFromStream(std::istream& is, char* data, size_t bytes) {
   read_chunk(is, data, bytes, [&](const unsigned char* packed, uint64_t length) {
-    unsigned long found = bytes;
-    return uncompress(reinterpret_cast<unsigned char*>(data), &found, packed, length) == 0 &&
-           found == bytes;
+    return vdb::unpack_zip(packed, length, data, bytes);
   });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The Python module wavecomb._vdb: .vdb files through OpenVDB. Documented in
+/// The Python module wavecomb._vdb: .vdb and .nvdb files. Documented in
 /// python/wavecomb/_vdb.pyi. It is loaded where there are volumes, and nowhere else.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -19,36 +20,25 @@
 #include <tuple>
 #include <vector>
 
-#include "archive.h"
 #include "bricks.h"
+#include "files.h"
+#include "nano_tree.h"
+#include "nano_write.h"
 #include "write.h"
 
 namespace nb = nanobind;
 
 namespace {
 
-using vdb::Archive;
 using vdb::Bricks;
-using vdb::Entry;
+using vdb::GridFile;
+using vdb::Head;
 using vdb::Part;
+using vdb::with_grid;
 
 using Index = std::array<int32_t, 3>;
 template <typename T>
 using Input = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
-
-/// Calls `use` with the grid as its own type; false where bricks are not made of that type.
-template <typename Use>
-bool with_grid(const openvdb::GridBase& grid, Use&& use) {
-  const auto as = [&]<typename Grid>() {
-    if (!grid.isType<Grid>()) return false;
-    use(static_cast<const Grid&>(grid));
-    return true;
-  };
-  return as.template operator()<openvdb::FloatGrid>() ||
-         as.template operator()<openvdb::DoubleGrid>() ||
-         as.template operator()<openvdb::Vec3SGrid>() ||
-         as.template operator()<openvdb::Vec3DGrid>();
-}
 
 /// (4, 4) rows of p' = p M; None where the transform is not affine.
 nb::object transform_of(const openvdb::GridBase& grid) {
@@ -86,12 +76,12 @@ void tell(nb::dict& d, const openvdb::GridBase& grid) {
                               nb::make_tuple(box.max().x(), box.max().y(), box.max().z()));
 }
 
-nb::dict describe(const Entry& entry, const openvdb::GridBase* grid) {
+nb::dict describe(const Head& head, const openvdb::GridBase* grid) {
   nb::dict d;
-  d["name"] = nb::bytes(entry.name().data(), entry.name().size());
-  d["index"] = entry.index;
-  d["type"] = nb::bytes(entry.descriptor.gridType().data(), entry.descriptor.gridType().size());
-  d["half"] = entry.descriptor.saveFloatAsHalf();
+  d["name"] = nb::bytes(head.name.data(), head.name.size());
+  d["index"] = head.index;
+  d["type"] = nb::bytes(head.type.data(), head.type.size());
+  d["half"] = head.is_half;
   if (grid == nullptr) return d;
   d["is_read"] = with_grid(*grid, [](const auto&) {});
   tell(d, *grid);
@@ -107,14 +97,14 @@ nb::dict describe(const Entry& entry, const openvdb::GridBase* grid) {
 
 nb::list grids(const std::string& path, bool heads) {
   nb::list found;
-  Archive archive(path);
-  for (const Entry& entry : archive.entries()) {
+  GridFile file(path);
+  for (size_t number = 0; number < file.size(); ++number) {
     openvdb::GridBase::Ptr grid;
     if (!heads) {
       const nb::gil_scoped_release release;
-      grid = archive.read(entry, Part::kTopology, [](const openvdb::GridBase&) {});
+      grid = file.read(number, Part::kTopology, std::numeric_limits<uint64_t>::max());
     }
-    found.append(describe(entry, grid.get()));
+    found.append(describe(file.head(number), grid.get()));
   }
   return found;
 }
@@ -135,13 +125,8 @@ nb::dict bricks(const std::string& path, size_t number, uint64_t most_bytes,
   bool is_known = false;
   {
     const nb::gil_scoped_release release;
-    Archive archive(path);
     const vdb::BrickOptions options{most_bytes, background_is_zero, drops_empty};
-    grid = archive.read(archive.entries().at(number), Part::kWhole, [&](const auto& base) {
-      with_grid(base, [&](const auto& typed) {
-        vdb::check_size(vdb::count_bricks(typed.tree()), vdb::format_of(typed), most_bytes);
-      });
-    });
+    grid = GridFile(path).read(number, Part::kWhole, most_bytes);
     if (grid != nullptr)
       is_known = with_grid(*grid, [&](const auto& typed) { made = vdb::collect(typed, options); });
   }
@@ -164,30 +149,32 @@ nb::dict bricks(const std::string& path, size_t number, uint64_t most_bytes,
   return d;
 }
 
+vdb::GridDesc description(const nb::dict& d) {
+  vdb::GridDesc desc;
+  desc.name = nb::cast<std::string>(d["name"]);
+  desc.is_half = nb::cast<bool>(d["half"]);
+  desc.makes_tiles = nb::cast<bool>(d["tiles"]);
+  const auto origins = nb::cast<Input<int32_t>>(d["origins"]);
+  const auto values = nb::cast<Input<float>>(d["values"]);
+  const auto matrix = nb::cast<Input<double>>(d["index_to_object"]);
+  desc.count = origins.shape(0);
+  desc.channels = values.ndim() == 5 ? 3 : 1;
+  if (origins.size() != 3 * desc.count || matrix.size() != 16 ||
+      values.size() != desc.count * vdb::kBrickVoxels * desc.channels)
+    throw std::invalid_argument("bricks of another shape");
+  desc.origins = origins.data();
+  desc.values = values.data();
+  std::copy_n(matrix.data(), 16, desc.index_to_object.begin());
+  for (const auto& [first, last, value] :
+       nb::cast<std::vector<std::tuple<Index, Index, float>>>(d["boxes"]))
+    desc.boxes.push_back({first, last, value});
+  return desc;
+}
+
 void write_file(const std::string& path, const nb::list& grids) {
   openvdb::GridPtrVec made;
-  for (const nb::handle item : grids) {
-    const auto d = nb::cast<nb::dict>(item);
-    vdb::GridDesc desc;
-    desc.name = nb::cast<std::string>(d["name"]);
-    desc.is_half = nb::cast<bool>(d["half"]);
-    desc.makes_tiles = nb::cast<bool>(d["tiles"]);
-    const auto origins = nb::cast<Input<int32_t>>(d["origins"]);
-    const auto values = nb::cast<Input<float>>(d["values"]);
-    const auto matrix = nb::cast<Input<double>>(d["index_to_object"]);
-    desc.count = origins.shape(0);
-    desc.channels = values.ndim() == 5 ? 3 : 1;
-    if (origins.size() != 3 * desc.count || matrix.size() != 16 ||
-        values.size() != desc.count * vdb::kBrickVoxels * desc.channels)
-      throw std::invalid_argument("bricks of another shape");
-    desc.origins = origins.data();
-    desc.values = values.data();
-    std::copy_n(matrix.data(), 16, desc.index_to_object.begin());
-    for (const auto& [first, last, value] :
-         nb::cast<std::vector<std::tuple<Index, Index, float>>>(d["boxes"]))
-      desc.boxes.push_back({first, last, value});
-    made.push_back(vdb::make_grid(desc));
-  }
+  for (const nb::handle item : grids)
+    made.push_back(vdb::make_grid(description(nb::cast<nb::dict>(item))));
   const nb::gil_scoped_release release;
   try {
     openvdb::io::File(path).write(made);
@@ -196,10 +183,20 @@ void write_file(const std::string& path, const nb::list& grids) {
   }
 }
 
+void write_nano_file(const std::string& path, const nb::list& grids, const std::string& packed) {
+  std::vector<vdb::NanoDesc> made;
+  for (const nb::handle item : grids) {
+    const auto d = nb::cast<nb::dict>(item);
+    made.push_back({vdb::make_grid(description(d)), nb::cast<std::string>(d["bits"])});
+  }
+  const nb::gil_scoped_release release;
+  vdb::write_nano(path, made, packed);
+}
+
 }  // namespace
 
 NB_MODULE(_vdb, m) {
-  m.doc() = ".vdb files through OpenVDB.";
+  m.doc() = "Grids in .vdb and .nvdb files.";
   nb::set_leak_warnings(false);
   nb::exception<vdb::BrokenFile>(m, "BrokenFile", PyExc_ValueError);
   nb::exception<vdb::TooLarge>(m, "TooLarge", PyExc_ValueError);
@@ -217,4 +214,7 @@ NB_MODULE(_vdb, m) {
   m.def("bricks", &bricks, nb::arg("path"), nb::arg("number"), nb::arg("most_bytes"),
         nb::arg("background_is_zero"), nb::arg("drops_empty"));
   m.def("write", &write_file, nb::arg("path"), nb::arg("grids"));
+  m.attr("nano_version") = vdb::nano_major_version();
+  if (vdb::can_write_nano())
+    m.def("write_nano", &write_nano_file, nb::arg("path"), nb::arg("grids"), nb::arg("packed"));
 }

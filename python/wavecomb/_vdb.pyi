@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plug-in that reads and writes .vdb files; ``wavecomb.vdb`` is its door."""
+"""The plug-in that reads and writes .vdb and .nvdb files; ``wavecomb.vdb`` is its door."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 version: str
+nano_version: int
 
 class BrokenFile(ValueError):
     """The file is none, ends too early, or holds what no library wrote."""
@@ -24,3 +25,6 @@ def bricks(
 
 def write(path: str, grids: Sequence[Mapping[str, Any]]) -> None:
     """Grids of float32 bricks. Raises ValueError, OSError."""
+
+def write_nano(path: str, grids: Sequence[Mapping[str, Any]], packed: str) -> None:
+    """The same as NanoVDB has them, where the plug-in was built with it. Raises as ``write``."""

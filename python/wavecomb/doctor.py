@@ -154,7 +154,9 @@ def _openvdb() -> Check:
     from wavecomb import vdb
 
     if version := vdb.version():
-        return Check("OpenVDB", OK, version, False)
+        nano = vdb.nano_version()
+        named = f"NanoVDB {nano}" if nano else "without NanoVDB"
+        return Check("OpenVDB", OK, f"{version}, {named}", False)
     do = vdb.BRING if _rebuild() == "make build" else "a wheel that was built with OpenVDB"
     return Check("OpenVDB", MISSING, "volumes are left out", False, do)
 

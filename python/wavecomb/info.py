@@ -76,6 +76,7 @@ def machine_info() -> dict[str, Any]:
         "native": library_info(),
         "texture_store": {"obstacle": _core.TextureStore.obstacle() or None},
         "openvdb": vdb.version(),
+        "nanovdb": vdb.nano_version(),
         "sandbox": box.describe(),
     }
 
@@ -99,6 +100,7 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
         ("native", library_text()),
         ("texture limit", info["texture_store"]["obstacle"] or "by a store"),
         ("openvdb", info["openvdb"] or "none: volumes are left out"),
+        ("nanovdb", str(info["nanovdb"] or "none: .nvdb files are not read")),
         ("sandbox", f"{files}; {calls}"),
     ]
 

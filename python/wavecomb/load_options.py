@@ -144,8 +144,8 @@ class LoadOptions:
         render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
             else the only ones under /Render (docs/cameras.md).
         product: Path or name of one of their products; None: the first.
-        texture_limit: MB (10^6 bytes) that all textures together may take; None: any. What does not
-            fit waits in a temporary file (docs/textures.md).
+        texture_limit: MB (10^6 bytes) that all textures and grids of volumes may take; None: any.
+            What does not fit of textures waits in a temporary file (docs/textures.md).
         working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
         lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
             (docs/decisions/light-shapes.md).
@@ -232,7 +232,8 @@ class LoadOptions:
         metavar="FILE",
     )  # fmt: skip
     texture_limit: float | None = _row(
-        None, "Memory of all textures; what does not fit waits in a temporary file.", "number",
+        None, "Memory of textures and grids; what does not fit waits in a temporary file.",
+        "number",
         "--texture-limit", metavar="MB", least=0, above=True, unit="MB", unset="any",
     )  # fmt: skip
     working_space: str = _row(

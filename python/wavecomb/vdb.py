@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door to OpenVDB: the one module that imports the plug-in ``wavecomb._vdb``.
+"""The door to OpenVDB and NanoVDB: the one module that imports the plug-in ``wavecomb._vdb``.
 
 The plug-in is built where OpenVDB is there (tools/setup_openvdb), and loaded only where something
-asks for a .vdb file.
+asks for a .vdb or .nvdb file.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class GridHead:
         number: Place in the file.
         name: Several may share one.
         index: Among those of its name.
-        type_name: OpenVDB's, as "Tree_float_5_4_3".
+        type_name: OpenVDB's, as "Tree_float_5_4_3"; of .nvdb files also "Tree_fp8_5_4_3".
         is_half: Whether its floats are kept in 16 bits.
     """
 
@@ -121,7 +121,7 @@ class Bricks:
 
 @functools.cache
 def is_there() -> bool:
-    """Whether .vdb files can be read and written."""
+    """Whether .vdb files can be read and written, and .nvdb files where ``nano_version`` is one."""
     try:
         _plugin()
     except ImportError:
@@ -132,6 +132,11 @@ def is_there() -> bool:
 def version() -> str | None:
     """Of OpenVDB; None: it is not there."""
     return str(_plugin().version) if is_there() else None
+
+
+def nano_version() -> int | None:
+    """The major version of .nvdb files that are read; None: none are."""
+    return int(_plugin().nano_version) or None if is_there() else None
 
 
 def _plugin() -> Any:
@@ -199,26 +204,32 @@ def read(
     )
 
 
-def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
+def write(path: str | Path, made: Sequence[Mapping[str, Any]], packed: str = "") -> None:
     """Writes a file of grids; the same grids give the same bytes.
 
     Args:
-        path: Of the file; who calls sees to it that it is whole or not there.
+        path: Of the file, .vdb or .nvdb; who calls sees to it that it is whole or not there.
         made: Of each grid ``name``, ``origins``, ``values`` (as of ``Bricks``; of float16 they are
             kept in 16 bits) and ``index_to_object``; with ``tiles`` bricks of one value become
             tiles, which takes less room; ``boxes`` (first index, last index, value) are filled
-            before.
+            before. In an .nvdb file ``bits`` ("4", "8", "16", "n") quantises numbers by leaf; it
+            has no halves.
+        packed: How an .nvdb file is packed: "zip" or "blosc"; "": it is not.
 
     Raises:
         WavecombError: There is no OpenVDB, or the file cannot be written.
     """
     plugin = _needed(path)
+    is_nano = Path(path).suffix.lower() == ".nvdb"
+    if is_nano and not hasattr(plugin, "write_nano"):
+        raise WavecombError(f"{path}: needs NanoVDB, which this build is without ({BRING})")
     described = [
         {
             "name": one["name"],
             "tiles": bool(one.get("tiles", False)),
             "boxes": list(one.get("boxes", ())),
             "half": np.asarray(one["values"]).dtype == np.float16,
+            "bits": str(one.get("bits", "32")),
             "origins": np.ascontiguousarray(one["origins"], np.int32),
             "values": np.ascontiguousarray(one["values"], np.float32),
             "index_to_object": np.ascontiguousarray(one["index_to_object"], np.float64),
@@ -226,8 +237,11 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
         for one in made
     ]
     with _errors(plugin, path):
-        plugin.write(str(path), described)
-        _make_repeatable(Path(path))
+        if is_nano:
+            plugin.write_nano(str(path), described, packed)
+        else:
+            plugin.write(str(path), described)
+            _make_repeatable(Path(path))
 
 
 def _make_repeatable(path: Path) -> None:
@@ -249,7 +263,8 @@ def _errors(plugin: Any, path: str | Path, grid: str = "") -> Iterator[None]:
         yield
     except plugin.BrokenFile as error:
         why = str(error).strip() or "it is damaged"
-        raise WavecombError(f"{named}: no .vdb file that can be read: {why}") from None
+        kind = ".nvdb" if Path(path).suffix.lower() == ".nvdb" else ".vdb"
+        raise WavecombError(f"{named}: no {kind} file that can be read: {why}") from None
     except (plugin.TooLarge, ValueError) as error:
         raise WavecombError(f"{named}: {error}") from None
     except OSError as error:

@@ -185,6 +185,34 @@ TEST_F(TileStoreTest, ManyReadersSeeAllOfItWithinTheLimit) {
   EXPECT_NO_THROW(store->check());
 }
 
+TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
+  constexpr size_t kGrid = 900'000;
+  const int grid = 0, other = 0;
+  store->keep_grid(&grid, kGrid);
+  store->keep_grid(&grid, kGrid);
+  add(0);
+  EXPECT_EQ(store->statistics().file_bytes, 0u);
+  add(1);  // fits into the limit, but for the grid
+  EXPECT_GT(store->statistics().file_bytes, 0u);
+  const auto read_all = [&] {
+    for (size_t i = 0; i < places.size(); ++i) EXPECT_TRUE(is_intact(i));
+  };
+  read_all();
+  EXPECT_EQ(store->statistics().grid_bytes, kGrid);
+  EXPECT_LE(all_resident() + kGrid, kLimit);
+  // One that comes later makes its way, down to some tiles where it is larger than the limit.
+  store->keep_grid(&other, 10 * kLimit);
+  EXPECT_LE(all_resident(), 32 * TileStore::kTileBytes);
+  read_all();
+  store->drop_grid(&other);
+  store->drop_grid(&grid);
+  EXPECT_EQ(store->statistics().grid_bytes, kGrid);
+  store->drop_grid(&grid);
+  EXPECT_EQ(store->statistics().grid_bytes, 0u);
+  read_all();
+  EXPECT_GT(all_resident(), kLimit / 2);
+}
+
 TEST_F(TileStoreTest, PlacesOfWhatIsRemovedAreUsedAgain) {
   for (uint32_t seed = 0; seed < 5; ++seed) add(seed);
   for (size_t i = 0; i < 5; ++i) EXPECT_TRUE(is_intact(i));

@@ -239,7 +239,7 @@ def Material "Look" {
 
 
 @cache
-def vdb_bytes() -> bytes:
+def vdb_bytes(name: str = "a.vdb", packed: str = "", bits: str = "32") -> bytes:
     """Two small grids, one of them with a tile."""
     import numpy as np
 
@@ -252,11 +252,35 @@ def vdb_bytes() -> bytes:
         "index_to_object": np.diag([0.1, 0.1, 0.1, 1.0]), "tiles": True,
     }  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "a.vdb")
+        file = Path(folder, name)
         halves = values.astype(np.float16)
-        vdb.write(file, [{"name": "density", "values": values, **bricks},
-                         {"name": "heat", "values": halves, **bricks}])  # fmt: skip
+        vdb.write(file, [{"name": "density", "values": values, "bits": bits, **bricks},
+                         {"name": "heat", "values": halves, **bricks}], packed)  # fmt: skip
         return file.read_bytes()
+
+
+def _nvdb(rng: random.Random, mutate: Mutation) -> bytes:
+    """An .nvdb file that is broken: anywhere, at its heads, or at words that say something.
+
+    Most of such a file are zeros, which nobody reads.
+    """
+    packed, bits = rng.choice(("", "", "zip", "blosc")), rng.choice(("32", "8", "n"))
+    data = vdb_bytes("a.nvdb", packed, bits)
+    how = rng.random()
+    if how < 0.3:
+        return mutate(rng, data)
+    if how < 0.5:
+        return mutate(rng, data[:1600]) + data[1600:]
+    made = bytearray(data)
+    for _ in range(rng.choice((1, 1, 2, 6))):
+        at = 8 * rng.randrange(len(made) // 8)
+        while not any(made[at : at + 8]):
+            at = (at + 8) % (len(made) // 8 * 8)
+        word = int.from_bytes(made[at : at + 8], "little")
+        new = rng.choice((0, 1, word + 32, word - 32, word ^ 1 << rng.randrange(64), 2**31 - 1,
+                          2**63, 2**64 - 1, len(made), rng.getrandbits(64)))  # fmt: skip
+        made[at : at + 8] = (new % 2**64).to_bytes(8, "little")
+    return bytes(made)
 
 
 _WORDS = re.compile(rb"[^\s<>=\"/,:{}\[\]]+")
@@ -338,6 +362,10 @@ def make_input(kind: str, rng: random.Random, folder: Path, mutations: list[Muta
         (folder / "a.vdb").write_bytes(mutate(rng, vdb_bytes()))
         stage.write_text(VOLUME)
         return stage
+    if kind == "nvdb":
+        (folder / "a.nvdb").write_bytes(_nvdb(rng, mutate))
+        stage.write_text(VOLUME.replace("a.vdb", "a.nvdb"))
+        return stage
     if kind in ("ply", "obj"):
         form = rng.choice(("ascii", "binary_little_endian", "binary_big_endian"))
         data = mutate(rng, ply_bytes(form) if kind == "ply" else OBJ.encode())
@@ -371,7 +399,7 @@ def make_input(kind: str, rng: random.Random, folder: Path, mutations: list[Muta
 
 INPUTS = (
     "ies", "mtlx", "ply", "obj", "checkpoint", "merge", "costs", "product names",
-    *(("vdb",) if vdb.is_there() else ()),
+    *(("vdb",) if vdb.is_there() else ()), *(("nvdb",) if vdb.nano_version() else ()),
 )  # fmt: skip
 BY_COMMAND = ("product names",)
 """Kinds that only the command judges: it is what writes files."""

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parts import needs
+from parts import needs, only_where
 from test_texture_limit import NoStore, textured, write_image
 
 import wavecomb
-from wavecomb import WavecombError, _core
+from wavecomb import WavecombError, _core, vdb
 from wavecomb.machine import temporary_folder
 from wavecomb.run.sequence import Frames
 from wavecomb.usd import load_stage
@@ -262,6 +262,61 @@ def test_without_the_system_s_help_levels_are_left_out(stage, monkeypatch):
     assert "kept by leaving out mip levels, as the system allows no userfaultfd" in said
     assert loaded.leaves_out_levels
     assert sum(size for _, size in loaded.scene.textures) <= LIMIT_MB * 1e6
+
+
+SMOKE = """
+def Volume "Smoke" {
+    rel field:density = </Smoke/density>
+    double3 xformOp:translate = (0, 0, -2)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def OpenVDBAsset "density" {
+        asset filePath = @smoke.vdb@
+    }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def smoky(stage):
+    """The squares with 3.5 MB of smoke before them."""
+    cells = np.stack(np.meshgrid(*[np.arange(10)] * 3, indexing="ij"), -1).reshape(-1, 3)[:900]
+    values = np.random.default_rng(1).random((900, 8, 8, 8), np.float32)
+    vdb.write(stage.parent / "smoke.vdb", [{
+        "name": "density", "origins": 8 * (cells - 5).astype(np.int32), "values": values,
+        "index_to_object": np.diag([0.025, 0.025, 0.025, 1.0]),
+    }])  # fmt: skip
+    path = stage.parent / "smoky.usda"
+    path.write_text(stage.read_text() + SMOKE)
+    return path
+
+
+@needs_store
+@only_where(vdb.is_there(), "this build is without OpenVDB")
+def test_grids_leave_less_for_textures(smoky, stage):
+    whole = picture(smoky).beauty
+    assert not np.array_equal(whole, picture(stage).beauty)
+    grid_bytes = 900 * 9**3 * 4
+    for limit in (15.9, 5.0):  # textures alone fit into the first
+        result = picture(smoky, texture_limit=limit)
+        assert np.array_equal(result.beauty, whole)
+        store = result.stats["texture_store"]
+        assert grid_bytes <= store["grid_bytes"] < 1.6 * grid_bytes
+        assert result.stats["memory_bytes"]["volumes"] == store["grid_bytes"]
+        assert store["file_bytes"] > 0 and store["loads"] > 0
+        assert store["resident_bytes"] + store["grid_bytes"] <= limit * 1e6
+    assert picture(stage, texture_limit=15.9).stats["texture_store"]["file_bytes"] == 0
+
+
+@needs_store
+@only_where(vdb.is_there(), "this build is without OpenVDB")
+def test_grids_that_alone_are_more_are_said(smoky, stage):
+    loaded = load_stage(smoky, texture_limit=1)
+    (line,) = [line for line in loaded.report.lines() if "grids of volumes" in line]
+    assert "texture limit 1 MB: grids of volumes take 2.6 MB, all of which is in memory" in line
+    small = wavecomb.render(loaded, size=(24, 24), spp=1)
+    plain = wavecomb.render(load_stage(smoky), size=(24, 24), spp=1)
+    assert np.array_equal(small.beauty, plain.beauty)
+    assert "grids" not in "".join(load_stage(smoky, texture_limit=4).report.lines())
 
 
 def test_reading_ahead_keeps_to_its_limit(tmp_path):

@@ -64,7 +64,9 @@ struct InteriorState {
   Color<F> throughput;
   F start;  ///< length behind it, since the last collision
   F first;  ///< Walk::first
-  F rest;   ///< to the next collision, or kFar; of a shadow ray, to its end
+  /// To the next collision, or kFar; kFar (1 + u) where nothing has scattered yet, with the number
+  /// u of the first length, which is spread over a pixel's samples. Of a shadow ray, to its end.
+  F rest;
   UInt<F> seed, number, hero, flags;
   WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)
 };

@@ -44,7 +44,28 @@ inline void Interiors::draw(Rays<F>& r, const Inside<F>& inside, const F& u,
                            select(r.s.hero == U(1u), m.scattering.y, m.scattering.z));
   const Mask<F> some = lanes & (of_hero > 0.f);
   const F length = max(F(-log(F(1.f - u)) / select(some, of_hero, F(1.f))), F(1e-30f));
-  r.s.rest = select(lanes, select(some, min(length, F(kFar)), F(kFar)), r.s.rest);
+  const F none_drawn = max(r.s.rest, F(kFar));
+  F rest = select(some, min(length, F(kFar)), none_drawn);
+  if (by_lamps_) rest = select(is_lit<F>(m), F(kFar * F(1.f + max(u, F(2.4e-7f)))), rest);
+  r.s.rest = select(lanes, rest, r.s.rest);
+}
+
+template <typename F>
+inline LampWay<F> Interiors::draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& medium,
+                                           const F& far, const Mask<F>& lanes) const {
+  using U = UInt<F>;
+  const Color<F> e = medium.absorption + medium.scattering;
+  const Sample4<F> n = walk_numbers<F>(r.s.seed, U(r.s.number + 0x40000000u));
+  const F angle = walk_numbers<F>(r.s.seed, U(r.s.number + 0x50000000u)).x;
+  const LampWay<F> lamp =
+      lamp_way<F>(scene_.lights, r.s.o, r.s.d, F(0.f), far, min(e.x, min(e.y, e.z)), n, lanes);
+  const Color<F>& b = medium.scattering;
+  const F own = select(r.s.hero == U(0u), b.x, select(r.s.hero == U(1u), b.y, b.z));
+  const F u = min(F(F(r.s.rest * (1.f / kFar)) - 1.f), F(1.f));
+  F at = -log(F(1.f - u)) / max(own, F(1e-30f));
+  at = select(n.w < lamp.share, clamp(lamp.draw(angle), F(0.f), far), at);
+  r.s.rest = select(lanes, clamp(at, F(1e-30f), F(kFar)), r.s.rest);
+  return lamp;
 }
 
 template <typename F>
@@ -95,6 +116,12 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
   const InteriorMedium<F> medium = medium_of<F>(now.material, r.active);
   const Mask<F> open = Mask<F>(r.hit.inst == U(kNoHit));
   F far = select(open, F(kFar), min(r.hit.t, F(kFar)));
+  LampWay<F> lamp;
+  Mask<F> lit(false);
+  if (by_lamps_) [[unlikely]] {
+    lit = r.active & is_lit<F>(medium) & (s.rest > kFar);
+    if (any(lit)) lamp = draw_by_lamps<F>(r, medium, far, lit);
+  }
   const Limit<F> limit = limit_of<F>(events, r);
   const Mask<F> stopped = r.active & (limit.length < far) & not_(s.rest < limit.length);
   far = select(stopped, limit.length, far);
@@ -108,7 +135,21 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
     const F through = exp(F(F(least - scattering) * length));
     return select(collides, F(through * F(scattering / most)), through);
   };
-  l.ratio = l.ratio * Color<F>(chance(b.x), chance(b.y), chance(b.z));
+  Color<F> ratio(chance(b.x), chance(b.y), chance(b.z));
+  if (any(lit)) [[unlikely]] {
+    const auto by_lamp = [&](const F& scattering) {
+      return even_chance<F>(lamp, scattering, length, length, collides);
+    };
+    const EvenChance<F> x = by_lamp(b.x), y = by_lamp(b.y), z = by_lamp(b.z);
+    const F greatest = max(max(x.drawn, max(y.drawn, z.drawn)), F(1e-30f));
+    const auto share = [](const EvenChance<F>& c) {
+      return F(c.truth / select(c.drawn > 0.f, c.drawn, F(1.f)));
+    };
+    ratio = select<F>(lit, Color<F>(x.drawn, y.drawn, z.drawn) * F(F(1.f) / greatest), ratio);
+    const Color<F> weight(share(x), share(y), share(z));
+    l.absorbed = select<F>(lit, l.absorbed * weight, l.absorbed);
+  }
+  l.ratio = l.ratio * ratio;
   l.absorbed =
       l.absorbed * Color<F>(exp(F(-a.x * length)), exp(F(-a.y * length)), exp(F(-a.z * length)));
   s.start = s.start + length;
@@ -120,7 +161,8 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
   const Mask<F> goes_on = met.passes | (walks & not_(died));
   if (any(goes_on)) {
     s.number = select(Mask<U>(goes_on), s.number + 1u, s.number);
-    draw<F>(r, inside, walk_numbers<F>(s.seed, s.number).x, goes_on);
+    const F first = F(s.rest * (1.f / kFar)) - 1.f, other = walk_numbers<F>(s.seed, s.number).x;
+    draw<F>(r, inside, select(s.rest > kFar, first, other), goes_on);
   }
   inside.store_in(l);
   const Mask<F> done = r.active & not_(goes_on);

@@ -5,7 +5,7 @@
 ///   throughput *= exp(-sum a_k t_k)
 /// and a collision comes after an optical depth of scattering that is exponential, by a hero
 /// channel (medium/tracking.h). Each medium is even, so that the length is drawn anew where one
-/// begins.
+/// begins. Where lamps draw lengths, too, that is once the bound or surface ahead is known.
 ///
 /// What collides behind a bound that refracts walks on: no light sample could reach it. Where it
 /// meets a surface it is a path again, whose bounce no light sample has competed with. What
@@ -14,6 +14,7 @@
 
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/statistics.h"
+#include "wavecomb/medium/equiangular.h"
 #include "wavecomb/medium/interior_rays.h"
 #include "wavecomb/medium/tracking.h"
 #include "wavecomb/medium/walk.h"
@@ -25,10 +26,16 @@ namespace wavecomb {
 /// lanes shows.
 class Interiors {
  public:
-  /// `counts` gets the rays that are traced here, as those of walks.
+  /// `counts` gets the rays that are traced here, as those of walks. `by_lamps`: lamps draw
+  /// distances in fog, too (equiangular.h).
   Interiors(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
-            const InteriorBuffers& buffers, Counts& counts)
-      : scene_(scene), accel_(accel), width_(width), b_(buffers), counts_(counts) {}
+            const InteriorBuffers& buffers, Counts& counts, bool by_lamps)
+      : scene_(scene),
+        accel_(accel),
+        width_(width),
+        by_lamps_(by_lamps),
+        b_(buffers),
+        counts_(counts) {}
 
   /// What is around a point. `keys`: of any path.
   Inside<float> surround(Vec3<float> p, float time, const PresenceKeys& keys) const;
@@ -106,9 +113,20 @@ class Interiors {
   /// on the other side.
   template <typename F>
   Met<F> meet(Rays<F>& r, Inside<F>& inside, const Bound<F>& now, const Mask<F>& lanes) const;
-  /// Draws how far it is to the next collision, with number `u`.
+  /// Whether lamps draw distances in a medium.
+  template <typename F>
+  static Mask<F> is_lit(const InteriorMedium<F>& m) {
+    return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(InteriorKind::kClear))) &
+           (max_component(m.scattering) > 0.f);
+  }
+  /// Draws how far it is to the next collision, with number `u`. Where nothing scatters there is
+  /// none, and a first number that waits stays. Where lamps draw, the number waits for the length.
   template <typename F>
   void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
+  /// Does so by lamps, with the number that waits, in a medium that ends at `far`.
+  template <typename F>
+  LampWay<F> draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& medium, const F& far,
+                           const Mask<F>& lanes) const;
   /// Walks on from a collision; gives the lanes that do not.
   template <typename F>
   Mask<F> turn(const InteriorRays& all, Rays<F>& r, const InteriorMedium<F>& medium,
@@ -135,6 +153,7 @@ class Interiors {
   const SceneView& scene_;
   const EmbreeAccelerator& accel_;
   uint32_t width_;
+  bool by_lamps_;
   const InteriorBuffers& b_;
   Counts& counts_;
 };
@@ -182,8 +201,16 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
     Rays<F> r;
     r.who = lane_index<F>() + static_cast<uint32_t>(i);
     r.active = active;
-    r.s = {three(rays.o), three(rays.d), path.throughput, F(0.f),      F(sum.x + sum.y + sum.z),
-           F(kFar),       begins.seed,   U(0u),           begins.hero, U(0u)};
+    r.s = {three(rays.o),
+           three(rays.d),
+           path.throughput,
+           F(0.f),
+           F(sum.x + sum.y + sum.z),
+           F(kFar * F(1.f + begins.first)),
+           begins.seed,
+           U(0u),
+           begins.hero,
+           U(0u)};
     inside.store_in(r.l);
     r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
     r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);

@@ -33,7 +33,8 @@ class Volumes : public WalksBelow {
                                    is_drawn_by_lamps)
                    ? &context.scene.lights
                    : nullptr),
-        interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts) {}
+        interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts,
+                   context.settings->equiangular && has_lamps(context.scene.lights)) {}
 
   /// `fly` of the reference where paths know what they are inside of: of the path in `path`, whose
   /// row is `inside` and whose ray, of `keys`, has hit `hit`. Both may be others afterwards.
@@ -86,17 +87,7 @@ class Volumes : public WalksBelow {
       }
       store(wave.ways.uints(kHero) + i, hero_of<F>(way.r.y, path.throughput));
     }
-    const Ways ways{q.ox,
-                    q.oy,
-                    q.oz,
-                    q.dx,
-                    q.dy,
-                    q.dz,
-                    flights.t,
-                    wave.ways.uints(kSeed),
-                    wave.ways.floats(kFirst),
-                    q.size,
-                    wave.times.floats(0)};
+    const Ways ways = ways_of(wave, q, flights.t);
     float* const scratch = wave.ways.floats(kScratch);
     if (!knows_inside)
       return fly_through<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
@@ -135,17 +126,7 @@ class Volumes : public WalksBelow {
       const PathRow<F> path = path_at<F>(wave, q.slot, i, q.size);
       put_numbers<F>(wave, i, Way<F>(sampler, path.key, depth, VertexSet::kShadow));
     }
-    const Ways ways{q.ox,
-                    q.oy,
-                    q.oz,
-                    q.dx,
-                    q.dy,
-                    q.dz,
-                    most,
-                    wave.ways.uints(kSeed),
-                    wave.ways.floats(kFirst),
-                    q.size,
-                    wave.times.floats(0)};
+    const Ways ways = ways_of(wave, q, most);
     transmittance_through<F>(volumes_, ways, product, counts_.volumes);
     if (!context_.knows_inside()) return;
     if (wave.pool.shades) [[unlikely]]
@@ -218,6 +199,21 @@ class Volumes : public WalksBelow {
             {c.floats(kRatio), c.floats(kRatio + 1), c.floats(kRatio + 2)},
             c.uints(kHero),
             {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)}};
+  }
+  /// The rays of a queue as ways of these lengths, with the numbers of `put_numbers`.
+  template <typename Queue>
+  static Ways ways_of(const Wave& wave, const Queue& q, const float* most) {
+    return {q.ox,
+            q.oy,
+            q.oz,
+            q.dx,
+            q.dy,
+            q.dz,
+            most,
+            wave.ways.uints(kSeed),
+            wave.ways.floats(kFirst),
+            q.size,
+            wave.times.floats(0)};
   }
   /// Lanes of shadow rays, from `i` on, whose shadow has a colour.
   template <typename F>

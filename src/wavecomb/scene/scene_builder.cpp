@@ -14,8 +14,33 @@
 #include "wavecomb/scene/scene_checks.h"
 #include "wavecomb/scene/scene_limits.h"
 #include "wavecomb/scene/volume_motion.h"
+#include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {
+
+namespace {
+
+/// A grid that a store of textures leaves room for, as long as anybody has it.
+struct CountedGrid {
+  std::shared_ptr<const VolumeGrid> grid;
+  std::shared_ptr<TileStore> store;
+
+  CountedGrid(std::shared_ptr<const VolumeGrid> g, std::shared_ptr<TileStore> s)
+      : grid(std::move(g)), store(std::move(s)) {
+    store->keep_grid(grid.get(), grid->bytes());
+  }
+  CountedGrid(const CountedGrid&) = delete;
+  CountedGrid& operator=(const CountedGrid&) = delete;
+  ~CountedGrid() { store->drop_grid(grid.get()); }
+};
+
+std::shared_ptr<const VolumeGrid> counted(const std::shared_ptr<const VolumeGrid>& grid,
+                                          const std::shared_ptr<TileStore>& store) {
+  const VolumeGrid* const at = grid.get();
+  return {std::make_shared<const CountedGrid>(grid, store), at};
+}
+
+}  // namespace
 
 SceneBuilder::SceneBuilder(uint32_t threads, std::shared_ptr<TileStore> store)
     : threads_(threads), store_(std::move(store)), groups_(1), children_(1) {
@@ -195,6 +220,9 @@ uint32_t SceneBuilder::add_mesh_light(Light light) {
 
 uint32_t SceneBuilder::add_volume(Volume volume) {
   check_volume(volume);
+  if (store_)
+    for (VolumeField* field : {&volume.density, &volume.color, &volume.glow, &volume.velocity})
+      if (field->grid) field->grid = counted(field->grid, store_);
   if (volume.moves()) {
     const auto known = std::find_if(volumes_.rbegin(), volumes_.rend(), [&](const Volume& other) {
       return other.motion && moves_alike(other, volume);

@@ -66,7 +66,7 @@ uint64_t TileStore::resident_bytes() const {
 size_t TileStore::room() const {
   // Never so few that readers take turns for ever.
   constexpr size_t kLeast = 32;
-  const uint64_t own = std::min(queue_.bytes(), limit_bytes_);
+  const uint64_t own = std::min(queue_.bytes() + counts_.grid_bytes, limit_bytes_);
   return std::max<size_t>(kLeast, (limit_bytes_ - own) / tile_bytes_);
 }
 
@@ -78,7 +78,28 @@ void TileStore::set_waiting(uint64_t bytes) {
 void TileStore::expect(uint64_t bytes, uint64_t scratch_bytes) {
   const std::lock_guard lock(mutex_);
   const uint64_t outside = round_up(bytes, page_bytes()) + scratch_bytes + waiting_bytes_;
-  if (!file_ && resident_bytes() + outside > limit_bytes_) spill();
+  spill_before(outside);
+}
+
+void TileStore::spill_before(uint64_t more) {
+  if (!file_ && resident_bytes() + counts_.grid_bytes + more > limit_bytes_) spill();
+}
+
+void TileStore::keep_grid(const void* grid, size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  Grid& kept = grids_.insert({grid, Grid{bytes, 0}}).first->second;
+  if (kept.uses++ > 0) return;
+  counts_.grid_bytes += kept.bytes;
+  if (!ranges_.empty()) spill_before(0);
+  make_room();
+}
+
+void TileStore::drop_grid(const void* grid) {
+  const std::lock_guard lock(mutex_);
+  const auto kept = grids_.find(grid);
+  if (kept == grids_.end() || --kept->second.uses > 0) return;
+  counts_.grid_bytes -= kept->second.bytes;
+  grids_.erase(kept);
 }
 
 const std::byte* TileStore::add(const std::byte* data, size_t bytes) {
@@ -88,7 +109,7 @@ const std::byte* TileStore::add(const std::byte* data, size_t bytes) {
   const std::byte* at = address(first);
   try {
     const size_t pages = round_up(bytes, page_bytes());
-    if (!file_ && resident_bytes() + pages > limit_bytes_) spill();
+    spill_before(pages);
     if (!file_) {
       const size_t whole = pages == bytes ? bytes : pages - page_bytes();
       if (whole > 0) put(at, data, whole);

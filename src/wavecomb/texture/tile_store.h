@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Keeps textures within a limit of memory, and the rest of them in a file.
+/// Keeps textures within a limit of memory, beside grids of volumes, and the rest of them in a
+/// file.
 #pragma once
 
 #include <atomic>
@@ -25,12 +26,14 @@ struct StoreStatistics {
   uint64_t file_bytes = 0;      ///< of the temporary file; 0: all fits in memory
   uint64_t resident_bytes = 0;  ///< memory in use, with that of the store itself
   uint64_t peak_bytes = 0;      ///< the most that resident_bytes ever was
+  uint64_t grid_bytes = 0;      ///< of grids of volumes, which leave less for textures
   uint64_t loads = 0;           ///< tiles read back from the file
   uint64_t releases = 0;        ///< tiles that made way for others
   double load_s = 0;            ///< seconds that reading back took, summed over threads
 };
 
-/// Memory of textures, of which at most `limit_bytes` are there at a time.
+/// Memory of textures, of which at most `limit_bytes` are there at a time, with grids of volumes.
+/// Grids are in memory as a whole: what they take is taken from the textures, down to a few tiles.
 ///
 /// Readers use plain pointers. While all textures fit they lie in memory. The first one that does
 /// not fit makes the store write all to a temporary file; from then on a tile of kTileBytes comes
@@ -66,6 +69,11 @@ class TileStore {
   /// Frees what `add` gave.
   void remove(const std::byte* at);
 
+  /// Says that a grid of `bytes` is in memory, which makes way for it; each `drop_grid` undoes one
+  /// call, the last one for all. Throws Error as `expect`.
+  void keep_grid(const void* grid, size_t bytes);
+  void drop_grid(const void* grid);
+
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
   /// Throws Error where a tile could not be read back, or there was no memory for it: what was read
@@ -88,6 +96,8 @@ class TileStore {
   const std::byte* address(uint32_t tile) const;
   uint32_t tile_at(const std::byte* at) const;
   uint64_t resident_bytes() const;
+  /// Throws as `spill` where textures, grids and `more` bytes are above the limit in memory.
+  void spill_before(uint64_t more);
   size_t room() const;
   void make_room();
   void spill();
@@ -111,6 +121,11 @@ class TileStore {
   TileQueue queue_;
   uint64_t held_bytes_ = 0;  ///< in memory, while there is no file
   uint64_t waiting_bytes_ = 0;
+  struct Grid {
+    size_t bytes;
+    uint32_t uses;
+  };
+  std::map<const void*, Grid> grids_;
   StoreStatistics counts_;
   uint64_t load_ns_ = 0;
   /// Of the first tile that could not be had.

@@ -22,6 +22,7 @@ from wavecomb.usd.looks.surface import (
     OPENPBR_COLOURS,
     Surface,
     fallback_surface,
+    is_cloudy,
 )
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
@@ -139,6 +140,8 @@ class MaterialTable:
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
         self._emitting: set[int] = set()
+        self.cloudy: list[str] = []
+        """Names of materials in use that refract and scatter inside."""
 
     @property
     def working(self) -> str:
@@ -166,6 +169,8 @@ class MaterialTable:
             if str(path).startswith("/__Prototype_"):
                 surface = replace(surface, name=self._report.place(path))
             self._surfaces[path] = surface
+            if is_cloudy(surface):
+                self.cloudy.append(surface.name)
             self._report.tally("materials")
         # Holding the object keeps its address from being used again.
         self._by_object[id(material)] = material, surface

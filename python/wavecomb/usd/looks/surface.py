@@ -130,6 +130,14 @@ class Surface:
         return replace(self, parameters={**self.parameters, parameter: value}, primvars=rest)
 
 
+def is_cloudy(surface: Surface) -> bool:
+    """Whether a surface bends light into something that scatters it."""
+    layers = surface.parameters.get("openpbr") or {}
+    scatters = max(layers.get("transmission_scatter", (0.0, 0.0, 0.0))) > 0
+    fills = layers.get("transmission_weight", 0.0) > 0 and layers.get("transmission_depth", 0.0) > 0
+    return scatters and fills and surface.parameters.get("ior", DEFAULTS["ior"]) != 1.0
+
+
 def fallback_surface(
     colour: tuple[float, float, float],
     opacity: float = 1.0,

@@ -58,7 +58,7 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.traverse import Traversal
 from wavecomb.usd.stage.view_options import Seen, check_view, seen_on
-from wavecomb.usd.stage.volumes import add_volumes
+from wavecomb.usd.stage.volumes import add_volumes, say_cloudy, say_room
 from wavecomb.usd.volumes.info import VolumeFacts
 
 if TYPE_CHECKING:
@@ -328,6 +328,8 @@ def _read(
     catchers = set_catchers(stage, choice.options, rays.catchers, builder)
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
     volumes = add_volumes(world, builder, report)
+    say_room(volumes, choice.options.texture_limit, report)
+    say_cloudy(volumes, materials.cloudy, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
         report.note("nothing to draw: the picture shows the environment only")
     chosen = None if view is None or view_prim is None else str(view_prim.GetPath())

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.looks.texture_store import MEGABYTE
 from wavecomb.usd.stage.group import Group, Scope, placed_volumes
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.report import LoadReport
@@ -83,6 +84,25 @@ def add_volumes(
         places.setdefault(name, []).append(corners)
         grids[name] = volume.grids
     return tuple(_facts(name, corners, grids[name]) for name, corners in places.items())
+
+
+def say_room(volumes: tuple[VolumeFacts, ...], limit: float | None, report: LoadReport) -> None:
+    """Says where grids alone take more than ``--texture-limit``, of so many MB, leaves."""
+    taken = sum(grid.bytes for grid in {grid for volume in volumes for grid in volume.grids})
+    if limit is not None and taken > limit * MEGABYTE:
+        report.warn(
+            f"texture limit {limit:g} MB: grids of volumes take {taken / MEGABYTE:,.1f} MB, all of "
+            "which is in memory; textures get a few tiles at a time: give more, or coarser grids"
+        )
+
+
+def say_cloudy(volumes: tuple[VolumeFacts, ...], cloudy: list[str], report: LoadReport) -> None:
+    """Says that light which scatters inside of these materials meets no volumes there."""
+    for name in cloudy if volumes else ():
+        what = (
+            "volumes inside of what refracts and scatters: unseen by light that was scattered there"
+        )
+        report.note(what, name)
 
 
 def _facts(

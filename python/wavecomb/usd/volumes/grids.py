@@ -177,7 +177,7 @@ class GridTable:
         values = self._values(found.values, use, kelvin)
         facts = GridFacts(
             use, field.name, field.file, head.name, head.value_name, found.voxels,
-            values.nbytes + found.origins.nbytes,
+            values.nbytes * (vdb.BRICK + 1) ** 3 // vdb.BRICK**3,
         )  # fmt: skip
         name = self._report.place(field.prim)
         signs = {"is_signed": True} if use == "velocity" else {}

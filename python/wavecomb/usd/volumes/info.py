@@ -18,7 +18,7 @@ class GridFacts:
         grid: Its name there.
         value: "float", "half", "vec3s" ... as OpenVDB calls it.
         voxels: That are active.
-        bytes: That its bricks take.
+        bytes: That its bricks take in memory, with their borders.
     """
 
     use: str

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nano_file.h"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <new>
+#include <system_error>
+
+#include "archive.h"
+#include "bricks.h"
+#include "nano_tree.h"
+#include "packed.h"
+
+namespace vdb {
+
+namespace {
+
+/// Of a segment (nanovdb::io::Header).
+struct SegmentHead {
+  std::array<char, 8> magic;
+  uint32_t version;
+  uint16_t count;
+  uint16_t codec;
+};
+static_assert(sizeof(SegmentHead) == 16);
+
+/// Of a grid in a segment, before its name (nanovdb::io::MetaData).
+struct GridHead {
+  uint64_t size, file_size, name_key, voxels;
+  uint32_t type, kind;
+  std::array<double, 6> world_box;
+  std::array<int32_t, 6> index_box;
+  std::array<double, 3> voxel_size;
+  uint32_t name_size;
+  std::array<uint32_t, 4> nodes;
+  std::array<uint32_t, 3> tiles;
+  uint16_t codec, padding;
+  uint32_t version;
+};
+static_assert(sizeof(GridHead) == 176);
+
+constexpr char kMagic[] = "NanoVDB";
+constexpr char kMagicOfOthers[] = "BDVonaN";
+/// In which a grid is packed by Blosc.
+constexpr uint64_t kNanoChunk = uint64_t{1} << 30;
+/// More than zlib and Blosc make smaller.
+constexpr uint64_t kMostPacked = 1100;
+constexpr uint32_t kLongestName = 1 << 16;
+
+std::string version_text(uint32_t version) {
+  return std::to_string(version >> 21) + "." + std::to_string((version >> 10) & 2047);
+}
+
+/// Throws where a segment is not one that we read.
+void check_head(const SegmentHead& head) {
+  if (std::memcmp(head.magic.data() + 1, kMagicOfOthers, 7) == 0)
+    throw BrokenFile("it was written on a machine of the other byte order");
+  if (std::memcmp(head.magic.data(), kMagic, 7) != 0)
+    throw BrokenFile("what should be a head of grids is none");
+  if (head.magic[7] == '1')
+    throw BrokenFile("it is a grid without a head: write it with nanovdb::io::writeGrid");
+  const uint32_t major = head.version >> 21, known = nano_major_version();
+  if (known == 0) throw BrokenFile("this build is without NanoVDB (libnanovdb-dev)");
+  if (major != known)
+    throw BrokenFile("format " + version_text(head.version) + " of NanoVDB is " +
+                     (major < known ? "older" : "newer") + " than " + std::to_string(known) +
+                     ", which is read: convert it, or give the .vdb file that it was made from");
+  if (head.magic[7] != '0' && head.magic[7] != '2')
+    throw BrokenFile("it is no file of grids that is known");
+  if (head.codec > 2) throw BrokenFile("it is packed in a way that is not known");
+}
+
+}  // namespace
+
+bool NanoFile::is_one(const std::string& path) {
+  std::array<char, 8> start{};
+  std::ifstream(path, std::ios::binary).read(start.data(), start.size());
+  return std::memcmp(start.data(), kMagic, 7) == 0 ||
+         std::memcmp(start.data() + 1, kMagicOfOthers, 7) == 0;
+}
+
+NanoFile::NanoFile(const std::string& path) {
+  std::error_code code;
+  const auto size = std::filesystem::file_size(path, code);
+  if (code) throw std::system_error(code);
+  stream_.open(path, std::ios::binary);
+  if (!stream_) throw std::system_error(errno, std::generic_category());
+  stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+  try {
+    find_grids(size);
+  } catch (const std::ios_base::failure&) {
+    throw BrokenFile("the file ends too early");
+  }
+}
+
+template <typename T>
+T NanoFile::take() {
+  T value;
+  stream_.read(reinterpret_cast<char*>(&value), sizeof(value));
+  return value;
+}
+
+void NanoFile::find_grids(uint64_t file_bytes) {
+  std::map<std::string, uint32_t> known;
+  for (uint64_t at = 0; at < file_bytes;) {
+    stream_.seekg(static_cast<std::streamoff>(at));
+    const auto head = take<SegmentHead>();
+    check_head(head);
+    const size_t first = entries_.size();
+    for (uint32_t i = 0; i < head.count; ++i) {
+      const auto grid = take<GridHead>();
+      if (grid.name_size > kLongestName) throw BrokenFile("a name of a grid that is too long");
+      std::string name(grid.name_size, '\0');
+      stream_.read(name.data(), grid.name_size);
+      NanoEntry& entry = entries_.emplace_back();
+      entry.name = name.c_str();
+      entry.index = known[entry.name]++;
+      entry.type = grid.type;
+      entry.codec = head.codec;
+      entry.size = grid.size;
+      entry.file_size = grid.file_size;
+    }
+    at = static_cast<uint64_t>(stream_.tellg());
+    for (size_t i = first; i < entries_.size(); ++i) {
+      NanoEntry& entry = entries_[i];
+      entry.offset = at;
+      if (entry.file_size > file_bytes - at) throw BrokenFile("the file ends too early");
+      at += entry.file_size;
+    }
+  }
+}
+
+std::string NanoFile::type_name(const NanoEntry& entry) {
+  return std::string("Tree_") + nano_type_word(entry.type) + "_5_4_3";
+}
+
+void NanoFile::unpack(const NanoEntry& entry, char* to) {
+  stream_.seekg(static_cast<std::streamoff>(entry.offset));
+  if (entry.codec == 0) {
+    stream_.read(to, static_cast<std::streamsize>(entry.size));
+    return;
+  }
+  const uint64_t end = entry.offset + entry.file_size;
+  for (uint64_t done = 0; done < entry.size;) {
+    const uint64_t bytes = entry.codec == 2 ? std::min(kNanoChunk, entry.size - done) : entry.size;
+    const auto length = take<uint64_t>();
+    if (length > end - static_cast<uint64_t>(stream_.tellg()))
+      throw BrokenFile("a chunk is longer than its grid");
+    const auto packed = std::make_unique_for_overwrite<unsigned char[]>(length);
+    stream_.read(reinterpret_cast<char*>(packed.get()), static_cast<std::streamsize>(length));
+    const bool ok = entry.codec == 2 ? unpack_blosc(packed.get(), length, to + done, bytes)
+                                     : unpack_zip(packed.get(), length, to + done, bytes);
+    if (!ok) throw BrokenFile("a chunk cannot be unpacked");
+    done += bytes;
+  }
+}
+
+openvdb::GridBase::Ptr NanoFile::read(const NanoEntry& entry, uint64_t most_bytes) {
+  if (!is_nano_type_read(entry.type)) return nullptr;
+  if (entry.codec == 0 ? entry.size != entry.file_size : entry.size / kMostPacked > entry.file_size)
+    throw BrokenFile("sizes of a grid that do not fit each other");
+  if (entry.size > most_bytes) throw TooLarge(room_text("the grid", entry.size, most_bytes));
+  constexpr std::align_val_t kAligned{64};
+  const auto free = [&](char* p) { ::operator delete[](p, kAligned); };
+  const std::unique_ptr<char[], decltype(free)> bytes(
+      static_cast<char*>(::operator new[](entry.size, kAligned)), free);
+  try {
+    unpack(entry, bytes.get());
+  } catch (const std::ios_base::failure&) {
+    throw BrokenFile("the file ends too early");
+  }
+  auto grid = read_nano(reinterpret_cast<const unsigned char*>(bytes.get()), entry.size, entry.type,
+                        most_bytes);
+  grid->setName(entry.name);
+  return grid;
+}
+
+}  // namespace vdb
