@@ -3,13 +3,38 @@
 # Ubuntu names static libraries that are not installed.
 #
 # OpenSubdiv_ROOT leads to it where it is elsewhere. OpenSubdiv_NEEDS_OPENMP: it is linked with libgomp.
+# OpenSubdiv_SOURCE, the folder of its sources: what we need of it is compiled as we are, for another CPU or standard
+# library than the distribution's.
+
+# _osd_version(FOLDER): sets OpenSubdiv_VERSION to that of the headers in it.
+function(_osd_version folder)
+  file(STRINGS "${folder}/opensubdiv/version.h" version REGEX "define +OPENSUBDIV_VERSION +v[0-9_]+")
+  string(REGEX MATCH "[0-9]+_[0-9]+_[0-9]+" version "${version}")
+  string(REPLACE "_" "." version "${version}")
+  set(OpenSubdiv_VERSION "${version}" PARENT_SCOPE)
+endfunction()
+
+if(OpenSubdiv_SOURCE)
+  file(GLOB _osd_sources "${OpenSubdiv_SOURCE}/opensubdiv/far/*.cpp" "${OpenSubdiv_SOURCE}/opensubdiv/sdc/*.cpp"
+    "${OpenSubdiv_SOURCE}/opensubdiv/vtr/*.cpp")
+  add_library(wavecomb_opensubdiv STATIC EXCLUDE_FROM_ALL ${_osd_sources})
+  target_include_directories(wavecomb_opensubdiv SYSTEM PUBLIC "${OpenSubdiv_SOURCE}")
+  target_compile_features(wavecomb_opensubdiv PUBLIC cxx_std_14)
+  target_compile_options(wavecomb_opensubdiv PRIVATE -w)
+  # By this name in what is exported, too.
+  add_library(OpenSubdiv::osdCPU INTERFACE IMPORTED)
+  set_target_properties(OpenSubdiv::osdCPU PROPERTIES INTERFACE_LINK_LIBRARIES wavecomb_opensubdiv)
+  set(OpenSubdiv_LIBRARY wavecomb_opensubdiv)
+  _osd_version("${OpenSubdiv_SOURCE}")
+  set(OpenSubdiv_NEEDS_OPENMP FALSE)
+  set(OpenSubdiv_FOUND TRUE)
+  return()
+endif()
+
 find_path(OpenSubdiv_INCLUDE_DIR opensubdiv/far/primvarRefiner.h)
 find_library(OpenSubdiv_LIBRARY osdCPU)
 if(OpenSubdiv_INCLUDE_DIR)
-  file(STRINGS "${OpenSubdiv_INCLUDE_DIR}/opensubdiv/version.h" OpenSubdiv_VERSION
-    REGEX "define +OPENSUBDIV_VERSION +v[0-9_]+")
-  string(REGEX MATCH "[0-9]+_[0-9]+_[0-9]+" OpenSubdiv_VERSION "${OpenSubdiv_VERSION}")
-  string(REPLACE "_" "." OpenSubdiv_VERSION "${OpenSubdiv_VERSION}")
+  _osd_version("${OpenSubdiv_INCLUDE_DIR}")
 endif()
 include(FindPackageHandleStandardArgs)
 find_package_handle_standard_args(OpenSubdiv REQUIRED_VARS OpenSubdiv_LIBRARY OpenSubdiv_INCLUDE_DIR

@@ -14,7 +14,9 @@ add_library(wavecomb_common INTERFACE)
 target_compile_features(wavecomb_common INTERFACE cxx_std_20)
 target_compile_options(wavecomb_common INTERFACE
   -ffp-contract=off -fno-strict-aliasing -fno-math-errno -fno-trapping-math
-  -Wall -Wextra -Wpedantic -Wshadow=local -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
+  -Wall -Wextra -Wpedantic $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
+  # Masks of scalar lanes are bool.
+  $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-bitwise-instead-of-logical>
   # GCC 12 sees uninitialized and out-of-bounds vectors inside its own intrinsics once they are inlined.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)

@@ -5,7 +5,9 @@ build renders. `make test-sdist` runs this.
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -39,6 +41,22 @@ def test_it_holds_the_sources_and_no_more(sources: Path) -> None:
         assert (sources / name).exists(), name
     for name in (".deps", ".venv", ".git", "build", "out", "dist"):
         assert not (sources / name).exists(), name
+
+
+def test_without_a_compiler_it_says_what_to_install(sources: Path, tmp_path: Path) -> None:
+    pip = [sys.executable, "-m", "pip"]
+    done = subprocess.run(
+        [*pip, "wheel", "--no-build-isolation", "--no-deps", "-w", tmp_path, "."],
+        cwd=sources,
+        env={**os.environ, "CXX": "/nowhere/c++"},
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert done.returncode != 0
+    said = " ".join((done.stdout + done.stderr).split())
+    assert "No C++ compiler was found." in said, said
+    assert "install g++" in said
 
 
 @needs("wavecomb._core")

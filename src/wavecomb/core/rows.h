@@ -74,7 +74,7 @@ WAVECOMB_INLINE Vector<B> load_words(const float* p) {
 #endif
   } else {
     Vector<B> v{};
-    unrolled<N>([&](auto i) WAVECOMB_INLINE_LAMBDA { v[i] = p[i]; });
+    unrolled<N>([&](auto i) WAVECOMB_INLINE_LAMBDA { v[i()] = p[i()]; });
     return v;
   }
 }

@@ -33,17 +33,18 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   using U = UInt<F>;
+  using V = Vertex<F, kFeatures>;
   VertexResult<F> out;
   out.emitted = Color<F>(F(0.f));
   out.direct = Color<F>(F(0.f));
   out.has_shadow = Mask<F>(false);
   out.alive = Mask<F>(false);
   out.shadow_set = U(0u);
-  if constexpr (v.has(kMeshLights)) out.shade = Color<F>(F(0.f));
+  if constexpr (V::has(kMeshLights)) out.shade = Color<F>(F(0.f));
   out.next.link = U(0u);
   out.axis = U(0u);
   out.bsdf_pdf = F(0.f);
-  if constexpr (v.has(kInside)) out.crossed = U(0u);
+  if constexpr (V::has(kInside)) out.crossed = U(0u);
   if (v.wants_lights()) {
     v.aovs->emitter = v.aovs->lit_by = U(kNoLight);
     v.aovs->light_weight = F(-1.f);

@@ -150,7 +150,7 @@ WAVECOMB_INLINE SurfacePlace<Bsdf, F>::SurfacePlace(const Vertex<F, kFeatures>& 
       reads_texture(v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) !=
                                        UInt<F>(0u))),
       textured(Bsdf::kTextured && any(reads_texture)),
-      s(setup_surface<F, v.has(kCurves), v.has(kMotion)>(
+      s(setup_surface<F, Vertex<F, kFeatures>::has(kCurves), Vertex<F, kFeatures>::has(kMotion)>(
           v.scene, v.hit, v.path.dir, textured || Bsdf::kOnFibre || (v.notes() && v.aovs->wants_uv),
           Bsdf::kHasTerminator, v.active)) {}
 
