@@ -2,9 +2,9 @@
 // Events that are no hits, and shadow rays that bring back a colour: fog through both integrators.
 #include "media_testing.h"
 #include "wave_testing.h"
-#include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/run_wave.h"
 #include "wavecomb/integrate/stages/shade_batch.h"
+#include "wavecomb/integrate/trace_task.h"
 #include "wavecomb/material/program_table.h"
 
 namespace wavecomb {

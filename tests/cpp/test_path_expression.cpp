@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/core/backward_automaton.h"
 #include "wavecomb/core/error.h"
 
 namespace wavecomb {
@@ -128,6 +129,44 @@ TEST(PathExpression, ErrorsNameThePlace) {
 TEST(PathExpression, TooMuchIsRefused) {
   const std::vector<NamedExpression> wide{{"a", "C.*D.{10}[LO]"}};
   EXPECT_THROW(PathAutomaton(wide, kKeys), Error);
+}
+
+/// From the end a path is read to any vertex, from the camera to the same: it matches what it does
+/// when the camera reads it all.
+TEST(BackwardAutomaton, MeetsTheForwardOneAnywhere) {
+  std::vector<NamedExpression> all;
+  for (const Pair& pair : kPairs)
+    all.push_back({"e" + std::to_string(all.size()), pair.expression});
+  const PathAutomaton forward(all, kKeys);
+  const BackwardAutomaton backward(forward);
+  ASSERT_EQ(backward.begin.size(), forward.ends);
+  EXPECT_LT(backward.states(), 200u);
+  for (uint32_t number = 0; number < kPathEvents * kPathEvents * kPathEvents; ++number) {
+    const std::vector<uint32_t> events{number % kPathEvents, number / kPathEvents % kPathEvents,
+                                       number / kPathEvents / kPathEvents};
+    for (uint32_t end = 0; end < forward.ends; ++end) {
+      const uint32_t expected = forward.matched[state_after(forward, events) * forward.ends + end];
+      uint32_t state = backward.begin[end];
+      for (size_t i = events.size();; --i) {
+        const uint32_t before =
+            state_after(forward, {events.begin(), events.begin() + static_cast<std::ptrdiff_t>(i)});
+        ASSERT_EQ(backward.matched[state * backward.forward_states + before], expected)
+            << number << " " << end << " " << i;
+        if (i == 0) break;
+        state = backward.next[state * PathAutomaton::kNextWords + events[i - 1]];
+      }
+    }
+  }
+}
+
+/// Which of the last eleven events that were read are diffuse: 2^11 states from the light, few from
+/// the camera.
+TEST(BackwardAutomaton, RefusesWhatIsTooMuch) {
+  const PathAutomaton forward(std::vector<NamedExpression>{{"a", "C.{10}D.*[LO]"}}, kKeys);
+  EXPECT_LT(forward.states(), 20u);
+  EXPECT_THROW(BackwardAutomaton{forward}, Error);
+  const PathAutomaton one(std::vector<NamedExpression>{{"a", "C.{3}D.*[LO]"}}, kKeys);
+  EXPECT_GT(BackwardAutomaton(one).states(), 0u);
 }
 
 }  // namespace

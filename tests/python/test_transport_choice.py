@@ -47,7 +47,7 @@ def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Pa
         ({"size": (32, 32), "spp": 16}, "too few samples"),
         ({"adaptive": 0.1}, "do not go with adaptive"),
         ({"guiding": "auto"}, "do not go with guiding"),
-        ({"aovs": ("direct",)}, "do not go with the AOV direct"),
+        ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "no room for so many light path expressions"),
         ({"clamp_indirect": 1.0}, "do not go with clamp_indirect"),
     ],
     ids=lambda x: str(x)[:30],

@@ -191,6 +191,19 @@ def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
         compare(f"connections {lens}", stage, beauty, transport="bdpt", **wide)
 
 
+def test_connections_are_unbiased_in_motion(tmp_path: Path, beauty: Any) -> None:
+    """A ball that moves while the shutter is open: both of a pair of paths see it at one time."""
+    shutter = "double shutter:open = 0\ndouble shutter:close = 1\nfloat focalLength"
+    way = "double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 1: (0.5, 0, 0.3) }"
+    ball = sphere("Moving", "Gloss", (-0.3, 0.6, 0.7), 0.35, rings=12)
+    order = 'uniform token[] xformOpOrder = ["xformOp:translate"]'
+    mover = f'def Xform "Mover" {{\n{way}\n{order}\n{ball}\n}}'
+    prims = corner(*lights(tmp_path)["rect"], mover)
+    view = (p.replace("float focalLength", shutter) if "Camera" in p else p for p in prims)
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *view), frame=0)
+    compare("connections in motion", stage, beauty, 24, 8, transport="bdpt")
+
+
 @pytest.mark.parametrize("ball", ["Frosted", "Clear", "Coated"])
 def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> None:
     """A ball under a large lamp, which paths from the camera find through it, too."""

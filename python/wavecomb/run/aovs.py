@@ -138,12 +138,22 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
     for kind in ("mean_of_hits", "nearest"):
         total += 4 * any(row.kind == kind for row in kept)
     total += (64 + 48) * sum(row.kind == "coverage" for row in kept)
-    single = sum(map(_is_light, chosen))
-    total += (24 + 12) * sum(map(expressions.is_expression, chosen))
-    total += (24 + 12) * (light_groups if "light_groups" in chosen else single)
+    total += (24 + 12) * _many_layers(chosen, light_groups)
     if chosen & set(ERRORS):
         total += 48 + 4 + 12
     return total
+
+
+def splat_layers(aovs: Iterable[str], light_groups: int) -> int:
+    """Layers beside the beauty that keep what paths from the lights bring by itself."""
+    chosen = set(aovs)
+    return len({"direct", "indirect"} & chosen) + _many_layers(chosen, light_groups)
+
+
+def _many_layers(chosen: set[str], light_groups: int) -> int:
+    """Light groups and light path expressions."""
+    groups = light_groups if "light_groups" in chosen else sum(map(_is_light, chosen))
+    return groups + sum(map(expressions.is_expression, chosen))
 
 
 def _is_light(name: str) -> bool:

@@ -20,6 +20,8 @@ MAX_SPP = 1 << 24
 _ERROR_BYTES_PER_PIXEL = 100
 # Of a reweighted one: its cascades, and the unbiased layer.
 _CASCADE_BYTES_PER_PIXEL = 96 + 12
+# Of sums of splats, for the beauty and each layer that has some.
+_SPLAT_BYTES_PER_PIXEL = 48
 # Of a deep one, at most: sums in the film, and samples in the picture.
 _DEEP_BYTES_PER_PIXEL = 1 + 4
 _DEEP_BYTES_PER_SAMPLE = 40 + 24
@@ -115,6 +117,9 @@ def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
     each += _CASCADE_BYTES_PER_PIXEL * (settings.firefly != "keep")
+    if settings.transport != "path":
+        sums = 1 + keeps_error(settings) + aov_names.splat_layers(aovs, light_groups)
+        each += _SPLAT_BYTES_PER_PIXEL * sums + 4  # and the samples of a light path
     if aov_names.DEEP in settings.aovs:
         each += _DEEP_BYTES_PER_PIXEL + _DEEP_BYTES_PER_SAMPLE * settings.deep_samples
     width, height = picture_size(settings)

@@ -13,11 +13,7 @@ LightPathRefusal light_path_refusal(const Settings& s) {
   if (s.guiding != Guiding::kOff) return {"guiding", "guiding off"};
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
-  for (const Aov aov : {Aov::kEmission, Aov::kDirect, Aov::kIndirect, Aov::kLightGroups,
-                        Aov::kExpressions, Aov::kDeep})
-    if (s.aovs.has(aov))
-      return {"the AOV " + std::string(aov_name(aov)) + ", which knows no light of such paths",
-              "others"};
+  if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which knows no light of such paths", "none"};
   return {};
 }
 

@@ -30,7 +30,8 @@ void keep_once(std::vector<uint32_t>& ids) {
 
 }  // namespace
 
-AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixels_(pixels) {
+AovFilm::AovFilm(size_t pixels, const AovLayout& layout)
+    : layout_(layout), splat_places_(layout), pixels_(pixels) {
   for (const AovRow& row : kAovs) {
     if (!layout.set.has(row.aov)) continue;
     switch (row.kind) {
@@ -60,7 +61,7 @@ AovFilm::AovFilm(size_t pixels, const AovLayout& layout) : layout_(layout), pixe
 
 size_t AovFilm::bytes() const {
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
-  size_t n = of(hits_) + of(centre2_) + deep_.bytes();
+  size_t n = of(hits_) + of(centre2_) + deep_.bytes() + splats_.bytes();
   for (const auto& sums : sums_) n += of(sums);
   for (const auto& values : nearest_) n += of(values);
   for (const auto& level : crypto_) n += of(level);
@@ -96,8 +97,15 @@ AovLayer AovFilm::layer(Aov aov, const std::vector<uint32_t>& samples) const {
     });
   };
   switch (row.kind) {
-    case AovKind::kMean:
-      return scaled([&](size_t i) { return inverse_count(samples[i]); });
+    case AovKind::kMean: {
+      AovLayer layer = scaled([&](size_t i) { return inverse_count(samples[i]); });
+      if (const uint32_t place = splat_places_.of(aov);
+          !splats_.empty() && place != SplatPlaces::kNowhere)
+        for (size_t i = 0; i < layer.values.size(); ++i)
+          layer.values[i] = static_cast<float>(sums[i] * inverse_count(samples[i / 3]) +
+                                               splat_mean(i / 3, place, i % 3));
+      return layer;
+    }
     case AovKind::kMeanOfHits: {
       AovLayer layer = scaled([&](size_t i) { return inverse_count(hits_[i]); });
       for (size_t i = 0; i < layer.values.size(); ++i)
@@ -126,9 +134,11 @@ AovLayer AovFilm::one_of_many(Aov aov, uint32_t which, std::string name,
                               const std::vector<uint32_t>& samples) const {
   const std::vector<double>& sums = sums_[place_of(aov)];
   const size_t words = words_of(row_of(aov));
+  const uint32_t place = splat_places_.of(aov, which);
   return make_layer(std::move(name), 3, pixels_, [&](size_t i, float* v) {
     for (size_t c = 0; c < 3; ++c)
-      v[c] = static_cast<float>(sums[i * words + 3 * which + c] * inverse_count(samples[i]));
+      v[c] = static_cast<float>(sums[i * words + 3 * which + c] * inverse_count(samples[i]) +
+                                splat_mean(i, place, c));
   });
 }
 

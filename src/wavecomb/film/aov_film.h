@@ -12,6 +12,8 @@
 #include "wavecomb/film/cryptomatte.h"
 #include "wavecomb/film/deep_film.h"
 #include "wavecomb/film/median.h"
+#include "wavecomb/film/splat_places.h"
+#include "wavecomb/film/splats.h"
 
 namespace wavecomb {
 
@@ -89,6 +91,17 @@ class AovFilm {
   /// The sums of a deep picture; empty where none is kept.
   DeepFilm& deep() { return deep_; }
 
+  // ---- light that paths from the lights bring ---------------------------------------------------
+
+  /// Keeps it from now on, in units of `unit`, for the layers that hold any.
+  void keep_splats(FixedPoint unit) { splats_ = SplatSums(pixels_ * splat_places_.count, unit); }
+  /// Adds light to a pixel of layer `place` (SplatPlaces), in any order.
+  void add_splat(size_t pixel, uint32_t place, float r, float g, float b) {
+    splats_.add(pixel * splat_places_.count + place, r, g, b);
+  }
+  /// How sums of splats are made means of, from now on.
+  void scale_splats(const SplatScale& scale) { splat_scale_ = scale; }
+
   // ---- layers -----------------------------------------------------------------------------------
 
   /// The layer of an AOV that has one alone; no values where it is not kept. `samples` is by pixel.
@@ -116,6 +129,7 @@ class AovFilm {
       block(name, nearest_[place_of(row.aov)]);
       if (row.kind == AovKind::kCoverage) block(name, crypto_[level_index(row.aov)]);
     }
+    block("aov_splats", splats_.sums());
     block("aov_hits", hits_);
     block("aov_centre", centre2_);
   }
@@ -136,12 +150,21 @@ class AovFilm {
   template <typename Layer>
   void for_each_of_many(const std::vector<std::string>& many_names, const Layer& layer) const;
 
+  /// What splats bring channel `c` of layer `place`, which may be kNowhere.
+  double splat_mean(size_t pixel, uint32_t place, size_t c) const {
+    if (splats_.empty() || place == SplatPlaces::kNowhere) return 0;
+    return splat_scale_.of(splats_.value(pixel * splat_places_.count + place, c));
+  }
+
   AovLayout layout_;
+  SplatPlaces splat_places_;
   size_t pixels_ = 0;
   // By the place of an AOV's row; empty where it is not kept.
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
+  SplatSums splats_;  ///< places of a pixel side by side; empty where there are none
+  SplatScale splat_scale_;
   DeepFilm deep_;
   std::vector<uint32_t> hits_;  ///< samples that have hit something
   std::vector<float> centre2_;  ///< squared distance of the nearest sample, pixels

@@ -36,6 +36,7 @@ std::vector<float> Film::means(const std::vector<float>& excess) const {
 
 void Film::note_light_paths() {
   if (splats_.empty()) return;
+  aovs_.scale_splats(splats_.scale());
   for (size_t i = 0; i < pixels_.size(); ++i) {
     double* sums = aovs_.sums(Aov::kByLightPaths, i);
     if (!sums) return;
@@ -66,9 +67,12 @@ std::vector<float> Film::variance() const {
   std::vector<float> out(3 * errors_.size());
   for (size_t i = 0; i < errors_.size(); ++i) {
     const double n = pixels_[i].samples;
+    std::array<double, 3> splats{};
+    if (!splats_.empty()) splats = splats_.difference(i);
     for (size_t c = 0; c < 3; ++c)
-      out[3 * i + c] = n < 2 ? std::numeric_limits<float>::infinity()
-                             : static_cast<float>(errors_[i].m2[c] / (n * (n - 1)));
+      out[3 * i + c] =
+          n < 2 ? std::numeric_limits<float>::infinity()
+                : static_cast<float>(errors_[i].m2[c] / (n * (n - 1)) + splats[c] * splats[c]);
   }
   return out;
 }

@@ -43,16 +43,17 @@ class Film {
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
   /// Keeps splats from now on, in units of `unit`, of `paths` numbers of paths, `scale` a sample;
-  /// the beauty is then the pixel's mean and theirs.
+  /// the beauty is then the pixel's mean and theirs. AOVs keep theirs, too.
   void keep_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
-    splats_ = SplatLayer(pixels_.size(), unit, paths, scale);
+    splats_ = SplatLayer(pixels_.size(), unit, paths, scale, has_error());
+    aovs_.keep_splats(unit);
   }
   /// Keeps samples by brightness from now on; the beauty is then reweighted. `darkest`: the
   /// brightness of their first layer.
   void keep_cascades(float darkest) { cascades_ = Cascades(window_, darkest); }
   bool has_cascades() const { return !cascades_.empty(); }
   Cascades& cascades() { return cascades_; }
-  /// Brings the AOV of light paths, where it is kept, to what splats tell now.
+  /// Brings AOVs that hold what light paths bring to what splats tell now.
   void note_light_paths();
   SplatLayer& splats() { return splats_; }
   const SplatLayer& splats() const { return splats_; }

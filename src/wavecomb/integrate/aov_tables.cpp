@@ -12,6 +12,7 @@ namespace wavecomb {
 
 AovTables::AovTables(const Scene& scene, const Settings& settings) {
   layout.set = settings.aovs;
+  connects = settings.connects();
   layout.deep = {settings.deep_samples, settings.deep_tolerance};
   if (settings.allocate == Allocate::kEfficiency) {
     layout.set.bits = layout.set.bits | Aov::kCost;
@@ -58,6 +59,7 @@ void AovTables::keep_groups(const Scene& scene, const Settings& settings) {
 
 void AovTables::keep_expressions(const Scene& scene, const Settings& settings) {
   automaton = PathAutomaton(settings.expressions, scene.light_groups());
+  if (settings.joins_light()) backward = BackwardAutomaton(automaton);
   layout.expressions = automaton.expressions;
   for (const NamedExpression& one : settings.expressions) kept_names.push_back(one.name);
   const std::vector<uint32_t> groups = scene.groups_of_lights();

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/core/backward_automaton.h"
 #include "wavecomb/core/lanes.h"
 #include "wavecomb/core/path_expression.h"
 #include "wavecomb/core/settings.h"
@@ -28,9 +29,11 @@ struct AovTables {
   /// Of the film's groups, then of its expressions.
   std::vector<std::string> kept_names;
   PathAutomaton automaton;             ///< of the expressions
+  BackwardAutomaton backward;          ///< the same for paths from lights, where there are any
   std::vector<uint32_t> end_of_light;  ///< PathExpressions'; empty where there are none
   /// The cost AOV is what the model says, which is reproducible, instead of time.
   bool models_cost = false;
+  bool connects = false;  ///< vertices of camera paths connect to those of paths from lights
 
   /// What AovHit calls geometry `geom` of instance `inst`; kNothingHit where nobody wants to know.
   template <typename F>

@@ -24,7 +24,8 @@ class LightTracer {
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
         splats_(worker.splats),
-        vertices_(worker.light_vertices) {}
+        vertices_(worker.light_vertices),
+        light_aovs_(worker.light_aovs) {}
 
   /// `keeps`: one of the path's vertices, for the camera's path of the same pixel and sample.
   void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
@@ -37,6 +38,7 @@ class LightTracer {
     rays_.begin(start.key, context_.moves()
                                ? light_path_time<F>(*context_.settings, start.key, pixel, sample)
                                : 0.f);
+    if (light_aovs_.wants_events()) light_aovs_.begin<F>(kOnlySlot, e.light, true);
     PathState<F> path{e.d, start.flux, start.weight, start.eta_scale, 0.f, 0.f, e.o, e.light};
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
@@ -52,13 +54,16 @@ class LightTracer {
         if (!(cost_aware_number<F>(start.key, depth) < q)) return;
         path.throughput *= 1.f / q;
       }
-      const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path);
+      VertexAovs<F> aovs;
+      aovs.wants_events = light_aovs_.wants_events();
+      const LightVertexResult<F> out = shade(start.key, depth, hit, mesh, material, path, aovs);
       const VertexResult<F>& v = out.v;
+      if (aovs.wants_events) light_aovs_.shade<F>(depth, kOnlySlot, start.key, aovs, true);
       if (keeps) keep(start.key, depth, hit, mesh, material, path, out);
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          bring(pixel, depth, out);
+          bring(pixel, sample, depth, path.receiver, out);
       }
       if (!v.alive) return;
       path = v.next;
@@ -66,11 +71,16 @@ class LightTracer {
   }
 
  private:
-  void bring(uint32_t pixel, uint32_t depth, const LightVertexResult<F>& out) {
-    if (context_.lessons)
+  void bring(uint32_t pixel, uint32_t sample, uint32_t depth, uint32_t light,
+             const LightVertexResult<F>& out) {
+    if (context_.lessons) {
       context_.lessons->bring(light_path_number(*context_.settings, pixel), depth, out.v.direct);
-    else
-      add_splat(context_, splats_, out.x, out.y, out.v.direct);
+      return;
+    }
+    add_splat(context_, splats_, sample, out.x, out.y, out.v.direct);
+    if (light_aovs_)
+      light_aovs_.show(*context_.film, *context_.splat_filter, kOnlySlot, depth, light, out.x,
+                       out.y, out.v.direct);
   }
 
   void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
@@ -79,11 +89,14 @@ class LightTracer {
                          path.ratio, key,      path.receiver};
     const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
                                   hit.inst, mesh,  hit.geom, kOnlySlot};
-    keep_light_vertex<F>(vertices_, depth, row, record, material, out.p, out.offered);
+    if (keep_light_vertex<F>(vertices_, depth, row, record, material, out.p, out.offered) &&
+        light_aovs_.wants_events())
+      light_aovs_.keep<F>(kOnlySlot, true);
   }
 
   LightVertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
-                             uint32_t mesh, uint32_t material, const PathState<F>& path) {
+                             uint32_t mesh, uint32_t material, const PathState<F>& path,
+                             VertexAovs<F>& aovs) {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
@@ -91,7 +104,7 @@ class LightTracer {
         light_path_state<F>(*context_.camera, path.dir, path.throughput, path.pdf, path.eta_scale,
                             path.ratio, path.o, path.receiver, hit.t, rays_.time(), true);
     return kShadeLightVertex<F>[scene.material_program[material]](
-        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, nullptr, true},
+        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, &aovs, true},
         setup_, nullptr);
   }
 
@@ -103,6 +116,7 @@ class LightTracer {
   SingleRays rays_;
   SplatList& splats_;
   LightVertices& vertices_;
+  LightPathAovs& light_aovs_;
 };
 
 /// Gives the film what the paths of a task have brought.

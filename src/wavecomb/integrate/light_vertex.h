@@ -25,6 +25,7 @@
 
 #include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/light_path.h"
+#include "wavecomb/integrate/steps/note_events.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/light/emission.h"
 
@@ -126,6 +127,15 @@ WAVECOMB_INLINE void ask_whether_seen(const Place& place, const Looker<F>& looke
   out.shadow_tfar = size * kShadowReach;
 }
 
+/// Notes how light is scattered to who looks, where that is asked for.
+template <typename F, uint32_t kFeatures, typename Place>
+WAVECOMB_INLINE void note_shown(const Vertex<F, kFeatures>& v, const Place& place,
+                                const Looker<F>& looker) {
+  if (v.wants_events()) [[unlikely]]
+    v.aovs->lit = note_event<std::remove_cvref_t<decltype(place.at.bsdf)>, F>(
+        place.at.bsdf, looker.local, place.l);
+}
+
 /// Shows the vertex to the camera.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
@@ -148,6 +158,7 @@ WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPa
   ask_whether_seen<F>(place, looker, c.to, Color<F>(place.flux * e.f_cos * brightness), out.v);
   out.x = c.x;
   out.y = c.y;
+  note_shown<F>(v, place, looker);
 }
 
 /// Shows the vertex to that of a camera path.
@@ -168,6 +179,7 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
   const F brightness = turn / F(F(1.f + before) + others);
   ask_whether_seen<F>(place, looker, target.from,
                       Color<F>(place.flux * e.f_cos * target.light * brightness), out);
+  note_shown<F>(v, place, looker);
 }
 
 /// The bounce, and the ray that goes on.
@@ -193,6 +205,10 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
     s = select(b.is_delta, F(v.path.pdf * by_angle), s);
     goes = not_(b.is_delta & passes_one_way<Bsdf, F>(at.bsdf, place.l, b.wi));
   }
+  if (v.wants_events()) [[unlikely]] {
+    v.aovs->bounce = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, b.wi, place.l);
+    v.aovs->bounce.is_delta = b.is_delta;
+  }
   out.next.dir = d;
   out.next.throughput = place.flux * weight;
   out.next.pdf = min(s, F(kMostRatio));
@@ -214,7 +230,8 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
 }  // namespace detail
 
 /// The steps of a vertex of the active lanes' paths from lights, with program `Bsdf`. `v.hit.time`
-/// is the path's, and `v.path.cone_width` the camera's.
+/// is the path's, and `v.path.cone_width` the camera's. Of `v.aovs`, where they are there, they
+/// note `lit` (towards who looks) and `bounce`, where events are wanted.
 /// `target` null: it is shown to the camera and the path goes on; else to the vertices of camera
 /// paths there, and `v.depth` says nothing.
 template <typename Bsdf, typename F, uint32_t kFeatures>

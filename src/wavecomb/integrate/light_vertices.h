@@ -67,13 +67,13 @@ class LightVertices {
 };
 
 /// Keeps, of the lanes in `offered`, the vertex at `p` where the path's number says so: with n
-/// vertices so far, the last one with probability 1 / n.
+/// vertices so far, the last one with probability 1 / n. Those whose vertex it now is.
 template <typename F>
-inline void keep_light_vertex(const LightVertices& to, uint32_t depth, const PathRow<F>& path,
-                              const ShadingRecord<F>& record, const UInt<F>& material,
-                              const Vec3<F>& p, const Mask<F>& offered) {
+inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth, const PathRow<F>& path,
+                                 const ShadingRecord<F>& record, const UInt<F>& material,
+                                 const Vec3<F>& p, const Mask<F>& offered) {
   using U = UInt<F>;
-  if (none(offered)) return;
+  if (none(offered)) return Mask<F>(false);
   LightVertexRow<F> row = load_row<LightVertexRow, F>(to.chosen, record.slot, offered);
   row.vertices = row.vertices + 1u;
   const U number = hash_u32<U>(path.key.pixel_hash, path.key.sample);
@@ -83,9 +83,10 @@ inline void keep_light_vertex(const LightVertices& to, uint32_t depth, const Pat
   row.depth = select(Mask<U>(taken), U(depth), row.depth);
   row.material = select(Mask<U>(taken), material, row.material);
   store_row<LightVertexRow, F>(to.chosen, record.slot, row, offered);
-  if (none(taken)) return;
+  if (none(taken)) return taken;
   store_row<PathRow, F>(to.paths, record.slot, path, taken);
   store_row<ShadingRecord, F>(to.records, record.slot, record, taken);
+  return taken;
 }
 
 }  // namespace wavecomb

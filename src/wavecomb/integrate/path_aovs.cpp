@@ -75,6 +75,10 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       add_difference(emission, emitted, none);
       add_difference(direct, with_direct, emitted);
       add_difference(indirect, radiance + row, with_direct);
+      if (!early_links_) return;
+      const float* links = early_links_.rows + row;
+      add_difference(direct, none, links);
+      add_difference(indirect, links, none);
     });
   }
   if (groups_) {

@@ -2,7 +2,7 @@
 /// What paths find for AOVs, beside their radiance. Both integrators own one of these, a row a path
 /// slot, and tell it what happens to a path:
 ///
-///   begin      a camera ray starts
+///   begin      a camera ray starts (path_first_hits.h)
 ///   hit_light, hit_surface   what it met first
 ///   vertex     a surface was shaded
 ///   add        light reached the path
@@ -14,27 +14,21 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "wavecomb/core/fields.h"
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/integrate/aov_tables.h"
-#include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/light_groups.h"
 #include "wavecomb/integrate/path_aov_rows.h"
+#include "wavecomb/integrate/path_cost_rows.h"
 #include "wavecomb/integrate/path_expressions.h"
+#include "wavecomb/integrate/path_first_hits.h"
 #include "wavecomb/integrate/path_pool.h"
 #include "wavecomb/integrate/path_state.h"
-#include "wavecomb/integrate/phase_clock.h"
 
 namespace wavecomb {
-
-/// What the model of costs says of a ray, in nanoseconds: about what it takes among a million
-/// triangles.
-inline constexpr float kModelRayNs = 250;
 
 /// Values that AOVs have of the first vertex, once it was shaded and where `path` has reached it: a
 /// line for each row whose source is kVertex. Runs put(aov, value), value of its channels.
@@ -47,12 +41,15 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
 }
 
 /// Contract: owned by one wave, or one reference integrator; slots below the capacity.
-class PathAovs {
+class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;
   /// `tables` may be null where nothing of `layout` needs them.
   PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
-      : layout_(layout), tables_(tables) {
+      : PathFirstHits(capacity, layout.set, tables),
+        PathCostRows(layout.set.has(Aov::kCost) ? capacity : 0, tables && tables->models_cost),
+        layout_(layout),
+        tables_(tables) {
     const AovSet& set = layout.set;
     const auto rows = [&](Block& block, bool wanted, size_t words) {
       if (wanted) block = Block(capacity, words);
@@ -64,24 +61,18 @@ class PathAovs {
       words += row.channels;
     }
     rows(vertex_, words > 0, words);
-    rows(depth_, set.has(Aov::kDepth), 1);
-    rows(end_, set.any(Aov::kDeep | Aov::kHalfDepth | Aov::kTransmittance), kRowWords<RayEndRow>);
-    rows(hits_, set.has(AovKind::kNearest) || set.has(AovKind::kCoverage), kRowWords<FirstHitRow>);
-    rows(centre_, set.has(AovKind::kNearest), 1);
-    rows(motion_, set.has(Aov::kMotion), 2);
     for (Block& part : parts_) rows(part, set.any(AovSet::kParts), kRadianceWords);
+    rows(early_links_, set.any(AovSet::kParts) && tables && tables->connects, kRadianceWords);
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
     if (layout.expressions > 0)
       expressions_ = PathExpressions(capacity, tables->automaton, tables->end_of_light);
-    rows(alpha_, set.has(Aov::kAlpha), 1);
-    rows(cost_ns_, set.has(Aov::kCost), 1);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
     rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
     rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);
   }
 
   size_t bytes() const {
-    size_t n = expressions_.bytes();
+    size_t n = expressions_.bytes() + hit_bytes() + cost_bytes();
     for (const Block* block : blocks()) n += block->bytes();
     return n;
   }
@@ -90,94 +81,12 @@ class PathAovs {
 
   /// Forgets the paths in slots below `slots`.
   void clear(size_t slots) {
-    for (Block* block :
-         {&vertex_, &guides_, &cost_ns_, &groups_, &alpha_, &light_samples_, &bounces_, &motion_})
+    for (const Block* block :
+         {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_links_})
       block->zero(slots);
+    clear_hits(slots);
+    clear_costs(slots);
     expressions_.clear(slots);
-    constexpr float kFar = std::numeric_limits<float>::infinity();
-    if (depth_) std::fill_n(depth_.rows, slots, kFar);
-    for (uint32_t i = 0; end_ && i < slots; ++i)
-      store_row<RayEndRow, float>(end_.rows, i, {kFar, 0.f, Color<float>(1.f)}, true);
-    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit,
-                                  kNothingHit,      kFar,        kFar};
-    for (uint32_t i = 0; hits_ && i < slots; ++i)
-      store_row<FirstHitRow, float>(hits_.rows, i, none, true);
-  }
-
-  /// The camera ray of numbers `r` starts.
-  template <typename F>
-  void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
-             const Mask<F>& active) const {
-    if (centre_) scatter<F>(centre_.rows, centre_distance2<F>(camera, r, active), slot, active);
-  }
-
-  // ---- first hits -------------------------------------------------------------------------------
-
-  bool wants_hits() const { return hits_ || depth_ || end_; }
-  bool wants_alpha() const { return bool(alpha_); }
-  /// The camera's rays of the active lanes have met something that covers what is behind.
-  template <typename F>
-  void cover(const UInt<F>& slot, const Mask<F>& active) const {
-    wavecomb::scatter<F>(alpha_.rows, F(1.f), slot, active);
-  }
-
-  /// The camera's ray has met the shape of light `light` at `p`.
-  template <typename F>
-  void hit_light(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
-                 const UInt<F>& light, const Mask<F>& active) const {
-    const F depth = camera_depth<F>(camera, p, time, active);
-    store_depth<F>(slot, depth, active);
-    if (!hits_) return;
-    const UInt<F> none(kNothingHit);
-    store_row<FirstHitRow, F>(hits_.rows, slot,
-                              {p, tables_->light_object(light), none, none, depth,
-                               camera_distance<F>(camera, p, time, active)},
-                              active);
-  }
-
-  /// The camera's ray has met geometry `geom` of instance `inst` at `p`.
-  template <typename F>
-  void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
-                   const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& material,
-                   const Mask<F>& active) const {
-    const F depth = camera_depth<F>(camera, p, time, active);
-    store_depth<F>(slot, depth, active);
-    if (hits_)
-      store_row<FirstHitRow, F>(hits_.rows, slot,
-                                {p, tables_->template object<F>(inst, geom, active), material, inst,
-                                 depth, camera_distance<F>(camera, p, time, active)},
-                                active);
-  }
-
-  bool wants_motion() const { return bool(motion_); }
-  /// What the camera's ray has met moves so far about the picture (screen_motion.h).
-  template <typename F>
-  void move(const UInt<F>& slot, const Vec2<F>& pixels, const Mask<F>& active) const {
-    scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
-  }
-
-  /// A volume has stopped the camera's ray at `p`: `seen`. There is no surface whose place, depth
-  /// and instance could be told.
-  template <typename F>
-  [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
-                                               const Vec3<F>& p, const F& time,
-                                               const VolumeSeen<F>& seen,
-                                               const Mask<F>& active) const {
-    if (end_) scatter_ray_end<F>(slot, camera_depth<F>(camera, p, time, active), F(1.f), active);
-    if (!hits_) return;
-    const F far(std::numeric_limits<float>::infinity());
-    const UInt<F> object =
-        select(Mask<UInt<F>>(seen.in_mesh), seen.place, tables_->volume_object(seen.volume));
-    store_row<FirstHitRow, F>(
-        hits_.rows, slot, {Vec3<F>(F(0.f)), object, seen.material, UInt<F>(kNothingHit), far, far},
-        active);
-  }
-  bool wants_transmittance() const { return layout_.set.has(Aov::kTransmittance); }
-  /// So much of what is behind comes through volumes along the camera's ray, if only what comes
-  /// through counts.
-  template <typename F>
-  void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
-    scatter_words<F>(end_.rows, through, slot * uint32_t{kRowWords<RayEndRow>} + 2u, active);
   }
 
   // ---- vertices ---------------------------------------------------------------------------------
@@ -265,6 +174,16 @@ class PathAovs {
   void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     add_radiance<F>(light_samples_.rows, slot, c, active);
   }
+  bool wants_links() const { return early_links_ || wants_lights() || light_samples_; }
+  /// Connections of the vertices at `depth` to ones from lights `light` have brought `c`.
+  /// Expressions get theirs elsewhere (light_path_aovs.h).
+  template <typename F>
+  void add_link(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
+                const Mask<F>& active) const {
+    if (early_links_ && depth == 0) add_radiance<F>(early_links_.rows, slot, c, active);
+    if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
+    if (light_samples_) add_light_sample<F>(slot, c, active);
+  }
   /// The environment's light has reached the paths of the active lanes.
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
@@ -288,33 +207,6 @@ class PathAovs {
     for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
   }
 
-  // ---- time -------------------------------------------------------------------------------------
-
-  bool wants_cost() const { return bool(cost_ns_); }
-  /// Costs are of the model: no time is taken.
-  bool models_cost() const { return wants_cost() && tables_ && tables_->models_cost; }
-  bool wants_time() const { return wants_cost() && !models_cost(); }
-  /// Adds a cost of the model, in nanoseconds. A path's come in the order of its vertices.
-  void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
-  /// What the model says of a ray of each path in slots slot(0) ... slot(n - 1), where it is asked.
-  template <typename Slot>
-  void charge_rays(size_t n, const Slot& slot) const {
-    for (size_t i = 0; models_cost() && i < n; ++i) add_cost(slot(i), kModelRayNs);
-  }
-  PhaseClock::Clock::time_point start_time() const {
-    return wants_time() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
-  }
-  /// Spreads the time since `start` evenly over the paths in slots slot(0) ... slot(n - 1), where
-  /// it is taken: a batch at a time, so a path's share is the mean of its batch.
-  template <typename Slot>
-  void spread_time(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
-    if (!wants_time() || n == 0) return;
-    const double ns =
-        std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count();
-    const auto share = static_cast<float>(ns / static_cast<double>(n));
-    for (size_t i = 0; i < n; ++i) cost_ns_.rows[slot(i)] += share;
-  }
-
   // ---- to the film ------------------------------------------------------------------------------
 
   /// The camera's exposure: multiplies what is radiance.
@@ -323,6 +215,7 @@ class PathAovs {
       for (size_t i = 0; block && i < slots * words; ++i) block.rows[i] *= exposure;
     };
     for (const Block& part : parts_) scale(part, kRadianceWords);
+    scale(early_links_, kRadianceWords);
     scale(groups_, kRadianceWords * layout_.light_groups);
     expressions_.scale(exposure, slots);
     scale(light_samples_, kRadianceWords);
@@ -336,9 +229,9 @@ class PathAovs {
  private:
   using Block = SlotRows;
 
-  std::array<const Block*, 14> blocks() const {
-    return {&vertex_, &depth_,   &end_,    &hits_,  &centre_,        &parts_[0], &parts_[1],
-            &groups_, &cost_ns_, &guides_, &alpha_, &light_samples_, &bounces_,  &motion_};
+  std::array<const Block*, 8> blocks() const {
+    return {&vertex_, &parts_[0], &parts_[1],      &early_links_,
+            &groups_, &guides_,   &light_samples_, &bounces_};
   }
 
   /// In place of where an AOV's value is kept.
@@ -347,20 +240,6 @@ class PathAovs {
     std::array<uint32_t, kAovCount> at{};
     at.fill(kNotKept);
     return at;
-  }
-
-  /// How deep the camera's ray went, and whether a volume has stopped it: the head of RayEndRow.
-  template <typename F>
-  void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
-                       const Mask<F>& active) const {
-    const UInt<F> at = slot * uint32_t{kRowWords<RayEndRow>};
-    scatter_words<F>(end_.rows, Vec2<F>{depth, in_volume}, at, active);
-  }
-  /// Distance along the camera's axis, of a surface.
-  template <typename F>
-  void store_depth(const UInt<F>& slot, const F& depth, const Mask<F>& active) const {
-    if (depth_) scatter<F>(depth_.rows, depth, slot, active);
-    if (end_) scatter_ray_end<F>(slot, depth, F(0.f), active);
   }
 
   /// What guides a denoiser, of paths that have met clear surfaces only so far.
@@ -389,15 +268,14 @@ class PathAovs {
 
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
-  Block vertex_, depth_, end_, hits_;
+  Block vertex_;
   /// By an AOV's place: its words in a row of vertex_, or kNotKept.
   std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
-  Block motion_;                ///< pixels, x and y
-  Block centre_;                ///< squared distance of the sample from the pixel's centre, pixels
   std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
-  Block groups_;                ///< radiance by light group, a slot's groups side by side
-  Block cost_ns_, guides_, bounces_;
-  Block alpha_;  ///< 1 where the camera's ray has met something that covers
+  /// Radiance that connections of first vertices brought: it is indirect, and scattering 0 has it.
+  Block early_links_;
+  Block groups_;  ///< radiance by light group, a slot's groups side by side
+  Block guides_, bounces_;
   PathExpressions expressions_;
   Block light_samples_;  ///< radiance that light samples brought
 };

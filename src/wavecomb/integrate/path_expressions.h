@@ -31,7 +31,49 @@ struct ExpressionRow {
   Color<F> lit_diffuse;
   WAVECOMB_FIELDS(states, lit_states, lit_event, lit_end, lit_diffuse)
 };
-static_assert(PathAutomaton::kMostStates <= 1024);
+
+/// Runs each(number, value) for the three colours.
+template <typename F, typename Each>
+inline void for_each_colour(const Color<F>& c, const Each& each) {
+  each(0u, c.x);
+  each(1u, c.y);
+  each(2u, c.z);
+}
+
+/// States of an automaton for the three colours in one word, and how scatterings lead on from them.
+struct ColourStates {
+  static constexpr uint32_t kBits = 10, kMask = 1023;
+  static_assert(PathAutomaton::kMostStates <= kMask + 1);
+
+  template <typename F>
+  static UInt<F> of(const UInt<F>& states, uint32_t colour) {
+    return (states >> (kBits * colour)) & kMask;
+  }
+  /// The state after a scattering, by an automaton's table `next`; those in volumes and below
+  /// surfaces have no lobes.
+  template <typename F>
+  static UInt<F> next(const uint32_t* table, const UInt<F>& state, const UInt<F>& event,
+                      const UInt<F>& lobe, const Mask<F>& active) {
+    using U = UInt<F>;
+    const U volume(static_cast<uint32_t>(PathEvent::kVolume));
+    const U at =
+        state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
+    return gather<U>(table, at, Mask<U>(active));
+  }
+  /// The states after a bounce, of whose lobes `u` in [0, 1) chooses one for each colour.
+  template <typename F>
+  static UInt<F> after(const uint32_t* table, const UInt<F>& states,
+                       const ScatteringNote<F>& bounce, const F& u, const Mask<F>& active) {
+    using U = UInt<F>;
+    U all(0u);
+    for_each_colour<F>(bounce.diffuse, [&](uint32_t c, const F& share) {
+      const U lobe = select(Mask<U>(bounce.is_delta), U(kSingularEvent),
+                            select(Mask<U>(Mask<F>(u < share)), U(kDiffuseEvent), U(kGlossyEvent)));
+      all = all | (next<F>(table, of<F>(states, c), bounce.event, lobe, active) << (kBits * c));
+    });
+    return all;
+  }
+};
 
 /// Contract: owned by one PathAovs; slots below the capacity. Light in the active lanes' slots,
 /// which are distinct.
@@ -97,14 +139,7 @@ class PathExpressions {
     row.lit_end = end_of<F>(v.lit_by, has_shadow);
     const U path = hash_u32<U>(key.pixel_hash, key.sample);
     const F u = unit_float<F>(hash_u32<U>(path, U(0x2c1b3c6du + depth)));
-    U states(0u);
-    for_each_colour<F>(v.bounce.diffuse, [&](uint32_t c, const F& share) {
-      const U lobe = select(Mask<U>(v.bounce.is_delta), U(kSingularEvent),
-                            select(Mask<U>(Mask<F>(u < share)), U(kDiffuseEvent), U(kGlossyEvent)));
-      states = states | (next<F>(state_of<F>(row.states, c), v.bounce.event, lobe, active)
-                         << (kStateBits * c));
-    });
-    row.states = states;
+    row.states = ColourStates::after<F>(automaton_->next.data(), row.states, v.bounce, u, active);
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
 
@@ -134,36 +169,40 @@ class PathExpressions {
     add_part(kGlossyEvent, c - diffuse);
   }
 
- private:
-  static constexpr uint32_t kStateBits = 10, kStateMask = 1023;
-
-  template <typename F, typename Each>
-  static void for_each_colour(const Color<F>& c, const Each& each) {
-    each(0, c.x);
-    each(1, c.y);
-    each(2, c.z);
-  }
+  /// The states of paths.
   template <typename F>
-  static UInt<F> state_of(const UInt<F>& states, uint32_t colour) {
-    return (states >> (kStateBits * colour)) & kStateMask;
+  UInt<F> states(const UInt<F>& slot, const Mask<F>& active) const {
+    return load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
   }
-  /// The state after a scattering; those in volumes and below surfaces have no lobes.
+  /// The state after a scattering.
   template <typename F>
   UInt<F> next(const UInt<F>& state, const UInt<F>& event, const UInt<F>& lobe,
                const Mask<F>& active) const {
-    using U = UInt<F>;
-    const U volume(static_cast<uint32_t>(PathEvent::kVolume));
-    const U at =
-        state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
-    return gather<U>(automaton_->next.data(), at, Mask<U>(active));
+    return ColourStates::next<F>(automaton_->next.data(), state, event, lobe, active);
   }
+  /// Adds light of a colour to the expressions in `matched`.
+  template <typename F>
+  void add_matched(const UInt<F>& slot, uint32_t colour, const UInt<F>& matched, const F& value,
+                   const Mask<F>& active) const {
+    using U = UInt<F>;
+    for (uint32_t e = 0; e < automaton_->expressions; ++e) {
+      const Mask<F> here = active & Mask<F>(((matched >> e) & 1u) != U(0u));
+      if (none(here)) continue;
+      const U word = slot * words_ + (3 * e + colour);
+      const F before = gather<F>(sums_.floats(0), word, here);
+      wavecomb::scatter<F>(sums_.floats(0), F(before + value), word, here);
+    }
+  }
+
+ private:
   /// The same of the states of all colours.
   template <typename F>
   UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
                       const Mask<F>& active) const {
     UInt<F> all(0u);
     for (uint32_t i = 0; i < 3; ++i)
-      all = all | (next<F>(state_of<F>(states, i), event, lobe, active) << (kStateBits * i));
+      all = all | (next<F>(ColourStates::of<F>(states, i), event, lobe, active)
+                   << (ColourStates::kBits * i));
     return all;
   }
   template <typename F>
@@ -178,16 +217,10 @@ class PathExpressions {
               const Mask<F>& active) const {
     using U = UInt<F>;
     for_each_colour<F>(c, [&](uint32_t colour, const F& value) {
-      const U at = state_of<F>(states, colour) * automaton_->ends + end;
+      const U at = ColourStates::of<F>(states, colour) * automaton_->ends + end;
       const U matched = select(Mask<U>(active),
                                gather<U>(automaton_->matched.data(), at, Mask<U>(active)), U(0u));
-      for (uint32_t e = 0; e < automaton_->expressions; ++e) {
-        const Mask<F> here = active & Mask<F>(((matched >> e) & 1u) != U(0u));
-        if (none(here)) continue;
-        const U word = slot * words_ + (3 * e + colour);
-        const F before = gather<F>(sums_.floats(0), word, here);
-        wavecomb::scatter<F>(sums_.floats(0), F(before + value), word, here);
-      }
+      add_matched<F>(slot, colour, matched, value, active);
     });
   }
 

@@ -160,10 +160,11 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
 /// A vertex of a camera path that may connect to one of a path from a light.
 template <typename F>
 struct ConnectionOffer {
-  Vec3<F> to;            ///< the vertex from the light
-  F vertices;            ///< LightVertexRow::vertices
-  Mask<F> wanted;        ///< there is one, and it is not too far from the camera
-  ConnectionRow<F> row;  ///< to be filled in; black where `wanted` is false
+  Vec3<F> to;                ///< the vertex from the light
+  F vertices;                ///< LightVertexRow::vertices
+  Mask<F> wanted;            ///< there is one, and it is not too far from the camera
+  ConnectionRow<F> row;      ///< to be filled in; black where `wanted` is false
+  ScatteringNote<F> note{};  ///< likewise, where events are wanted
 };
 
 /// The offer of the vertex at `depth` of paths in `slot` to the vertices kept there: black so far.

@@ -2,11 +2,10 @@
 /// Path tracing by the reference integrator: one path after the other, in scalars.
 #pragma once
 
-#include <optional>
 #include <utility>
 
 #include "wavecomb/integrate/camera_connection.h"
-#include "wavecomb/integrate/light_tracer.h"
+#include "wavecomb/integrate/light_path.h"
 #include "wavecomb/integrate/media.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
@@ -37,6 +36,7 @@ class PathTracer {
         rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),
         history_(worker.history),
+        light_aovs_(worker.light_aovs),
         vertices_(worker.light_vertices) {}
 
   /// Radiance of the path of a task of one, as the camera's exposure shows it; what else it found
@@ -169,6 +169,10 @@ class PathTracer {
         inside_.crossed = v.crossed;
       }
       add(aovs.emitter, v.emitted);
+      if constexpr (!Media::kAny)
+        if (vertices_ && aovs.wants_events)
+          light_aovs_.offer<F>(kSlot, aovs_.expressions().states<F>(kSlot, true), offer_.note,
+                               true);
       if (aovs.wants_events && (v.alive || v.has_shadow))
         aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
       aovs_.vertex<F>(depth, kSlot, aovs, path, true);
@@ -311,11 +315,14 @@ class PathTracer {
                             from.cone_spread, from.o, from.receiver, hit.t, rays_.time(), true);
     const LightPathSetup setup{*context_.camera, *context_.splat_filter,
                                context_.light_path_share()};
+    VertexAovs<F> aovs;
+    aovs.wants_events = light_aovs_.wants_events();
     const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](
                                   {scene, light_settings_, from.key, depth, mesh_hit, hit.geom,
-                                   hit.t, at.material, state, nullptr, true},
+                                   hit.t, at.material, state, &aovs, true},
                                   setup, & target)
                                   .v;
+    if (aovs.wants_events) light_aovs_.link<F>(kSlot, aovs.lit, true);
     if (!v.has_shadow) return;
     clock_.enter(Phase::kShadow);
     const uint32_t no_set = 0;
@@ -323,7 +330,9 @@ class PathTracer {
     if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
       return;
     radiance_.sum += v.direct;
-    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, v.direct, true);
+    aovs_.add_link<F>(depth, kSlot, from.receiver, v.direct, true);
+    if (light_aovs_.wants_events())
+      light_aovs_.connect<F>(aovs_.expressions(), kSlot, v.direct, true);
   }
 
   static constexpr uint32_t kSlot = kOnlySlot;
@@ -335,6 +344,7 @@ class PathTracer {
   SingleRays rays_;
   PathAovs& aovs_;
   PathHistory& history_;
+  LightPathAovs& light_aovs_;
   LightVertices& vertices_;   ///< that of the path from the light, where it is connected
   ConnectionOffer<F> offer_;  ///< of the vertex, with it
   RadianceRow<F> radiance_;
@@ -342,45 +352,5 @@ class PathTracer {
   std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
   uint32_t probe_count_ = 0;
 };
-
-/// Traces the paths of a task into the film, a pixel's samples in the order of their numbers.
-template <typename Media>
-void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveTask& task,
-                const Media& media) {
-  PathTracer tracer(context, worker, media);
-  std::optional<LightTracer> from_light;
-  if (context.connects()) from_light.emplace(context, worker);
-  Film& film = *context.film;
-  worker.clock.start(Phase::kGenerate);
-  for (uint32_t p = 0; p < task.pixel_count; ++p) {
-    const uint32_t pixel = task.pixels[p], x = pixel & 0xffffu, y = pixel >> 16;
-    if (context.discards) {
-      for (uint32_t s = 0; s < task.samples; ++s)
-        tracer.exposed_path({task.pixels + p, 1, task.first_sample + s, 1});
-      continue;
-    }
-    Film::Pixel sum = film.pixel(x, y);
-    for (uint32_t s = 0; s < task.samples; ++s) {
-      worker.clock.enter(Phase::kGenerate);
-      if (from_light) from_light->trace(pixel, task.first_sample + s, true);
-      const auto start = worker.aovs.start_time();
-      const Color<float> radiance =
-          tracer.exposed_path({task.pixels + p, 1, task.first_sample + s, 1});
-      worker.aovs.spread_time(1, start, [](size_t) { return 0; });
-      worker.clock.enter(Phase::kResolve);
-      if (film.has_error())
-        film.error(x, y).add(tracer.radiance(), sum.samples, {sum.r, sum.g, sum.b});
-      sum.r += radiance.x;
-      sum.g += radiance.y;
-      sum.b += radiance.z;
-      ++sum.samples;
-      if (film.has_cascades()) film.cascades().add(film.index(x, y), &radiance.x);
-      worker.aovs.resolve(film.aovs(), film.index(x, y), 0, 1, tracer.radiance());
-    }
-    film.pixel(x, y) = sum;
-  }
-  if (from_light) end_light_task(context, worker, task);
-  worker.clock.stop();
-}
 
 }  // namespace wavecomb

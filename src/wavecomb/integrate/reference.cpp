@@ -2,8 +2,8 @@
 #include "wavecomb/integrate/reference.h"
 
 #include "wavecomb/integrate/light_tracer.h"
-#include "wavecomb/integrate/path_tracer.h"
 #include "wavecomb/integrate/shared_kernels.h"
+#include "wavecomb/integrate/trace_task.h"
 #include "wavecomb/medium/volumes.h"
 
 namespace wavecomb {

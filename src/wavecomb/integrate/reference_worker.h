@@ -15,6 +15,9 @@ struct ReferenceWorker {
         history(1, context.kept_vertices()),
         splats(context.joins_light() ? Wave::kSplats : 0),
         light_vertices(context.connects() ? 1 : 0),
+        light_aovs(context.joins_light() ? LightPathAovs(1, context.film->aovs().layout(),
+                                                         context.aovs, context.connects())
+                                         : LightPathAovs()),
         walks(context.scene.walks.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()),
         interiors(context.knows_inside() ? 1 : 0) {}
   PhaseClock clock;
@@ -24,6 +27,7 @@ struct ReferenceWorker {
   PathHistory history;
   SplatList splats;  ///< of paths from lights
   LightVertices light_vertices;
+  LightPathAovs light_aovs;
   SoaBlock walks;  ///< below surfaces
   InteriorBuffers interiors;
 };

@@ -16,6 +16,7 @@
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/integrator.h"
 #include "wavecomb/integrate/interior_buffers.h"
+#include "wavecomb/integrate/light_path_aovs.h"
 #include "wavecomb/integrate/light_vertices.h"
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
@@ -119,7 +120,10 @@ struct Wave {
         policy_chooser(context.policies.size()),
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders),
-        light_vertices(context.connects() ? capacity : 0) {}
+        light_vertices(context.connects() ? capacity : 0),
+        light_aovs(context.joins_light() ? LightPathAovs(capacity, context.film->aovs().layout(),
+                                                         context.aovs, context.connects())
+                                         : LightPathAovs()) {}
   static constexpr size_t kWayColumns = 14, kWalkColumns = 36;
   static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
   static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
@@ -147,6 +151,7 @@ struct Wave {
   PhaseClock clock;
   Counts counts;
   LightVertices light_vertices;
+  LightPathAovs light_aovs;  ///< of paths from lights
   /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
   /// connected to the vertices of camera paths in their slots.
   enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
@@ -154,7 +159,8 @@ struct Wave {
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
-           ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes();
+           ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes() +
+           light_aovs.bytes();
   }
 };
 

@@ -336,6 +336,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   };
   const auto snapshot = [&](bool finished) {
     check_textures();
+    film.note_light_paths();
     if (options.snapshot)
       options.snapshot(
           {film, loop.pass(), *training, loop.status(), finished, aovs.kept_names, taken});

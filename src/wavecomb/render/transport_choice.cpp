@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "wavecomb/core/backward_automaton.h"
 #include "wavecomb/core/clock.h"
 
 namespace wavecomb {
@@ -149,6 +150,12 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
     return !refusal.what.empty();
   };
   if (refused(light_path_refusal(settings)) || refused(light_path_refusal(scene))) return choice;
+  try {
+    (void)BackwardAutomaton(PathAutomaton(settings.expressions, scene.light_groups()));
+  } catch (const Error&) {
+    choice.why = "light paths have no room for so many light path expressions";
+    return choice;
+  }
   if (!focuses_light(scene)) {
     choice.why = "nothing in the stage is clear or glossy";
     return choice;
@@ -170,9 +177,13 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
   small.crop = false;
   small.time_limit = 0;
   small.firefly = Firefly::kKeep;
+  small.adaptive = small.noise = 0;
+  small.allocate = Allocate::kEven;
+  small.error = false;
   small.costs = CostSource::kModel;
   small.aovs.bits = 0;
   small.light_groups.clear();
+  small.expressions.clear();
   TransportTrial trials[2][2];
   for (size_t i = 0; i < std::size(kTransportSeeds); ++i) {
     small.seed = kTransportSeeds[i];

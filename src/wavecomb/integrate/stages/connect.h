@@ -65,7 +65,13 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
     const U slot = load<U>(q.slot + i);
     const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
     add_radiance<F>(wave.pool.radiance, slot, c, active);
-    if (wave.aovs.wants_light_samples()) wave.aovs.add_light_sample<F>(slot, c, active);
+    if (wave.aovs.wants_links()) [[unlikely]] {
+      const auto light =
+          gather_field<F>(wave.light_vertices.paths, &PathRow<float>::receiver, slot, active);
+      wave.aovs.add_link<F>(depth, slot, light, c, active);
+      if (wave.light_aovs.wants_events())
+        wave.light_aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
+    }
   }
 }
 

@@ -35,6 +35,8 @@ void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task
         wave.pool.paths, slot,
         {e.o, e.d, path.flux, path.weight, path.eta_scale, F(0.f), F(0.f), path.key, e.light},
         e.valid);
+    if (wave.light_aovs.wants_events()) [[unlikely]]
+      wave.light_aovs.begin<F>(slot, e.light, e.valid);
     const Mask<U> on(e.valid);
     compress_store<U>(rays.direction + started, direction_key<F>(e.d), on);
     started += compress_store<U>(rays.slot + started, slot, on);

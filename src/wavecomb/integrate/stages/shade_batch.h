@@ -60,8 +60,12 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
         V{context.scene, settings, path.key, depth, hit, r.geom, t, material, state,
           wants_aovs ? &aovs : nullptr, active, context.guide, connects ? &offer : nullptr});
     if constexpr ((kFeatures & kJoined) != 0)
-      if (connects) [[unlikely]]
+      if (connects) [[unlikely]] {
         store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
+        if (aovs.wants_events)
+          wave.light_aovs.offer<F>(slot, wave.aovs.expressions().template states<F>(slot, active),
+                                   offer.note, active);
+      }
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);

@@ -20,6 +20,8 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
   const LightVertices& vertices = wave.light_vertices;
   const bool connects = wave.light_use == Wave::LightUse::kConnect;
   const LightPathSetup setup{camera, *context.splat_filter, context.light_path_share()};
+  VertexAovs<F> aovs;
+  aovs.wants_events = wave.light_aovs.wants_events();
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const RecordPacket<F> packet(queue, i, end);
     const Mask<F>& active = packet.active;
@@ -38,11 +40,21 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
           Mask<F>(load_row<LightVertexRow, F>(vertices.chosen, r.slot, active).depth == U(0u))};
     const LightVertexResult<F> out = take_light_steps<Bsdf, F>(
         Vertex<F, kFeatures>{context.scene, settings, path.key, depth, hit, r.geom, r.t,
-                             packet.material, state, nullptr, active},
+                             packet.material, state, aovs.wants_events ? &aovs : nullptr, active},
         setup, connects ? &target : nullptr);
     const VertexResult<F>& v = out.v;
-    if (wave.light_use == Wave::LightUse::kKeep)
-      keep_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.offered);
+    if (aovs.wants_events) [[unlikely]] {
+      if (connects)
+        wave.light_aovs.link<F>(r.slot, aovs.lit, active);
+      else
+        wave.light_aovs.shade<F>(depth, r.slot, path.key, aovs, active);
+    }
+    if (wave.light_use == Wave::LightUse::kKeep) {
+      const Mask<F> kept =
+          keep_light_vertex<F>(vertices, depth, path, r, packet.material, out.p, out.offered);
+      if (aovs.wants_events && any(kept)) [[unlikely]]
+        wave.light_aovs.keep<F>(r.slot, kept);
+    }
     packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
       store_row<ShadowRow, F>(

@@ -8,14 +8,14 @@
 
 namespace wavecomb {
 
-/// Adds light that arrives at (x, y) of the film to the sums of the pixels around. Integers: the
-/// order does not matter.
-inline void add_splat(const WaveContext& context, SplatList& list, float x, float y,
-                      const Color<float>& c) {
+/// Adds light of a path's sample that arrives at (x, y) of the film to the sums of the pixels
+/// around. Integers: the order does not matter.
+inline void add_splat(const WaveContext& context, SplatList& list, uint32_t sample, float x,
+                      float y, const Color<float>& c) {
   Film& film = *context.film;
   context.splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
     const SplatList::Splat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
-                                 c.z * weight};
+                                 c.z * weight, SplatLayer::is_in_half(sample)};
     if (list.add(splat)) return;
     film.splats().add(list);
     list.clear();
@@ -42,7 +42,8 @@ inline void note_first_places(const Wave& wave, const WaveContext& context, cons
 inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
   if (context.lessons) return;
   for (uint32_t p = 0; p < task.pixel_count; ++p)
-    context.film->splats().done(light_path_number(*context.settings, task.pixels[p]), task.samples);
+    context.film->splats().done(light_path_number(*context.settings, task.pixels[p]),
+                                task.first_sample, task.samples);
 }
 
 /// Asks which vertices the camera sees, and gives the film what they bring, or those who learn.
@@ -58,8 +59,14 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
       continue;
     }
     const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
-    add_splat(context, wave.splats, bits_float<float>(row.group), bits_float<float>(row.set),
-              {q.r[i], q.g[i], q.b[i]});
+    const float x = bits_float<float>(row.group), y = bits_float<float>(row.set);
+    const Color<float> c{q.r[i], q.g[i], q.b[i]};
+    add_splat(context, wave.splats, task.first_sample + q.slot[i] % task.samples, x, y, c);
+    if (wave.light_aovs) [[unlikely]] {
+      const auto light =
+          gather_field<float>(wave.pool.paths, &PathRow<float>::receiver, q.slot[i], true);
+      wave.light_aovs.show(*context.film, *context.splat_filter, q.slot[i], depth, light, x, y, c);
+    }
   }
   if (context.lessons) return;
   context.film->splats().add(wave.splats);

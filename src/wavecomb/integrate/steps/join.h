@@ -24,6 +24,7 @@
 #pragma once
 
 #include "wavecomb/integrate/steps/interact.h"
+#include "wavecomb/integrate/steps/note_events.h"
 
 namespace wavecomb {
 
@@ -99,6 +100,8 @@ WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Inter
   const Color<F> light = at.throughput * e.f_cos * offer.vertices;
   offer.row = {at.origin(w), e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
                joint.template towards<Bsdf>(v, at, wo, w, wi)};
+  if (v.wants_events()) [[unlikely]]
+    offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, wo, wi);
 }
 
 /// R after the bounce `b`, along `world`.

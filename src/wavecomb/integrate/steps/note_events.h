@@ -38,6 +38,14 @@ inline ScatteringNote<F> note_scattering(const Bsdf& bsdf, const Vec3<F>& wo, co
 
 }  // namespace detail
 
+/// What a vertex of a path from a light does with light from `l` that goes to `w`, or one of a
+/// camera path with light that a connection brings, from `l` to `w`: every lobe shows it whole.
+template <typename Bsdf, typename F>
+[[gnu::noinline, gnu::cold]] ScatteringNote<F> note_event(const Bsdf bsdf, const Vec3<F> w,
+                                                          const Vec3<F> l) {
+  return detail::note_scattering<Bsdf, F>(bsdf, w, l, F(1.f), F(1.f));
+}
+
 /// Notes in `aovs` what the light sample, along `to_light`, and the bounce, along `next`, scatter
 /// at a place of `bsdf` that is seen from `wo`. Everything by value, so that shading need not keep
 /// in memory what it keeps in registers.

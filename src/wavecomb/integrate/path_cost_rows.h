@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What paths cost, for the AOV of it: time, or what the model says (docs/aovs.md).
+#pragma once
+
+#include <chrono>
+
+#include "wavecomb/integrate/path_aov_rows.h"
+#include "wavecomb/integrate/phase_clock.h"
+
+namespace wavecomb {
+
+/// What the model of costs says of a ray, in nanoseconds: about what it takes among a million
+/// triangles.
+inline constexpr float kModelRayNs = 250;
+
+/// Contract: part of a PathAovs; slots below the capacity, which is 0 where nobody asks.
+class PathCostRows {
+ public:
+  PathCostRows() = default;
+  PathCostRows(size_t capacity, bool models)
+      : cost_ns_(capacity > 0 ? SlotRows(capacity, 1) : SlotRows()), models_(models) {}
+
+  bool wants_cost() const { return bool(cost_ns_); }
+  /// Costs are of the model: no time is taken.
+  bool models_cost() const { return wants_cost() && models_; }
+  bool wants_time() const { return wants_cost() && !models_cost(); }
+  /// Adds a cost of the model, in nanoseconds. A path's come in the order of its vertices.
+  void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
+  /// What the model says of a ray of each path in slots slot(0) ... slot(n - 1), where it is asked.
+  template <typename Slot>
+  void charge_rays(size_t n, const Slot& slot) const {
+    for (size_t i = 0; models_cost() && i < n; ++i) add_cost(slot(i), kModelRayNs);
+  }
+  PhaseClock::Clock::time_point start_time() const {
+    return wants_time() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
+  }
+  /// Spreads the time since `start` evenly over the paths in slots slot(0) ... slot(n - 1), where
+  /// it is taken: a batch at a time, so a path's share is the mean of its batch.
+  template <typename Slot>
+  void spread_time(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
+    if (!wants_time() || n == 0) return;
+    const double ns =
+        std::chrono::duration<double, std::nano>(PhaseClock::Clock::now() - start).count();
+    const auto share = static_cast<float>(ns / static_cast<double>(n));
+    for (size_t i = 0; i < n; ++i) cost_ns_.rows[slot(i)] += share;
+  }
+
+ protected:
+  size_t cost_bytes() const { return cost_ns_.bytes(); }
+  void clear_costs(size_t slots) const { cost_ns_.zero(slots); }
+
+  SlotRows cost_ns_;  ///< a word a slot
+
+ private:
+  bool models_ = false;
+};
+
+}  // namespace wavecomb

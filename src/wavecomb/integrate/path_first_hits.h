@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+/// What camera rays have met, for AOVs, before it is shaded.
+#pragma once
+
+#include <limits>
+
+#include "wavecomb/integrate/aov_tables.h"
+#include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/integrate/path_aov_rows.h"
+
+namespace wavecomb {
+
+/// Contract: part of a PathAovs; slots below the capacity.
+class PathFirstHits {
+ public:
+  PathFirstHits() = default;
+  /// `tables` may be null where nothing of `set` needs them.
+  PathFirstHits(size_t capacity, const AovSet& set, const AovTables* tables)
+      : names_(tables), transmits_(set.has(Aov::kTransmittance)) {
+    const auto rows = [&](SlotRows& block, bool wanted, size_t words) {
+      if (wanted) block = SlotRows(capacity, words);
+    };
+    rows(depth_, set.has(Aov::kDepth), 1);
+    rows(end_, set.any(Aov::kDeep | Aov::kHalfDepth | Aov::kTransmittance), kRowWords<RayEndRow>);
+    rows(hits_, set.has(AovKind::kNearest) || set.has(AovKind::kCoverage), kRowWords<FirstHitRow>);
+    rows(centre_, set.has(AovKind::kNearest), 1);
+    rows(motion_, set.has(Aov::kMotion), 2);
+    rows(alpha_, set.has(Aov::kAlpha), 1);
+  }
+
+  /// The camera ray of numbers `r` starts.
+  template <typename F>
+  void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
+             const Mask<F>& active) const {
+    if (centre_) scatter<F>(centre_.rows, centre_distance2<F>(camera, r, active), slot, active);
+  }
+
+  bool wants_hits() const { return hits_ || depth_ || end_; }
+  bool wants_alpha() const { return bool(alpha_); }
+  /// The camera's rays of the active lanes have met something that covers what is behind.
+  template <typename F>
+  void cover(const UInt<F>& slot, const Mask<F>& active) const {
+    wavecomb::scatter<F>(alpha_.rows, F(1.f), slot, active);
+  }
+
+  /// The camera's ray has met the shape of light `light` at `p`.
+  template <typename F>
+  void hit_light(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                 const UInt<F>& light, const Mask<F>& active) const {
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_depth<F>(slot, depth, active);
+    if (!hits_) return;
+    const UInt<F> none(kNothingHit);
+    store_row<FirstHitRow, F>(hits_.rows, slot,
+                              {p, names_->light_object(light), none, none, depth,
+                               camera_distance<F>(camera, p, time, active)},
+                              active);
+  }
+
+  /// The camera's ray has met geometry `geom` of instance `inst` at `p`.
+  template <typename F>
+  void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
+                   const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& material,
+                   const Mask<F>& active) const {
+    const F depth = camera_depth<F>(camera, p, time, active);
+    store_depth<F>(slot, depth, active);
+    if (hits_)
+      store_row<FirstHitRow, F>(hits_.rows, slot,
+                                {p, names_->template object<F>(inst, geom, active), material, inst,
+                                 depth, camera_distance<F>(camera, p, time, active)},
+                                active);
+  }
+
+  bool wants_motion() const { return bool(motion_); }
+  /// What the camera's ray has met moves so far about the picture (screen_motion.h).
+  template <typename F>
+  void move(const UInt<F>& slot, const Vec2<F>& pixels, const Mask<F>& active) const {
+    scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
+  }
+
+  /// A volume has stopped the camera's ray at `p`: `seen`. There is no surface whose place, depth
+  /// and instance could be told.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
+                                               const Vec3<F>& p, const F& time,
+                                               const VolumeSeen<F>& seen,
+                                               const Mask<F>& active) const {
+    if (end_) scatter_ray_end<F>(slot, camera_depth<F>(camera, p, time, active), F(1.f), active);
+    if (!hits_) return;
+    const F far(std::numeric_limits<float>::infinity());
+    const UInt<F> object =
+        select(Mask<UInt<F>>(seen.in_mesh), seen.place, names_->volume_object(seen.volume));
+    store_row<FirstHitRow, F>(
+        hits_.rows, slot, {Vec3<F>(F(0.f)), object, seen.material, UInt<F>(kNothingHit), far, far},
+        active);
+  }
+  bool wants_transmittance() const { return transmits_; }
+  /// So much of what is behind comes through volumes along the camera's ray, if only what comes
+  /// through counts.
+  template <typename F>
+  void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
+    scatter_words<F>(end_.rows, through, slot * uint32_t{kRowWords<RayEndRow>} + 2u, active);
+  }
+
+ protected:
+  size_t hit_bytes() const {
+    size_t n = 0;
+    for (const SlotRows* block : {&depth_, &end_, &hits_, &centre_, &motion_, &alpha_})
+      n += block->bytes();
+    return n;
+  }
+  /// Forgets the paths in slots below `slots`.
+  void clear_hits(size_t slots) const {
+    alpha_.zero(slots);
+    motion_.zero(slots);
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    if (depth_) std::fill_n(depth_.rows, slots, kFar);
+    for (uint32_t i = 0; end_ && i < slots; ++i)
+      store_row<RayEndRow, float>(end_.rows, i, {kFar, 0.f, Color<float>(1.f)}, true);
+    const FirstHitRow<float> none{Vec3<float>(0.f), kNothingHit, kNothingHit,
+                                  kNothingHit,      kFar,        kFar};
+    for (uint32_t i = 0; hits_ && i < slots; ++i)
+      store_row<FirstHitRow, float>(hits_.rows, i, none, true);
+  }
+
+  SlotRows depth_, end_, hits_;
+  SlotRows motion_;  ///< pixels, x and y
+  SlotRows centre_;  ///< squared distance of the sample from the pixel's centre, pixels
+  SlotRows alpha_;   ///< 1 where the camera's ray has met something that covers
+
+ private:
+  /// How deep the camera's ray went, and whether a volume has stopped it: the head of RayEndRow.
+  template <typename F>
+  void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
+                       const Mask<F>& active) const {
+    const UInt<F> at = slot * uint32_t{kRowWords<RayEndRow>};
+    scatter_words<F>(end_.rows, Vec2<F>{depth, in_volume}, at, active);
+  }
+  /// Distance along the camera's axis, of a surface.
+  template <typename F>
+  void store_depth(const UInt<F>& slot, const F& depth, const Mask<F>& active) const {
+    if (depth_) scatter<F>(depth_.rows, depth, slot, active);
+    if (end_) scatter_ray_end<F>(slot, depth, F(0.f), active);
+  }
+
+  const AovTables* names_ = nullptr;
+  bool transmits_ = false;
+};
+
+}  // namespace wavecomb
