@@ -6,6 +6,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/layer_ids.h"
 #include "wavecomb/light/kinds.h"
+#include "wavecomb/light/light.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -73,6 +74,12 @@ void AovTables::keep_expressions(const Scene& scene, const Settings& settings) {
                                      : PathEnd::kLight;
     end_of_light.push_back(path_end(end, groups[i]));
   }
+  if (const LightView lights = scene.view().lights; lights.has_effects)
+    for (uint32_t i = 0; i < groups.size(); ++i) {
+      const LightEffect<float> effect(lights, i, true);
+      multipliers.push_back(effect.diffuse);
+      multipliers.push_back(effect.specular);
+    }
   end_of_light.push_back(path_end(PathEnd::kObject, 0));
   end_of_light.push_back(path_end(PathEnd::kVolume, 0));
 }

@@ -31,6 +31,7 @@ struct AovTables {
   PathAutomaton automaton;             ///< of the expressions
   BackwardAutomaton backward;          ///< the same for paths from lights, where there are any
   std::vector<uint32_t> end_of_light;  ///< PathExpressions'; empty where there are none
+  std::vector<float> multipliers;      ///< likewise
   /// The cost AOV is what the model says, which is reproducible, instead of time.
   bool models_cost = false;
   bool connects = false;  ///< vertices of camera paths connect to those of paths from lights

@@ -65,7 +65,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     rows(early_links_, set.any(AovSet::kParts) && tables && tables->connects, kRadianceWords);
     rows(groups_, layout.light_groups > 0, kRadianceWords * layout.light_groups);
     if (layout.expressions > 0)
-      expressions_ = PathExpressions(capacity, tables->automaton, tables->end_of_light);
+      expressions_ =
+          PathExpressions(capacity, tables->automaton, tables->end_of_light, tables->multipliers);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
     rows(light_samples_, set.has(AovSource::kWay), kRadianceWords);
     rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);

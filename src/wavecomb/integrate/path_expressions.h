@@ -6,7 +6,8 @@
 /// share s of a colour, that colour goes on as diffuse with probability s, by one number of the
 /// vertex for all three, and else as glossy. Whatever light comes then is added whole to what the
 /// state says, so that the layers of a partition add up to the beauty, and each has the mean that
-/// its lobes bring. Light samples are split by s itself: they need no choice.
+/// its lobes bring. Light samples are split by s itself: they need no choice. So is what a bounce
+/// meets of a light that gives the two lobes other shares of itself.
 #pragma once
 
 #include <array>
@@ -29,7 +30,12 @@ struct ExpressionRow {
   // it that is diffuse.
   UInt<F> lit_states, lit_event, lit_end;
   Color<F> lit_diffuse;
-  WAVECOMB_FIELDS(states, lit_states, lit_event, lit_end, lit_diffuse)
+  // Of the last bounce, for lights with multipliers: the states before it, 1 + its event, or 0 of a
+  // mirror and before the first, and the share of it that is diffuse.
+  UInt<F> from_states, bounce;
+  Color<F> bounce_diffuse;
+  WAVECOMB_FIELDS(states, lit_states, lit_event, lit_end, lit_diffuse, from_states, bounce,
+                  bounce_diffuse)
 };
 
 /// Runs each(number, value) for the three colours.
@@ -81,11 +87,12 @@ class PathExpressions {
  public:
   PathExpressions() = default;
   /// `end_of_light`: path_end of each light, and at the end those of what is no light: surfaces,
-  /// then volumes.
+  /// then volumes. `multipliers`: of each light, diffuse and specular; empty where all are 1.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
-                  const std::vector<uint32_t>& end_of_light)
+                  const std::vector<uint32_t>& end_of_light, const std::vector<float>& multipliers)
       : automaton_(&automaton),
         end_of_light_(end_of_light.data()),
+        multipliers_(multipliers.empty() ? nullptr : multipliers.data()),
         lights_(static_cast<uint32_t>(end_of_light.size() - 2)),
         words_(3 * automaton.expressions),
         rows_(1, capacity * kRowWords<ExpressionRow>),
@@ -111,8 +118,12 @@ class PathExpressions {
   [[gnu::noinline, gnu::cold]] void add(const UInt<F>& slot, const UInt<F>& light,
                                         const Color<F>& c, const Mask<F>& active) const {
     if (none(active)) return;
-    const UInt<F> states = load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
-    add_to<F>(slot, states, end_of<F>(light, active), c, active);
+    const ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
+    const UInt<F> end = end_of<F>(light, active);
+    Mask<F> whole = active;
+    if (multipliers_) [[unlikely]]
+      whole = whole & not_(add_by_parts<F>(slot, row, light, end, c, active));
+    add_to<F>(slot, row.states, end, c, whole);
   }
 
   /// Volumes that shine have.
@@ -139,6 +150,9 @@ class PathExpressions {
     row.lit_end = end_of<F>(v.lit_by, has_shadow);
     const U path = hash_u32<U>(key.pixel_hash, key.sample);
     const F u = unit_float<F>(hash_u32<U>(path, U(0x2c1b3c6du + depth)));
+    row.from_states = row.states;
+    row.bounce = select(Mask<U>(v.bounce.is_delta), U(0u), v.bounce.event + 1u);
+    row.bounce_diffuse = v.bounce.diffuse;
     row.states = ColourStates::after<F>(automaton_->next.data(), row.states, v.bounce, u, active);
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
@@ -150,6 +164,7 @@ class PathExpressions {
     ExpressionRow<F> row = load_row<ExpressionRow, F>(rows_.floats(0), slot, active);
     row.states =
         next_of_all<F>(row.states, U(static_cast<uint32_t>(PathEvent::kVolume)), U(0u), active);
+    row.bounce = U(0u);
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
 
@@ -195,6 +210,34 @@ class PathExpressions {
   }
 
  private:
+  /// Adds what a bounce has met of lights with multipliers: each of its two lobes gets what that
+  /// light gives to it, so that they add up to `c`. Where it was so.
+  template <typename F>
+  [[gnu::noinline, gnu::cold]] Mask<F> add_by_parts(const UInt<F>& slot,
+                                                    const ExpressionRow<F>& row,
+                                                    const UInt<F>& light, const UInt<F>& end,
+                                                    const Color<F>& c,
+                                                    const Mask<F>& active) const {
+    using U = UInt<F>;
+    const Mask<F> known = active & Mask<F>(light != U(kNoLight)) & Mask<F>(row.bounce != U(0u));
+    const U at = select(Mask<U>(known), light + light, U(0u));
+    const F d = gather<F>(multipliers_, at, known), s = gather<F>(multipliers_, at + 1u, known);
+    const Mask<F> here = known & not_(Mask<F>(d == s));
+    if (none(here)) return here;
+    const auto share = [&](const F& diffuse) {
+      const F part = diffuse * d, all = fma(F(1.f - diffuse), s, part);
+      return select(all > 0.f, F(part / select(all > 0.f, all, F(1.f))), F(0.f));
+    };
+    const Color<F> diffuse = c * Color<F>(share(row.bounce_diffuse.x), share(row.bounce_diffuse.y),
+                                          share(row.bounce_diffuse.z));
+    const auto add_part = [&](uint32_t lobe, const Color<F>& part) {
+      add_to<F>(slot, next_of_all<F>(row.from_states, row.bounce - 1u, U(lobe), here), end, part,
+                here);
+    };
+    add_part(kDiffuseEvent, diffuse);
+    add_part(kGlossyEvent, c - diffuse);
+    return here;
+  }
   /// The same of the states of all colours.
   template <typename F>
   UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
@@ -226,6 +269,7 @@ class PathExpressions {
 
   const PathAutomaton* automaton_ = nullptr;
   const uint32_t* end_of_light_ = nullptr;
+  const float* multipliers_ = nullptr;
   uint32_t lights_ = 0, words_ = 0;
   SoaBlock rows_, sums_;
 };
