@@ -161,6 +161,32 @@ def test_diffuse_light_is_what_lights_without_specular_give(loaded: Any, tmp_pat
         assert _layer(seen, name)[ball].mean(axis=(0, 1)) == pytest.approx(want, rel=0.03), name
 
 
+SHINY = """#usda 1.0
+def DomeLight "Sky" { float inputs:diffuse = DIFFUSE }
+def Sphere "Ball" { rel material:binding = </Plastic> }
+def Camera "Cam" { float focalLength = 20
+    double3 xformOp:translate = (0, 0, 4)
+    uniform token[] xformOpOrder = ["xformOp:translate"] }
+"""
+
+
+def test_multipliers_go_to_the_lobe_that_they_are_of(tmp_path: Path) -> None:
+    """What bounces meet of a light, too: a sky on plastic, half of which finds it by bounces."""
+    asked = {"diffuse": "C<RD>B", "glossy": "C<RG>B", "seen": "CB"}
+    found = {}
+    for diffuse in (1, 0.25):
+        text = SHINY.replace("DIFFUSE", str(diffuse)) + _material("Plastic", _MATERIALS["Plastic"])
+        text = text.replace("/World/", "/")
+        folder = tmp_path / str(diffuse)
+        folder.mkdir()
+        picture = _render(wavecomb.load(write(folder, text)), asked, spp=256, max_depth=1)
+        total = sum(_layer(picture, name) for name in asked)
+        np.testing.assert_allclose(total, picture.beauty, rtol=2e-6, atol=1e-7)
+        found[diffuse] = {name: _layer(picture, name).mean(axis=(0, 1)) for name in asked}
+    assert found[0.25]["diffuse"] == pytest.approx(0.25 * found[1]["diffuse"], rel=0.01)
+    assert found[0.25]["glossy"] == pytest.approx(found[1]["glossy"], rel=0.01)
+
+
 def test_the_beauty_is_as_without(loaded: Any) -> None:
     plain = wavecomb.render(loaded, size=SIZE, spp=SPP, aovs=[])
     assert _render(loaded, PARTITIONS["lobes"]).beauty.tobytes() == plain.beauty.tobytes()
