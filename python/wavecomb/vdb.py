@@ -35,6 +35,8 @@ ABSENT = f"OpenVDB, which this build is without ({BRING})"
 BRICK = 8
 """Edge of a brick, in voxels."""
 
+_NUMBERS = {"float", "double", "vec3s", "vec3d", "fp4", "fp8", "fp16", "fpn"}
+
 _UUID = slice(21, 57)
 """Where a file holds what makes it unique: 36 letters, drawn at random by OpenVDB."""
 
@@ -61,6 +63,11 @@ class GridHead:
     def is_vector(self) -> bool:
         """Whether a value is several numbers."""
         return self.type_name.startswith("Tree_vec")
+
+    @property
+    def is_of_numbers(self) -> bool:
+        """Whether a value is a number, or three, as are read; not integers, say."""
+        return self.type_name.removeprefix("Tree_").partition("_")[0] in _NUMBERS
 
     @property
     def value_name(self) -> str:

@@ -198,6 +198,17 @@ def test_numbers_that_are_none_are_counted(tmp_path: Path) -> None:
     assert got.values.shape == (2, EDGE, EDGE, EDGE)
 
 
+def test_grids_of_integers_are_listed_and_left_out(tmp_path: Path) -> None:
+    data = bytearray(vdb_bytes("a.nvdb"))
+    struct.pack_into("<I", data, 16 + 32, 4)
+    (tmp_path / "a.nvdb").write_bytes(data)
+    assert vdb.grid_heads(tmp_path / "a.nvdb")[0].value_name == "int32"
+    stage = tmp_path / "s.usda"
+    stage.write_text(VOLUME.replace("a.vdb", "a.nvdb"))
+    report = "\n".join(wavecomb.load(stage).report.lines())
+    assert "grids of int32 (left out)" in report and "/Smoke/density" in report
+
+
 def test_a_command_says_one_line(tmp_path: Path) -> None:
     stage = tmp_path / "s.usda"
     stage.write_text(VOLUME.replace("a.vdb", "a.nvdb"))

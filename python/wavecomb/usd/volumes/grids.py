@@ -145,6 +145,9 @@ class GridTable:
         head = self._head(field)
         if head is None:
             return None
+        if not head.is_of_numbers:
+            self._report.missing(f"grids of {head.value_name} (left out)", field.prim)
+            return None
         is_dark = use != "colour"
         found = vdb.read(field.file, head, background_is_zero=is_dark, whole=not is_dark)
         named = f"{field.file}: grid {head.name!r}"
