@@ -600,6 +600,9 @@ class Settings:
     """How textures are filtered. Default: auto."""
     cosine_sampling: bool
     """Samples every bounce that is not a mirror's by cosine. Default: False."""
+    alpha: bool
+    """Where the camera sees a dome or a distant light the picture is clear, with an alpha channel.
+    Default: False."""
     error: bool
     """Keeps errors and variances where nothing else asks. Default: False."""
     overscan: int

@@ -17,15 +17,23 @@ from wavecomb.picture.image import display, read_image, read_layers
 pytest.importorskip("wavecomb._core")
 
 STAGE = """#usda 1.0
-def DomeLight "Sky" { color3f inputs:color = (0.5, 1, 2) }
-def DistantLight "Sun" { float inputs:angle = 20
+def DomeLight "Sky" {
+    color3f inputs:color = (0.5, 1, 2)
+}
+def DistantLight "Sun" {
+    float inputs:angle = 20
     float3 xformOp:rotateXYZ = (-8, 180, 0)
-    uniform token[] xformOpOrder = ["xformOp:rotateXYZ"] }
-def Sphere "Ball" { double radius = 1
-    color3f[] primvars:displayColor = [(0.8, 0.2, 0.1)] }
-def Camera "Cam" { float focalLength = 20
+    uniform token[] xformOpOrder = ["xformOp:rotateXYZ"]
+}
+def Sphere "Ball" {
+    double radius = 1
+    color3f[] primvars:displayColor = [(0.8, 0.2, 0.1)]
+}
+def Camera "Cam" {
+    float focalLength = 20
     double3 xformOp:translate = (0, 0, 4)
-    uniform token[] xformOpOrder = ["xformOp:translate"] }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
 """
 SIZE = (24, 16)
 
