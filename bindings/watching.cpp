@@ -56,6 +56,7 @@ nb::object owned(std::vector<std::byte> bytes) {
 nb::dict state_dict(const Snapshot& s) {
   nb::dict d;
   d["pass.target"] = s.pass.target;
+  d["pass.light_target"] = view(&s.pass.light_target, sizeof(uint32_t));
   d["pass.active"] = view(s.pass.active.data(), s.pass.active.size());
   const auto& counts = s.pass.allotment.counts;
   d["pass.counts"] = view(counts.data(), counts.size() * sizeof(uint32_t));
@@ -179,7 +180,11 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
     const auto active = nb::cast<Bytes>(state["pass.active"]);
     if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
     pass.active.assign(active.data(), active.data() + active.size());
-    // Neither is of a version that allotted, or learned, nothing.
+    // None of these is of a version that had no such light, allotted, or learned, nothing.
+    if (state.contains("pass.light_target")) {
+      const Bytes light = bytes_of(state, "pass.light_target", sizeof(uint32_t));
+      std::memcpy(&pass.light_target, light.data(), sizeof(uint32_t));
+    }
     if (state.contains("pass.counts")) {
       const auto counts = nb::cast<Bytes>(state["pass.counts"]);
       if (counts.size() != 0) bytes_of(state, "pass.counts", film.pixel_count() * sizeof(uint32_t));

@@ -219,5 +219,57 @@ TEST(Adaptive, NoiseTargetIsMetByPicturesOfFewBrightPixels) {
   EXPECT_LT(c.active_count, 4u * 81 + 1) << "stars and their windows only";
 }
 
+/// A film whose pixels' own samples say nothing of noise, and whose light comes of splats: the
+/// error is theirs, of halves of their own.
+TEST(ErrorMap, SeesTheNoiseOfSplats) {
+  constexpr uint32_t kSize = 24, kSamples = 64, kPaths = kSize * kSize;
+  std::mt19937 rng(7);
+  std::exponential_distribution<float> brightness;
+  double told = 0, known = 0;
+  for (int round = 0; round < 4; ++round) {
+    Film film(kSize, kSize, {AovSet{0}}, true);
+    film.keep_splats({-20}, kPaths);
+    for (uint32_t i = 0; i < kPaths; ++i)
+      add_samples(film, i % kSize, i / kSize, 16, [](float* rgb) { rgb[0] = rgb[1] = rgb[2] = 1; });
+    SplatList list(1);
+    for (uint32_t sample = 0; sample < kSamples; ++sample)
+      for (uint32_t path = 0; path < kPaths; ++path) {
+        const float c = 2 * brightness(rng);
+        ASSERT_TRUE(list.add(
+            {static_cast<uint32_t>(rng() % kPaths), c, c, c, SplatLayer::is_in_half(sample)}));
+        film.splats().add(list);
+        list.clear();
+      }
+    for (uint32_t path = 0; path < kPaths; ++path) film.splats().done(path, 0, kSamples);
+    const double expected = 3;
+    double error = 0, light = 0;
+    for (size_t i = 0; i < kPaths; ++i) {
+      error += std::abs(1 + film.splats().mean(i)[0] - expected);
+      light += expected;
+    }
+    told += measure_error(film).mean_relative;
+    known += error / light;
+    EXPECT_EQ(measure_noise_parts(film, {}).own, 0);
+    EXPECT_GT(measure_noise_parts(film, {}).splats, 0);
+    EXPECT_GT(film.variance()[0], 0);
+  }
+  EXPECT_NEAR(told, known, 0.1 * known);
+}
+
+TEST(Adaptive, LightPathsGoOnAsFarAsTheirNoiseDecides) {
+  // As noisy by splats as by samples, n = m = 16, all pixels active: as many of both.
+  EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0), 64u);
+  // A sixteenth of the pixels active: a sample of light paths costs 16 times as much.
+  EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0 / 16), 16u);
+  EXPECT_EQ(light_samples_after({1, 4}, 16, 16, 64, 64, 1.0 / 16), 32u);
+  // Never more than the share, never fewer than there are.
+  EXPECT_EQ(light_samples_after({1, 100}, 16, 16, 64, 64, 1.0), 64u);
+  EXPECT_EQ(light_samples_after({100, 1}, 16, 16, 64, 64, 1e-3), 16u);
+  EXPECT_EQ(light_samples_after({0, 0}, 16, 16, 64, 64, 1.0), 16u);
+  EXPECT_EQ(light_samples_after({0, 1}, 16, 16, 64, 64, 1.0), 64u);
+  // Nothing is known of halves that are not there.
+  EXPECT_EQ(light_samples_after({1, 0}, 1, 4, 16, 4, 1.0), 4u);
+}
+
 }  // namespace
 }  // namespace wavecomb

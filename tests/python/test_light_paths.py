@@ -100,10 +100,6 @@ def test_a_resumed_picture_is_that_which_nothing_stopped(stages: Any, tmp_path: 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"adaptive": 0.1}, "adaptive"),
-        ({"noise": 0.1}, "noise"),
-        ({"allocate": "error", "spp": 64}, "allocate"),
-        ({"error": True}, "error"),
         ({"guiding": "on"}, "guiding"),
         ({"guiding": "auto"}, "guiding"),
         ({"clamp_indirect": 1.0}, "clamp_indirect"),

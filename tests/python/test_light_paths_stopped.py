@@ -15,7 +15,12 @@ import wavecomb
 
 _core = pytest.importorskip("wavecomb._core")
 
-ENDINGS: list[dict[str, Any]] = [{"spp": 24}]
+ENDINGS: list[dict[str, Any]] = [
+    {"spp": 24},
+    {"spp": 48, "noise": 0.05},
+    {"spp": 32, "adaptive": 0.06},
+    {"spp": 32, "allocate": "error", "error": True},
+]
 AOVS = ["direct", "indirect", "light_groups", "by_light_paths", "lpe:a=C.*D[LO]"]
 
 
@@ -88,8 +93,11 @@ def went_on(scene: Any, settings: dict[str, Any], runs: int = 200) -> tuple[Any,
     raise AssertionError("it never ended")
 
 
-@pytest.mark.parametrize("transport", ["light", "bdpt"])
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize(
+    ("transport", "ending"),
+    [("light", ENDINGS[0]), ("bdpt", ENDINGS[0]), ("light", ENDINGS[1]), ("bdpt", ENDINGS[2]),
+     ("light", ENDINGS[3])],
+)  # fmt: skip
 def test_stopped_renders_go_on(stages: Any, transport: str, ending: dict[str, Any]) -> None:
     scene = stages["plain"].scene
     settings: dict[str, Any] = {"width": 32, "height": 24, "transport": transport, **ending}

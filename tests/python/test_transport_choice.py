@@ -36,6 +36,7 @@ def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Pa
     for way in (
         {"threads": 1, "wave_size": 100, "policy": "material"},
         {"lanes": 1, "seed": 7, "region": (3, 3, 9, 9), "crop": True},
+        {"noise": 0.1},
     ):
         other = chosen(stage, **way)
         assert {**other, "seconds": 0} == {**choice, "seconds": 0}
@@ -45,7 +46,6 @@ def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Pa
     ("settings", "why"),
     [
         ({"size": (32, 32), "spp": 16}, "too few samples"),
-        ({"adaptive": 0.1}, "do not go with adaptive"),
         ({"guiding": "auto"}, "do not go with guiding"),
         ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "no room for so many light path expressions"),
         ({"clamp_indirect": 1.0}, "do not go with clamp_indirect"),

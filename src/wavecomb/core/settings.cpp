@@ -7,9 +7,6 @@
 namespace wavecomb {
 
 LightPathRefusal light_path_refusal(const Settings& s) {
-  if (s.keeps_error())
-    return {"adaptive, noise, allocate and error, which see what paths from the camera bring alone",
-            "none of them"};
   if (s.guiding != Guiding::kOff) return {"guiding", "guiding off"};
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};

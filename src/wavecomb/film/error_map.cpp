@@ -2,29 +2,40 @@
 #include "wavecomb/film/error_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 namespace wavecomb {
 namespace {
 
-/// Sums over rgb: of the pixel's mean, and of its difference from the half's mean.
+/// Sums over rgb: of the pixel's mean, and of its difference from the half's mean; and of the
+/// squares of the two that this is of, of the pixel's own samples and of splats.
 struct PixelError {
-  double light = 0, difference = 0;
+  double light = 0, difference = 0, own2 = 0, splat2 = 0;
   bool known = false;
 };
 
-PixelError pixel_error(const Film::Pixel& p, const ErrorSums& e) {
+PixelError pixel_error(const Film& film, size_t pixel) {
+  const Film::Pixel& p = film.pixel(pixel);
+  const ErrorSums& e = film.error(pixel);
   const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
   if (n < 2 * ErrorSums::kHalfBlock) return {};  // there is no other half, or not all of it
   const double sums[3] = {p.r, p.g, p.b};
   // Var(I - A) = var (1 / half - 1 / n), and var / n is asked for: the same where half = n / 2.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
   PixelError out;
+  std::array<double, 3> splats{}, splat_difference{};
+  if (!film.splats().empty()) {
+    splats = film.splats().mean(pixel);
+    splat_difference = film.splats().difference(pixel);
+  }
   for (size_t c = 0; c < 3; ++c) {
-    const double mean = sums[c] / n;
-    out.light += mean;
-    out.difference += std::abs(mean - e.half[c] / in_half) * scale;
+    const double mean = sums[c] / n, own = (mean - e.half[c] / in_half) * scale;
+    out.light += mean + splats[c];
+    out.difference += std::abs(own + splat_difference[c]);
+    out.own2 += own * own;
+    out.splat2 += splat_difference[c] * splat_difference[c];
   }
   if (!std::isfinite(out.light) || !std::isfinite(out.difference)) out = {};
   out.known = true;
@@ -58,7 +69,7 @@ ErrorMap measure_error(const Film& film) {
   double light = 0, root = 0, difference = 0;
   size_t count = 0;
   for (size_t i = 0; i < map.error.size(); ++i) {
-    const PixelError e = pixel_error(film.pixel(i), film.error(i));
+    const PixelError e = pixel_error(film, i);
     if (!e.known) continue;
     known[i] = 1;
     ++count;
@@ -80,6 +91,18 @@ ErrorMap measure_error(const Film& film) {
     map.even_error = light / root;
   }
   return map;
+}
+
+NoiseParts measure_noise_parts(const Film& film, std::span<const uint8_t> active) {
+  NoiseParts parts;
+  for (size_t i = 0; i < film.pixel_count(); ++i) {
+    if (!active.empty() && active[i] == 0) continue;
+    const PixelError e = pixel_error(film, i);
+    if (!e.known || !(e.light > 0)) continue;
+    parts.own += e.own2 / e.light;
+    parts.splats += e.splat2 / e.light;
+  }
+  return parts;
 }
 
 }  // namespace wavecomb

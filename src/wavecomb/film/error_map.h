@@ -2,6 +2,8 @@
 /// How noisy a picture is, by the half buffers of its film.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "wavecomb/film/film.h"
@@ -18,7 +20,8 @@ struct ErrorMap {
   ///   e = sum over rgb |I - A| / sqrt(sum over rgb I)
   /// with I the mean of all samples and A that of one half (Dammertz, Hanika and Keller, "A
   /// Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination", WSCG 2010,
-  /// equation 1). For independent samples |I - A| has the distribution of |I - truth|. Infinite
+  /// equation 1). Where light comes of splats, too, I and A are sums of both, each with halves of
+  /// its own. For independent samples |I - A| has the distribution of |I - truth|. Infinite
   /// where no pixel of the window has an error yet; pixels that are not finite count as 0.
   std::vector<float> error;
   /// Sum |I - A| / sum I over picture and channels; infinite where no pixel has an error yet.
@@ -30,5 +33,12 @@ struct ErrorMap {
 
 /// Measures the film, which has error sums.
 ErrorMap measure_error(const Film& film);
+
+/// What of the squared errors, over the light, comes of pixels' own samples and what of splats.
+struct NoiseParts {
+  double own = 0, splats = 0;
+};
+/// Of the pixels in `active`; of all, where it is empty.
+NoiseParts measure_noise_parts(const Film& film, std::span<const uint8_t> active);
 
 }  // namespace wavecomb

@@ -36,4 +36,16 @@ AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
                              std::span<const uint32_t> samples, const Settings& settings,
                              const PassRules& rules);
 
+/// Samples of light paths at the end of a pass, after `done` of them, where those of pixels go from
+/// `before` to `after` and `share` is what that would be of as many light paths as pixels' paths.
+///
+/// A pass takes |A| (after - before) paths of active pixels' and P for each sample of light paths,
+/// P their numbers. Of errors V_c / n + V_l / m the least at a cost has
+///   m / n = sqrt(V_l |A| / (V_c P)),
+/// with the V over the active pixels, of the halves. `share` is the most, since more of one kind
+/// would do best with other weights. What earlier passes have shown decides, so no bias comes of
+/// it.
+uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
+                             uint32_t after, uint32_t share, double active_share);
+
 }  // namespace wavecomb

@@ -2,6 +2,7 @@
 #include "wavecomb/render/allotment.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -20,15 +21,20 @@ struct Pilot {
   std::vector<double> cost;   ///< of a sample; empty: not asked for
 };
 
-double light_of(const Film::Pixel& p) {
-  const double light = (p.r + p.g + p.b) / (3.0 * std::max(1u, p.samples));
+double light_of(const Film& film, size_t pixel) {
+  const Film::Pixel& p = film.pixel(pixel);
+  double light = (p.r + p.g + p.b) / (3.0 * std::max(1u, p.samples));
+  if (!film.splats().empty()) {
+    const std::array<double, 3> splats = film.splats().mean(pixel);
+    light += (splats[0] + splats[1] + splats[2]) / 3.0;
+  }
   return std::isfinite(light) ? std::max(0.0, light) : 0.0;
 }
 
 /// The light of the picture: the square of the mean root, which few bright pixels do not decide.
 double usual_light(const Film& film) {
   double root = 0;
-  for (size_t i = 0; i < film.pixel_count(); ++i) root += std::sqrt(light_of(film.pixel(i)));
+  for (size_t i = 0; i < film.pixel_count(); ++i) root += std::sqrt(light_of(film, i));
   root /= static_cast<double>(film.pixel_count());
   return root * root;
 }
@@ -43,7 +49,7 @@ Pilot measure(Film& film, bool with_cost) {
     const Film::Pixel& p = film.pixel(i);
     const double* m2 = film.error(i).m2;
     const double variance = (m2[0] + m2[1] + m2[2]) / (3.0 * std::max(1u, p.samples - 1));
-    const double light = light_of(p);
+    const double light = light_of(film, i);
     if (std::isfinite(variance)) {
       const double scale = light * light + dark * dark;
       pilot.error[i] = scale > 0 ? std::sqrt(std::max(0.0, variance) / scale) : 0.0;

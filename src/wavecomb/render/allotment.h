@@ -6,6 +6,8 @@
 /// least where n is proportional to s / I; error times time is least where it is proportional to
 /// (s / I) / sqrt(c) (Neyman, JRSS 97(4), 1934, and with costs).
 ///
+/// Light of splats counts for I: no pixel's samples change its noise.
+///
 /// A pixel's count must not depend on its own samples, or the mean of them is biased: s / I and c
 /// are means over the pixels around it, without itself. What is left is the scale, to which a pixel
 /// adds its share of 24 of all pixels.

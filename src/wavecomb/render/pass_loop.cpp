@@ -55,6 +55,8 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
   may_be_cut_ = all_begun;
   // What a render without a limit has begun may be a long pass: here one sample each comes first.
   if (rules_.timed && !all_begun) pass_.target = std::min(pass_.target, 1u);
+  if (!rules_.adaptive || pass_.light_target == 0)
+    pass_.light_target = light_share_.samples(pass_.target);
 }
 
 void PassLoop::run() {
@@ -85,13 +87,13 @@ void PassLoop::run() {
 PassPlan PassLoop::light_plan() const {
   if (light_order_.empty()) return {};
   PassState pass;
-  pass.target = light_share_.samples(pass_.target);
+  pass.target = pass_.light_target;
   return plan_pass(light_order_, {0, 0, settings_.width, settings_.height},
                    film_.splats().samples(), pass);
 }
 
 bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
-  const uint32_t done = pass_.target;
+  const uint32_t done = pass_.target, light_done = pass_.light_target;
   if (done > 0 && film_.has_error()) {
     const ErrorMap map = measure_error(film_);
     error_ = map.mean_relative;
@@ -109,6 +111,11 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
   // Pixels of an adaptive render that go on late catch up.
   pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
+  pass_.light_target = light_share_.samples(pass_.target);
+  if (rules_.adaptive && done > 0 && !light_order_.empty())
+    pass_.light_target = light_samples_after(
+        measure_noise_parts(film_, pass_.active), light_done, done, pass_.target,
+        pass_.light_target, static_cast<double>(active) / static_cast<double>(light_order_.size()));
   may_be_cut_ = may_be_cut_ || done > 0;
   ++passes_;
   return true;

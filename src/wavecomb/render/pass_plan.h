@@ -32,7 +32,8 @@ struct Allotment {
 
 /// Where a pass stands: what a checkpoint keeps beside the film.
 struct PassState {
-  uint32_t target = 0;  ///< samples that each pixel of the pass has at its end; or the mean
+  uint32_t target = 0;        ///< samples that each pixel of the pass has at its end; or the mean
+  uint32_t light_target = 0;  ///< likewise of paths from lights, where there are any
   std::vector<uint8_t> active{};  ///< by pixel, row by row: 1: of the pass. Empty: all are
   Allotment allotment{};
 
