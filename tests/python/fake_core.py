@@ -33,6 +33,7 @@ class Settings:
     region = None
     allocate = "even"
     firefly = "keep"
+    transport = "path"
     aovs: tuple[str, ...] = ()
 
     def __init__(self, **settings: Any) -> None:
