@@ -234,7 +234,10 @@ def exr(
         ({"wavecomb__seeds": "[1e999]"}, "does not say what settings"),
         ({"layers": {"beauty": (4, 4, 3), "samples": (4, 4, 3)}}, "layer samples is 4 x 4 with 3"),
         ({"layers": {"beauty": (4, 1, 3), "samples": (4, 1, 1)}}, "layer beauty is 1 x 4"),
-        ({"layers": {"beauty": (4, 4, 4), "samples": (4, 4, 1)}}, "has no layer A, which the other"),
+        (
+            {"layers": {"beauty": (4, 4, 4), "samples": (4, 4, 1)}},
+            "has no layer A, which the other",
+        ),
         (
             {"layers": {"beauty": (4, 4, 3), "samples": (4, 4, 1), "CryptoObject00": (4, 4, 3)}},
             "layer CryptoObject00",
