@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import leggauss
 from voxels import bricks
 
 from wavecomb import _core
@@ -84,6 +85,44 @@ def test_emission_and_absorption() -> None:
         expected = through + eps / sigma * (1.0 - through)
         mean, error = seen[:, channel].mean(), seen[:, channel].std() / SIZE
         assert abs(mean - expected) < 1e-3 * expected + 4 * error
+
+
+def h_function(albedo: float, mu: float) -> float:
+    """Chandrasekhar's H of isotropic scattering (Radiative Transfer, 1950, chapter V)."""
+    nodes, weights = leggauss(64)
+    x, w = 0.5 * (nodes + 1), 0.5 * weights
+
+    def of(values: Any, h: Any) -> Any:
+        inner = (w * x * h)[None, :] / (values[:, None] + x[None, :])
+        return 1 / (math.sqrt(1 - albedo) + 0.5 * albedo * inner.sum(axis=1))
+
+    h = np.ones_like(x)
+    for _ in range(2000):
+        h = of(x, h)
+    return float(of(np.array([mu]), h)[0])
+
+
+def test_an_isotropic_half_space() -> None:
+    """Under even light it sends 1 - sqrt(1 - a) H(1) straight up: within 0.1 % and the noise."""
+    albedos = (0.3, 0.6, 0.9)
+    builder = _core.SceneBuilder()
+    builder.add_volume(
+        IDENTITY, bounds=((-500, -500, -2), (500, 500, 0)), extinction=(30,) * 3, albedo=albedos
+    )
+    builder.add_light("dome", np.eye(4), color=(1.0, 1.0, 1.0))
+    camera = np.eye(4)
+    camera[3, 2] = 4
+    builder.set_camera(camera, projection="orthographic", window=(-0.1, 0.1, -0.1, 0.1))
+    settings = _core.Settings(
+        width=SIZE, height=SIZE, spp=512, max_depth=160, filter="box", filter_width=1.0
+    )
+    result = _core.render(builder.build(), settings, None, None, None)
+    seen = result.beauty.reshape(-1, 3).astype(np.float64)
+    for channel, albedo in enumerate(albedos):
+        exact = 1 - math.sqrt(1 - albedo) * h_function(albedo, 1.0)
+        mean, error = seen[:, channel].mean(), seen[:, channel].std() / SIZE
+        assert abs(mean - exact) < 1e-3 * exact + 4 * error
+        assert error < 1e-3
 
 
 def test_one_picture_whatever_renders_it() -> None:
