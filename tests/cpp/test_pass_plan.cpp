@@ -107,7 +107,7 @@ std::map<uint32_t, std::pair<uint32_t, uint32_t>> by_pixel(const PassPlan& plan)
 
 TEST(PassPlan, AllPixelsInMortonOrder) {
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, 5, 3}), none(15, 0);
-  const PassPlan plan = plan_pass(order, {0, 0, 5, 3}, none, {16, {}});
+  const PassPlan plan = plan_pass(order, {0, 0, 5, 3}, none, {.target = 16});
   EXPECT_EQ(plan.pixels, order);
   ASSERT_EQ(plan.batches.size(), 1u);
   EXPECT_EQ(plan.samples(), 15u * 16);
@@ -118,13 +118,15 @@ TEST(PassPlan, TakesActivePixelsBelowTheTarget) {
   //                                      a pass that was cut, and one pixel that was left at 16
   const std::vector<uint32_t> samples = {32, 48, 64, 16, 64, 32};
   const std::vector<uint8_t> active = {1, 1, 1, 1, 0, 0};
-  const auto plan = by_pixel(plan_pass(order, {0, 0, 3, 2}, samples, {64, active}));
+  const auto plan =
+      by_pixel(plan_pass(order, {0, 0, 3, 2}, samples, {.target = 64, .active = active}));
   const auto at = [](uint32_t x, uint32_t y) { return x | y << 16; };
   const std::map<uint32_t, std::pair<uint32_t, uint32_t>> expected = {
       {at(0, 0), {32, 32}}, {at(1, 0), {48, 16}}, {at(0, 1), {16, 48}}};
   EXPECT_EQ(plan, expected);
   EXPECT_TRUE(
-      plan_pass(order, {0, 0, 3, 2}, std::vector<uint32_t>(6, 64), {64, active}).batches.empty());
+      plan_pass(order, {0, 0, 3, 2}, std::vector<uint32_t>(6, 64), {.target = 64, .active = active})
+          .batches.empty());
 }
 
 TEST(PassPlan, ProgressivePassesDoubleUpToTheStep) {
@@ -152,8 +154,8 @@ TEST(WaveGroups, CoverThePlanOnceAndFillWaves) {
   for (const uint32_t wave_size : {64u, 1000u, 4096u, 65536u})
     for (const uint32_t samples : {1u, 16u, 100u, 5000u})
       for (const uint32_t threads : {1u, 2u, 16u}) {
-        const PassPlan plan =
-            plan_pass(order, {0, 0, 100, 70}, std::vector<uint32_t>(7000, 32), {32 + samples, {}});
+        const PassPlan plan = plan_pass(order, {0, 0, 100, 70}, std::vector<uint32_t>(7000, 32),
+                                        {.target = 32 + samples});
         size_t pixels = 0;
         const std::vector<WaveGroup> groups = wave_groups(plan, wave_size, threads);
         for (const WaveGroup& g : groups) {
@@ -172,7 +174,8 @@ TEST(WaveGroups, CoverThePlanOnceAndFillWaves) {
 
 TEST(WaveGroups, FewPixelsKeepAllWorkersBusy) {
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, 5, 4});
-  const PassPlan plan = plan_pass(order, {0, 0, 5, 4}, std::vector<uint32_t>(20, 0), {4096, {}});
+  const PassPlan plan =
+      plan_pass(order, {0, 0, 5, 4}, std::vector<uint32_t>(20, 0), {.target = 4096});
   EXPECT_GE(wave_groups(plan, 65536, 4).size(), 10u);
 }
 

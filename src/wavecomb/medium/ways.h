@@ -59,7 +59,8 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 }  // namespace detail
 
 /// Follows ways from one collision with the majorant to the next, real or not. A lane that has
-/// ended takes the next way once half of the lanes have (a quarter: fuller lanes, and more time).
+/// ended takes the next way once three eighths of the lanes have (a quarter: fuller lanes, and more
+/// time).
 /// `Visitor`, of the lanes' ways:
 ///
 ///   start(way, lanes)                          lanes begin with these ways
@@ -73,7 +74,7 @@ inline void each_collision(const PlacedGrid& placed, float scale, uint32_t volum
                            VolumeCounts& counts, Visitor& visitor) {
   using U = UInt<F>;
   constexpr auto kWide = static_cast<uint32_t>(kWidth<F>);
-  constexpr uint32_t kEnough = kWide < 4 ? 1 : kWide / 2;
+  constexpr uint32_t kEnough = kWide < 4 ? 1 : 3 * kWide / 8;
   if (scale <= 0) return;
   BrickWalk<F> walk(placed);
   CollisionNumbers<F> numbers;
