@@ -34,9 +34,7 @@ class VariantBar(QWidget):
 
     def _fill(self) -> None:
         model = self.model
-        while self._form.rowCount():
-            self._form.removeRow(0)
-        self.combos = {}
+        self._clear()
         for one in model.sets:
             combo = QComboBox()
             combo.setObjectName(f"variant-{one.name}")
@@ -51,6 +49,20 @@ class VariantBar(QWidget):
             self._form.addRow(one.name, combo)
             self.combos[one.name] = combo
         self.setVisible(bool(model.sets))
+
+    def _clear(self) -> None:
+        """Takes all rows away.
+
+        One of the combos may be what asked for that: it must live on until its event is over.
+        """
+        self.combos = {}
+        while self._form.rowCount():
+            row = self._form.takeRow(0)
+            for item in (row.labelItem, row.fieldItem):  # type: ignore[attr-defined]
+                widget = item.widget() if item is not None else None
+                if widget is not None:
+                    widget.hide()
+                    widget.deleteLater()
 
     def _choose(self, name: str, combo: QComboBox, number: int) -> None:
         self.model.choose(name, combo.itemData(number))
