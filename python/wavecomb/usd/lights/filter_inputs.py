@@ -15,6 +15,8 @@ _PREFIXES = (
     "primvars:arnold:", "ri:light:", "ri:lightFilter:", "",
 )  # fmt: skip
 """What inputs of filters begin with."""
+OF_LIGHTS = ("inputs:", "")
+"""What doors begin with that a light has itself."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +25,12 @@ class FilterInputs:
 
     prim: Usd.Prim
     time: Usd.TimeCode
+    prefixes: tuple[str, ...] = _PREFIXES
 
     def attribute(self, *names: str) -> Usd.Attribute | None:
         """The first of some names that says something."""
         for name in names:
-            for prefix in _PREFIXES:
+            for prefix in self.prefixes:
                 attribute = self.prim.GetAttribute(prefix + name)
                 if attribute and (
                     attribute.HasAuthoredValue() or attribute.HasAuthoredConnections()

@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
-from wavecomb.usd.lights.filter_inputs import FilterInputs, filter_prims, kind_of, plain_kind
+from wavecomb.usd.lights.filter_inputs import (
+    OF_LIGHTS,
+    FilterInputs,
+    filter_prims,
+    kind_of,
+    plain_kind,
+)
 from wavecomb.usd.lights.gels import GELS
 from wavecomb.usd.looks.colour_space import space_of
 from wavecomb.usd.looks.network import number
@@ -98,7 +104,7 @@ class FilterReader:
         Gels are not among them: ``gels``.
         """
         prims = [(path, prim) for path, prim in filter_prims(light) if not _gel(prim)]
-        doors = FilterInputs(light, self._time)
+        doors = FilterInputs(light, self._time, OF_LIGHTS)
         has_doors = any(doors.number(f"barndoor{flap}", 0.0) > 0 for flap in _FLAPS)
         if (prims or has_doors) and kind not in ("rect", "disk", "sphere", "cylinder"):
             self._report.missing(f"light filters of {kind} lights", light.GetPath())
