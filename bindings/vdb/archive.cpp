@@ -5,10 +5,9 @@
 #include <openvdb/io/io.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <filesystem>
 #include <map>
-#include <system_error>
+
+#include "opened.h"
 
 namespace vdb {
 
@@ -19,13 +18,8 @@ namespace vio = openvdb::io;
 }  // namespace
 
 Archive::Archive(const std::string& path) {
-  std::error_code code;
-  const auto size = std::filesystem::file_size(path, code);
-  if (code) throw std::system_error(code);
-  stream_.open(path, std::ios::binary);
-  if (!stream_) throw std::system_error(errno, std::generic_category());
   // Whatever is missing from the file throws; OpenVDB does not look.
-  stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+  const uintmax_t size = open_to_read(stream_, path);
   guarded([&] {
     readHeader(stream_);
     if (fileVersion() > openvdb::OPENVDB_FILE_VERSION)

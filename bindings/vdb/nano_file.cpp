@@ -2,17 +2,15 @@
 #include "nano_file.h"
 
 #include <array>
-#include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <new>
-#include <system_error>
 
 #include "archive.h"
 #include "bricks.h"
 #include "nano_tree.h"
+#include "opened.h"
 #include "packed.h"
 
 namespace vdb {
@@ -84,12 +82,7 @@ bool NanoFile::is_one(const std::string& path) {
 }
 
 NanoFile::NanoFile(const std::string& path) {
-  std::error_code code;
-  const auto size = std::filesystem::file_size(path, code);
-  if (code) throw std::system_error(code);
-  stream_.open(path, std::ios::binary);
-  if (!stream_) throw std::system_error(errno, std::generic_category());
-  stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+  const uintmax_t size = open_to_read(stream_, path);
   try {
     find_grids(size);
   } catch (const std::ios_base::failure&) {
