@@ -26,6 +26,8 @@ constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
 /// Nodes above this depth of the light tree are balanced.
 constexpr uint32_t kTiltDepth = 6;
+/// Most lights of a tree whose nodes are: it is copied, 64 bytes each.
+constexpr size_t kMostTilted = size_t{1} << 20;
 
 uint32_t path_count(const Settings& settings) {
   const uint64_t pixels = uint64_t{settings.width} * settings.height;
@@ -133,7 +135,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   if (parts.size() == 0) return out;
   const LightSet& set = scene.light_set();
   const LightTree& tree = parts.by_tree ? scene.light_tree(settings.threads) : set.tree;
-  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMostWeighed;
+  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMostTilted;
   if (parts.size() < 2 && !has_nodes) return out;
 
   // Half by heads, so that what power thinks little of is looked at, too.
