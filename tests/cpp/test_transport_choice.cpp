@@ -68,6 +68,21 @@ TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {
   EXPECT_GT(gain_of(0.05f, 0.05f, 0.05f, 0.5f).gain, 20);
 }
 
+TEST(TransportGain, CountsLightThatIsLostInTheNoiseOfAPixel) {
+  const double even = gain_of(0.05f, 0.05f, 0.5f).gain;
+  EXPECT_GT(gain_of(0.05f, 0.05f, 0.5f, 0.15f).gain, 10 * even);
+}
+
+TEST(TransportGain, TakesNoNoiseForLight) {
+  for (uint32_t seed = 0; seed < 400; seed += 4) {
+    const TransportTrial without[2] = {trial(seed, 0.3f, 0, 0, false),
+                                       trial(seed + 1, 0.3f, 0, 0, false)};
+    const TransportTrial with[2] = {trial(seed + 2, 0.3f, 0.02f, 0, true),
+                                    trial(seed + 3, 0.3f, 0.02f, 0, true)};
+    EXPECT_LT(transport_gain(without, with, kSide, 1000).gain, 1) << seed;
+  }
+}
+
 TEST(FocusesLight, ByItsMaterials) {
   const auto scene_of = [](const Material& material) {
     SceneBuilder b;

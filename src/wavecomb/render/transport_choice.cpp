@@ -27,8 +27,10 @@ constexpr double kPathVertex = 0.7, kJointVertex = 1.2;
 constexpr double kWorthwhileLight = 1.3;
 /// Below this a material's lobe is sharp enough for light that it sends on to be seen.
 constexpr float kSharpRoughness = 0.4f;
-/// Differences of pictures, over their variance, that are not noise.
+/// Differences of pictures, over their variance, that are not noise: where there are as many cells
+/// as the smallest trial has pixels, and the more the fewer they are, down to the least that tell.
 constexpr double kMissed = 0.25;
+constexpr size_t kLeastCells = 64;
 /// Samples, in those of a trial, for which light that is missed counts.
 constexpr double kMostLonger = 16;
 constexpr int kMostShare = 2;  ///< exponent of the share of light paths, and its negative
@@ -70,6 +72,61 @@ std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t wi
   return out;
 }
 
+/// Brightnesses of a picture, or of a coarser one.
+struct Plane {
+  uint32_t width;
+  std::vector<double> values;
+
+  /// Means over 2 x 2 of them, at the edges of those that there are.
+  Plane halved() const {
+    const auto height = static_cast<uint32_t>(values.size() / width);
+    Plane out{(width + 1) / 2, {}};
+    for (uint32_t y = 0; y < height; y += 2)
+      for (uint32_t x = 0; x < width; x += 2) {
+        double sum = 0, count = 0;
+        for (uint32_t v = y; v < std::min(y + 2, height); ++v)
+          for (uint32_t u = x; u < std::min(x + 2, width); ++u, ++count)
+            sum += values[size_t{v} * width + u];
+        out.values.push_back(sum / count);
+      }
+    return out;
+  }
+};
+
+Plane plane_of(const std::vector<float>& rgb, uint32_t width) {
+  Plane out{width, std::vector<double>(rgb.size() / 3)};
+  for (size_t i = 0; i < out.values.size(); ++i) out.values[i] = brightness(rgb, i);
+  return out;
+}
+
+/// Squared light, times `scale`, that pictures with light paths have and the others lack, or the
+/// other way round, summed over pixels; 0 where it may be noise. Light that few samples bring is
+/// told in coarser pictures where it is not in a pixel, so the most is taken of all that tell.
+double missed_light(const TransportTrial (&without)[2], const TransportTrial (&with)[2],
+                    const std::vector<double>& scale, uint32_t width) {
+  std::array<Plane, 5> planes = {
+      plane_of(without[0].beauty, width), plane_of(without[1].beauty, width),
+      plane_of(with[0].beauty, width), plane_of(with[1].beauty, width), Plane{width, scale}};
+  const auto pixels = static_cast<double>(scale.size());
+  double most = 0;
+  while (planes[0].values.size() >= kLeastCells) {
+    const auto cells = static_cast<double>(planes[0].values.size());
+    double missed = 0, noise = 0;
+    for (size_t i = 0; i < planes[0].values.size(); ++i) {
+      const double p = planes[0].values[i] - planes[1].values[i];
+      const double j = planes[2].values[i] - planes[3].values[i];
+      const double both = planes[0].values[i] + planes[1].values[i] - planes[2].values[i] -
+                          planes[3].values[i];
+      missed += 0.25 * (both * both - p * p - j * j) * planes[4].values[i];
+      noise += 0.5 * (p * p + j * j) * planes[4].values[i];
+    }
+    const double few = std::max(1.0, std::sqrt(double{kLeastTransportPixels} / cells));
+    if (missed > kMissed * few * noise) most = std::max(most, missed * pixels / cells);
+    for (Plane& plane : planes) plane = plane.halved();
+  }
+  return most;
+}
+
 double cost_of(const TransportTrial (&trials)[2], double vertex) {
   double cost = 0;
   for (const TransportTrial& t : trials)
@@ -92,7 +149,7 @@ TransportGain transport_gain(const TransportTrial (&without)[2], const Transport
     for (const auto& trials : {&without, &with})
       for (const TransportTrial& t : *trials) mean[i] += 0.25 * double{brightness(t.beauty, i)};
   const std::vector<double> scale = inverse_squares(mean, width);
-  double path = 0, joint = 0, camera = 0, light = 0, missed = 0;
+  double path = 0, camera = 0, light = 0;
   for (size_t i = 0; i < pixels; ++i) {
     const double p0 = brightness(without[0].beauty, i), p1 = brightness(without[1].beauty, i);
     const double j0 = brightness(with[0].beauty, i), j1 = brightness(with[1].beauty, i);
@@ -100,14 +157,11 @@ TransportGain transport_gain(const TransportTrial (&without)[2], const Transport
     const double l1 = brightness(with[1].by_light_paths, i);
     const auto squared = [](double d) { return d * d; };
     path += 0.5 * squared(p0 - p1) * scale[i];
-    joint += 0.5 * squared(j0 - j1) * scale[i];
     light += 0.5 * squared(l0 - l1) * scale[i];
     camera += 0.5 * squared((j0 - l0) - (j1 - l1)) * scale[i];
-    missed += (squared(0.5 * (p0 + p1 - j0 - j1)) - 0.25 * (squared(p0 - p1) + squared(j0 - j1))) *
-              scale[i];
   }
   // Light that no path from the camera has met is error that more samples do not take away.
-  if (missed > kMissed * (path + joint)) path += missed * std::min(longer, kMostLonger);
+  path += missed_light(without, with, scale, width) * std::min(longer, kMostLonger);
   const double path_cost = cost_of(without, kPathVertex);
   const double camera_cost = cost_of(without, kJointVertex);
   const double light_cost = std::max(0.0, cost_of(with, kJointVertex) - camera_cost);
