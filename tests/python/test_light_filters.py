@@ -239,6 +239,12 @@ def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):
     )
     assert (got == with_own).all()
     free = picture(tmp_path, FLOOR + lamp("SphereLight", CONE), spp=16)
+    edge = picture(
+        tmp_path,
+        FLOOR + lamp("SphereLight", f"{CONE}\ncustom float barndoorbottomedge = 0.5"),
+        spp=16,
+    )
+    assert edge.sum() < free.sum(), "an edge alone dims, too"
     lit = free[:, :, 0] > 0
     shares = got[:, :, 0] / np.where(lit, free[:, :, 0], 1)
     # The left half is dark; from the bottom, half of the square brightens, smoothly.

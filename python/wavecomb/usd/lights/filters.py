@@ -105,7 +105,9 @@ class FilterReader:
         """
         prims = [(path, prim) for path, prim in filter_prims(light) if not _gel(prim)]
         doors = FilterInputs(light, self._time, OF_LIGHTS)
-        has_doors = any(doors.number(f"barndoor{flap}", 0.0) > 0 for flap in _FLAPS)
+        has_doors = any(
+            doors.number(f"barndoor{flap}{end}", 0.0) > 0 for flap in _FLAPS for end in ("", "edge")
+        )
         if (prims or has_doors) and kind not in ("rect", "disk", "sphere", "cylinder"):
             self._report.missing(f"light filters of {kind} lights", light.GetPath())
             return ()
