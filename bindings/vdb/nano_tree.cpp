@@ -7,6 +7,7 @@
 #if __has_include(<nanovdb/NanoVDB.h>)
 #include <nanovdb/NanoVDB.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -72,7 +73,6 @@ class NanoWalk {
   using Upper = typename nanovdb::NanoUpper<Build>::DataType;
   using Root = typename nanovdb::NanoRoot<Build>::DataType;
   using Value = typename OpenValueOf<typename Leaf::ValueType>::Type;
-  using Grid = openvdb::Grid<typename openvdb::tree::Tree4<Value, 5, 4, 3>::Type>;
 
   explicit NanoWalk(const Buffer& buffer) : buffer_(buffer) {
     constexpr uint64_t kTree = sizeof(nanovdb::GridData);
@@ -173,10 +173,36 @@ openvdb::GridClass class_of(const nanovdb::GridData& data) {
   }
 }
 
+/// A grid of OpenVDB in the making. Not inlined: one for all builds that have such values, since a
+/// compiler takes long over each.
+template <typename Value>
+class Making {
+ public:
+  using Grid = openvdb::Grid<typename openvdb::tree::Tree4<Value, 5, 4, 3>::Type>;
+  using Values = std::array<Value, kBrickVoxels>;
+  using Mask = openvdb::util::NodeMask<3>;
+
+  [[gnu::noinline]] explicit Making(const Value& background)
+      : grid_(Grid::create(background)) {}
+  [[gnu::noinline]] void add_tile(int level, const openvdb::Coord& xyz, const Value& value) {
+    grid_->tree().addTile(level, xyz, value, true);
+  }
+  [[gnu::noinline]] void add_leaf(const openvdb::Coord& xyz, const Values& values,
+                                  const Mask& mask) {
+    auto* leaf = grid_->tree().touchLeaf(xyz);
+    std::copy(values.begin(), values.end(), leaf->buffer().data());
+    leaf->setValueMask(mask);
+  }
+  openvdb::GridBase::Ptr grid() const { return grid_; }
+
+ private:
+  typename Grid::Ptr grid_;
+};
+
 template <typename Build>
 openvdb::GridBase::Ptr read_as(const Buffer& buffer, uint64_t most_bytes) {
   using Walk = NanoWalk<Build>;
-  using Grid = typename Walk::Grid;
+  using Value = typename Walk::Value;
   const Walk tree(buffer);
   uint64_t bricks = 0;
   tree.walk(
@@ -185,19 +211,20 @@ openvdb::GridBase::Ptr read_as(const Buffer& buffer, uint64_t most_bytes) {
         bricks += along * along * along;
       },
       [&](const openvdb::Coord&, const auto&) { ++bricks; });
-  check_size(bricks, {ChannelsOf<typename Walk::Value>::value, false}, most_bytes);
-  auto grid = Grid::create(tree.background());
+  check_size(bricks, {ChannelsOf<Value>::value, false}, most_bytes);
+  Making<Value> making(tree.background());
   tree.walk([&](int level, const openvdb::Coord& xyz, int,
-                const auto& value) { grid->tree().addTile(level, xyz, value, true); },
+                const Value& value) { making.add_tile(level, xyz, value); },
             [&](const openvdb::Coord& xyz, const auto& from) {
-              auto* leaf = grid->tree().touchLeaf(xyz);
-              auto* values = leaf->buffer().data();
-              for (uint32_t i = 0; i < kBrickVoxels; ++i) values[i] = open_value(from.getValue(i));
-              typename Grid::TreeType::LeafNodeType::NodeMaskType mask;
-              for (uint32_t i = 0; i < kBrickVoxels; ++i) mask.set(i, from.mValueMask.isOn(i));
-              leaf->setValueMask(mask);
+              typename Making<Value>::Values values;
+              typename Making<Value>::Mask mask;
+              for (uint32_t i = 0; i < kBrickVoxels; ++i) {
+                values[i] = open_value(from.getValue(i));
+                mask.set(i, from.mValueMask.isOn(i));
+              }
+              making.add_leaf(xyz, values, mask);
             });
-  return grid;
+  return making.grid();
 }
 
 /// Calls `use` with the build type that a nanovdb::GridType stands for; false where it is not read.
