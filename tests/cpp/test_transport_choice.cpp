@@ -6,6 +6,8 @@
 #include <random>
 
 #include "scene_testing.h"
+#include "wavecomb/render/light_paths.h"
+#include "wavecomb/render/renderer.h"
 #include "wavecomb/render/transport_choice.h"
 
 namespace wavecomb {
@@ -18,16 +20,15 @@ constexpr uint64_t kRays = 100'000, kRecords = 50'000;
 
 /// A picture of brightness 1, and `light` more with light paths, whose parts have noise of these
 /// deviations.
-TransportTrial trial(uint32_t seed, float camera_noise, float light_noise, float light,
-                     bool with_paths) {
+TransportTrial trial(uint32_t seed, float camera_noise, float light_noise, float light) {
   std::mt19937 rng(seed);
   std::normal_distribution<float> noise;
   TransportTrial out;
-  out.rays = with_paths ? 2 * kRays : kRays;
-  out.records = with_paths ? 2 * kRecords : kRecords;
+  out.rays = 2 * kRays;
+  out.records = 2 * kRecords;
   for (uint32_t i = 0; i < kSide * kSide; ++i) {
     const float camera = 1 + camera_noise * noise(rng);
-    const float found = with_paths ? light + light_noise * noise(rng) : 0;
+    const float found = light + light_noise * noise(rng);
     for (int c = 0; c < 3; ++c) {
       out.beauty.push_back(camera + found);
       out.by_light_paths.push_back(found);
@@ -36,23 +37,28 @@ TransportTrial trial(uint32_t seed, float camera_noise, float light_noise, float
   return out;
 }
 
-TransportGain gain_of(float path_noise, float camera_noise, float light_noise, float light = 0) {
-  const TransportTrial without[2] = {trial(1, path_noise, 0, 0, false),
-                                     trial(2, path_noise, 0, 0, false)};
-  const TransportTrial with[2] = {trial(3, camera_noise, light_noise, light, true),
-                                  trial(4, camera_noise, light_noise, light, true)};
-  return transport_gain(without, with, kSide, 8);
+/// `left`: the deviation of eight samples of a pixel, of what light paths find.
+TransportGain gain_of(float left, float camera_noise, float light_noise, float light = 1,
+                      double longer = 8) {
+  TransportTrials trials;
+  trials.without.rays = kRays;
+  trials.without.records = kRecords;
+  trials.with[0] = trial(3, camera_noise, light_noise, light);
+  trials.with[1] = trial(4, camera_noise, light_noise, light);
+  trials.variance.assign(kSide * kSide, 8.0 * left * left);
+  trials.width = kSide;
+  return transport_gain(trials, longer);
 }
 
 TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
-  const TransportGain gain = gain_of(0.1f, 0.1f, 0.f);
+  const TransportGain gain = gain_of(0.f, 0.1f, 0.f);
   EXPECT_LT(gain.gain, 0.95);
   EXPECT_LT(gain.share.exponent, 0) << "as few as there may be";
 }
 
 TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
-  // As noisy parts: v 4, (1 + 1) at s = 1, and light paths cost what camera paths cost.
-  const TransportGain gain = gain_of(0.2f, 0.1f, 0.1f);
+  // v 1 + 3 without, (1 + 1) at s = 1, and light paths cost what camera paths cost.
+  const TransportGain gain = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
   const double path = kRays + 0.7 * kRecords, joint = kRays + 1.2 * kRecords;
   EXPECT_EQ(gain.share.exponent, 0);
   EXPECT_NEAR(gain.gain, 4 * path / (2 * 2 * joint), 0.15);
@@ -65,22 +71,49 @@ TEST(TransportGain, AsksForManyLightPathsWhereTheyAreTheNoise) {
 
 TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {
   EXPECT_LT(gain_of(0.05f, 0.05f, 0.05f).gain, 1);
-  EXPECT_GT(gain_of(0.05f, 0.05f, 0.05f, 0.5f).gain, 20);
+  const TransportGain never = gain_of(1e6f, 0.05f, 0.05f, 0.5f);
+  EXPECT_GT(never.gain, 20);
+  EXPECT_LT(gain_of(1e6f, 0.05f, 0.05f, 0.5f, 1).gain, never.gain) << "no more than there is";
+  EXPECT_LT(gain_of(1e6f, 0.05f, 0.f, 0.001f).gain, 1) << "and this is hardly seen";
 }
 
-TEST(TransportGain, CountsLightThatIsLostInTheNoiseOfAPixel) {
-  const double even = gain_of(0.05f, 0.05f, 0.5f).gain;
-  EXPECT_GT(gain_of(0.05f, 0.05f, 0.5f, 0.15f).gain, 10 * even);
-}
-
-TEST(TransportGain, TakesNoNoiseForLight) {
-  for (uint32_t seed = 0; seed < 400; seed += 4) {
-    const TransportTrial without[2] = {trial(seed, 0.3f, 0, 0, false),
-                                       trial(seed + 1, 0.3f, 0, 0, false)};
-    const TransportTrial with[2] = {trial(seed + 2, 0.3f, 0.02f, 0, true),
-                                    trial(seed + 3, 0.3f, 0.02f, 0, true)};
-    EXPECT_LT(transport_gain(without, with, kSide, 1000).gain, 1) << seed;
-  }
+/// What light paths tell of the noise of camera paths, against that noise.
+TEST(CameraSquares, AreTheVarianceOfCameraPaths) {
+  // A lamp in the floor shines on a rough mirror above, and that on the floor.
+  SceneBuilder b;
+  const uint32_t floor = b.add_material(make_material(ProgramId::kDiffuse, {0.7f, 0.7f, 0.7f}));
+  const uint32_t metal = b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.9f, 0.9f}, 0.2f));
+  b.add_to_group(0, b.add_mesh(make_mesh(ground(3), floor)));
+  b.add_to_group(0, b.add_mesh(make_mesh(ground(3).transform(translate(0, 2, 0)), metal)));
+  Light lamp = make_light(LightKind::kRect, {50, 50, 50}, translate(0, 0.05f, 0) * rotate(0, 90));
+  lamp.width = lamp.height = 0.3f;
+  b.add_light(lamp);
+  b.set_camera(make_camera({0.8, 1.5, 0.8}, {0.8, 0, 0.7}, 0.5f));
+  const ScenePtr scene = b.build();
+  WavefrontRenderer renderer(scene);
+  Settings s;
+  s.width = s.height = 8;
+  s.max_depth = 2;
+  s.filter = FilterKind::kBox;
+  s.sampler = SamplerKind::kIndependent;
+  s.spp = kSanitized ? 2048 : 32'768;
+  s.error = true;
+  const Picture path = renderer.render(s);
+  double known = 0;
+  for (size_t i = 0; i < path.beauty.size(); ++i)
+    known += double{path.variance[i]} * s.spp + double{path.beauty[i]} * double{path.beauty[i]};
+  s.error = false;
+  s.transport = Transport::kLight;
+  s.aovs.bits = static_cast<uint32_t>(Aov::kByLightPaths);
+  s.spp = 1024;
+  RenderOptions options;
+  options.wants_camera_squares = true;
+  const Picture told = renderer.render(s, options);
+  double sum = 0;
+  for (const float v : layer(told, "by_light_paths").values) sum += double{v};
+  sum *= double{scene_brightness(*scene)};
+  EXPECT_GT(sum, 0.75 * known);
+  EXPECT_LT(sum, 1.1 * known);
 }
 
 TEST(FocusesLight, ByItsMaterials) {

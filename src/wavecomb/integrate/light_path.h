@@ -64,8 +64,16 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
 struct LightPathSetup {
   const CameraSetup& camera;
   const SplatFilter& filter;
-  float share;  ///< 1 / N, N as many paths as the picture has pixels
+  float share;           ///< 1 / N, N as many paths as the picture has pixels
+  float camera_squares;  ///< as WaveContext says
 };
+
+/// Of a WaveContext.
+template <typename Context>
+inline LightPathSetup light_path_setup(const Context& context) {
+  return {*context.camera, *context.splat_filter, context.light_path_share(),
+          context.camera_squares};
+}
 
 /// The time of the path of a pixel and sample: that of the camera's path, where it is connected to
 /// that.

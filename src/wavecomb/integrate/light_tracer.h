@@ -19,7 +19,7 @@ class LightTracer {
   LightTracer(const WaveContext& context, ReferenceWorker& worker)
       : context_(context),
         settings_(ShadeSettings(*context.settings).of_light_paths()),
-        setup_{*context.camera, *context.splat_filter, context.light_path_share()},
+        setup_(light_path_setup(context)),
         clock_(worker.clock),
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),

@@ -21,6 +21,12 @@
 /// it brings the path
 ///   T' f' |cos|  T f(w, l) |cos l|  |g w| / |g l|  v / d^2,
 ///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2).
+///
+/// How noisy camera paths would be that had to find a path's light alone is known without them: with
+/// c what it brings with its weight v = 1 / (1 + x), x is how dense they are over light paths, the
+/// whole of it is c (1 + x), and a camera path's sample has the second moment
+///   E[sum over light paths of (c (1 + x))^2 / x],   of which v is the part that is light paths' own:
+///   c^2 (1 + x) / x.
 #pragma once
 
 #include "wavecomb/integrate/camera_connection.h"
@@ -32,6 +38,9 @@
 namespace wavecomb {
 
 namespace detail {
+
+/// Density of camera paths over light paths below which they are as good as none.
+inline constexpr float kLeastRatio = 1e-9f;
 
 /// What a path from a light finds at a vertex: the surface, and the light's side.
 template <typename Bsdf, typename F, typename Interaction>
@@ -155,7 +164,13 @@ WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPa
   const F seen = place.turn(looker.w) * c.density;
   const F others = place.others(v.path.pdf, e.pdf) * F(seen * setup.share);
   const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
-  ask_whether_seen<F>(place, looker, c.to, Color<F>(place.flux * e.f_cos * brightness), out.v);
+  Color<F> light = place.flux * e.f_cos * brightness;
+  if (setup.camera_squares > 0.f) [[unlikely]] {
+    const F y = luminance<F>(light);
+    const F y2 = y * F(y * F(1.f / setup.camera_squares));
+    light = Color<F>(F(y2 * F(F(1.f + others) / max(others, F(kLeastRatio)))));
+  }
+  ask_whether_seen<F>(place, looker, c.to, light, out.v);
   out.x = c.x;
   out.y = c.y;
   note_shown<F>(v, place, looker);

@@ -313,8 +313,7 @@ class PathTracer {
     const PathState<F> state =
         light_path_state<F>(*context_.camera, from.d, from.throughput, from.pdf, from.eta_scale,
                             from.cone_spread, from.o, from.receiver, hit.t, rays_.time(), true);
-    const LightPathSetup setup{*context_.camera, *context_.splat_filter,
-                               context_.light_path_share()};
+    const LightPathSetup setup = light_path_setup(context_);
     VertexAovs<F> aovs;
     aovs.wants_events = light_aovs_.wants_events();
     const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](

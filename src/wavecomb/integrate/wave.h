@@ -62,6 +62,9 @@ struct WaveContext {
   const SplatFilter* splat_filter = nullptr;  ///< of paths from lights; null: there are none
   AimLessons* lessons = nullptr;  ///< gets what paths from lights bring, in the film's place
   float light_paths = 1;  ///< that start there for each of a pixel's, over the picture's pixels
+  /// Brightness over which splats bring, in place of their light, what it would add to the variance
+  /// of a pixel's samples were it left to camera paths (light_vertex.h); 0: they bring light.
+  float camera_squares = 0;
 
   /// Whether paths start at lights, too.
   bool joins_light() const { return splat_filter != nullptr; }

@@ -54,7 +54,7 @@ struct WavefrontRenderer::Impl {
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
                  LightCalibrationCache& calibrations, Watch& watch);
   /// A small picture, for choose_transport; ends where `outer` is stopped.
-  TransportTrial try_out(const Settings& settings, const Watch& outer);
+  TransportTrial try_out(const Settings& settings, bool wants_squares, const Watch& outer);
 };
 
 namespace {
@@ -169,8 +169,10 @@ const CostProfile& WavefrontRenderer::cost_profile() const {
   return impl_->profile;
 }
 
-TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, const Watch& outer) {
+TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, bool wants_squares,
+                                                const Watch& outer) {
   RenderOptions options;
+  options.wants_camera_squares = wants_squares;
   options.progress = [&](const RenderStatus&) {
     return outer.stopped() ? Request::kStop : Request::kGoOn;
   };
@@ -192,7 +194,8 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   if (settings.transport != Transport::kAuto)
     return impl_->render(settings, {}, options, impl_->light_calibrations, watch);
   const TransportChoice choice = choose_transport(
-      *impl_->scene, settings, [&](const Settings& s) { return impl_->try_out(s, watch); },
+      *impl_->scene, settings,
+      [&](const Settings& s, bool squares) { return impl_->try_out(s, squares, watch); },
       [&] { return watch.stopped(); });
   Settings chosen = settings;
   chosen.transport = choice.transport;
@@ -297,6 +300,8 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
       guide = view_of(*training);
       context.guide = &guide;
     }
+    // What is learned is learned of light.
+    if (options.wants_camera_squares) context.camera_squares = scene_brightness(scene);
     if (!watch.stopped()) {
       const std::lock_guard lock(mutex);
       learned = std::make_shared<const Learned>(

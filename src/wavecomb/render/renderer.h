@@ -67,6 +67,9 @@ struct RenderOptions {
   /// Gets the rays of the wavefront integrator; what it throws ends the render.
   RayRecorder* recorder = nullptr;
   double interval_s = 0.1;  ///< seconds between calls of progress
+  /// For trials of light paths: splats bring no light, but what it would add to the variance of a
+  /// pixel's samples were it left to camera paths, over scene_brightness() (light_vertex.h).
+  bool wants_camera_squares = false;
   /// False: the picture is empty, for who took what it needs from snapshots. A stopped render of a
   /// large picture ends sooner then.
   bool wants_picture = true;

@@ -3,9 +3,12 @@
 ///
 /// Not where they do not go with the settings or the scene, nor where no surface is clear or glossy
 /// or no light sends paths. Elsewhere a small picture of the whole view is rendered before the
-/// first pass, twice either way. With the error e of a sample and its cost c, by rays and vertices
+/// first pass, twice with light paths. How noisy it would be without them is not looked at, since
+/// what camera paths hardly find they may not meet in so few samples: light paths tell
+/// (integrate/light_vertex.h). With the errors e of a sample and its costs c, by rays and vertices
 /// at fixed costs, the efficiency of light paths to that without is
-///   e c / ((e_camera + e_light / s) (c_camera + s c_light)),
+///   (e_camera + e_left) c / ((e_camera + e_light / s) (c_camera + s c_light)),
+/// e_left that of what light paths bring, were it left to camera paths, and
 /// s how many of them there are for each camera path, a power of two.
 /// Nothing of it depends on seed, region, threads, waves or lanes; so parts of a picture, a resumed
 /// one and merged ones are rendered alike. Its samples are not in the picture.
@@ -37,7 +40,8 @@ struct TransportTrial {
   std::vector<float> by_light_paths;  ///< the part of it that light paths found; empty: none
   uint64_t rays = 0, records = 0;     ///< that it took
 };
-using RenderTrial = std::function<TransportTrial(const Settings&)>;
+/// With true, by_light_paths is RenderOptions::wants_camera_squares, over that brightness.
+using RenderTrial = std::function<TransportTrial(const Settings&, bool)>;
 
 /// Whether anything in the scene reflects or passes light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
@@ -49,12 +53,18 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
 
 // ---- for tests ----
 
-/// What trials tell of pictures without and with light paths, two of each, of `width` columns.
+/// Trials of `width` columns.
+struct TransportTrials {
+  TransportTrial without;        ///< for its cost
+  TransportTrial with[2];        ///< of two seeds
+  std::vector<double> variance;  ///< of a sample, of what is left to camera paths, by pixel
+  uint32_t width = 0;
+};
 struct TransportGain {
   double gain = 0;  ///< the best efficiency to that without
   LightPathShare share;
 };
-TransportGain transport_gain(const TransportTrial (&without)[2], const TransportTrial (&with)[2],
-                             uint32_t width, double longer);
+/// What trials tell of a render of `longer` as many samples.
+TransportGain transport_gain(const TransportTrials& trials, double longer);
 
 }  // namespace wavecomb
