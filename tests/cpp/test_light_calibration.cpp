@@ -242,7 +242,7 @@ TEST(LightParts, AreAllLightsThatShine) {
   EXPECT_EQ(parts.of(kNoLight), kNoPart);
 
   const std::vector<double> wanted{0.1, 0.2, 0.3, 0.05, 0.35};
-  const WeighedLights weighed = weigh_lights(set, set.tree, parts, wanted, {});
+  const WeighedLights weighed = LightWeigher(set, set.tree, parts).weigh(wanted, {});
   double sum = 0;
   for (size_t i = 0; i < parts.size(); ++i) {
     EXPECT_NEAR(weighed.shares[i], wanted[i], 0.01) << parts.names[i];
@@ -264,7 +264,8 @@ TEST(LightParts, TheTreeIsOne) {
   for (uint32_t i = 1; i < set.size(); ++i) EXPECT_EQ(parts.of(i), 1u);
   const NodeTilt tilt{0, 4};
   const WeighedLights weighed =
-      weigh_lights(set, scene->light_tree(1), parts, std::vector<double>{0.25, 0.75}, {&tilt, 1});
+      LightWeigher(set, scene->light_tree(1), parts)
+          .weigh(std::vector<double>{0.25, 0.75}, {&tilt, 1});
   LightView view = scene->view().lights;
   view.tree = scene->light_tree(1).view();
   const LightTreeNode before = view.tree.nodes[0];

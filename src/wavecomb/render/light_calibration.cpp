@@ -142,7 +142,8 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   std::vector<double> even(parts.size());
   for (size_t i = 0; i < parts.size(); ++i)
     even[i] = 0.5 * parts.power[i] + 0.5 / static_cast<double>(parts.size());
-  const WeighedLights first = weigh_lights(set, tree, parts, even, {});
+  LightWeigher weigher(set, tree, parts);
+  const WeighedLights first = weigher.weigh(even, {});
   SceneView probing = view;
   first.apply(probing.lights);
   const std::vector<uint32_t> pixels = spread_pixels(settings, path_count(settings));
@@ -165,7 +166,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   }
   std::vector<NodeTilt> tilts;
   if (has_nodes) tilts = balance_nodes(probing.lights.tree, probes, scales);
-  out.weighed = weigh_lights(set, tree, parts, balance.shares(parts.power), tilts);
+  out.weighed = weigher.weigh(balance.shares(parts.power), tilts);
   out.parts = std::move(parts);
   out.paths = static_cast<uint32_t>(pixels.size());
   out.tilted_nodes = static_cast<uint32_t>(tilts.size());

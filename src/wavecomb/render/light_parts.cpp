@@ -121,35 +121,6 @@ void weigh_tree(const LightSet& set, const LightTree& tree, const LightParts& pa
   }
 }
 
-/// Runs one(begin, end, part) for the lights of each part, in ranges of their numbers, ascending.
-template <typename One>
-void for_each_range(const LightSet& set, const LightParts& parts, const One& one) {
-  for (size_t i = 0; i < set.record_count; ++i)
-    if (parts.of_record[i] != kNoPart) one(i, i + 1, parts.of_record[i]);
-  for (size_t m = 0; m < parts.of_mesh.size(); ++m) {
-    const auto [begin, part] = parts.of_mesh[m];
-    const size_t end = m + 1 < parts.of_mesh.size() ? parts.of_mesh[m + 1].first : set.size();
-    if (part != kNoPart) one(begin, end, part);
-  }
-}
-
-void weigh_table(const LightSet& set, const LightParts& parts, std::span<const double> shares,
-                 WeighedLights& out) {
-  std::vector<double> weights(set.size(), 0);
-  for_each_range(set, parts, [&](size_t begin, size_t end, uint32_t part) {
-    const double factor = shares[part] / parts.power[part];
-    for (size_t i = begin; i < end; ++i) weights[i] = double{set.pick_pdf(i)} * factor;
-  });
-  std::vector<uint32_t> numbers;
-  out.pick = build_pick_table(weights, set.first_triangle(), out.pick_bins, numbers);
-  for_each_range(set, parts, [&](size_t begin, size_t end, uint32_t part) {
-    for (size_t i = begin; i < end; ++i) out.shares[part] += numbers[i] * 0x1p-24;
-  });
-  out.pick_pdf.resize(numbers.size());
-  for (size_t i = 0; i < numbers.size(); ++i)
-    out.pick_pdf[i] = static_cast<float>(numbers[i]) * 0x1p-24f;
-}
-
 }  // namespace
 
 uint32_t LightParts::of(uint32_t light) const {
@@ -196,14 +167,51 @@ void WeighedLights::apply(LightView& view) const {
   if (!nodes.empty()) view.tree.nodes = nodes.data();
 }
 
-WeighedLights weigh_lights(const LightSet& set, const LightTree& tree, const LightParts& parts,
-                           std::span<const double> shares, std::span<const NodeTilt> tilts) {
+LightWeigher::LightWeigher(const LightSet& set, const LightTree& tree, const LightParts& parts)
+    : set_(set), tree_(tree), parts_(parts) {
+  if (parts.by_tree) return;
+  for (size_t i = 0; i < set.record_count; ++i)
+    if (parts.of_record[i] != kNoPart) ranges_.push_back({i, i + 1, parts.of_record[i]});
+  for (size_t m = 0; m < parts.of_mesh.size(); ++m) {
+    const auto [begin, part] = parts.of_mesh[m];
+    const size_t end = m + 1 < parts.of_mesh.size() ? parts.of_mesh[m + 1].first : set.size();
+    if (part != kNoPart) ranges_.push_back({begin, end, part});
+  }
+  by_power_.resize(set.size());
+  weights_.assign(set.size(), 0);
+  parallel_for(ranges_.size(), [&](size_t r) {
+    for (size_t i = ranges_[r].begin; i < ranges_[r].end; ++i) by_power_[i] = set.pick_pdf(i);
+  });
+}
+
+void LightWeigher::weigh_table(std::span<const double> shares, WeighedLights& out) {
+  parallel_for(ranges_.size(), [&](size_t r) {
+    const Range& range = ranges_[r];
+    const double factor = shares[range.part] / parts_.power[range.part];
+    for (size_t i = range.begin; i < range.end; ++i)
+      weights_[i] = double{by_power_[i]} * factor;
+  });
+  out.pick = build_pick_table(weights_, set_.first_triangle(), out.pick_bins, numbers_);
+  out.pick_pdf.resize(numbers_.size());
+  std::vector<uint64_t> sums(ranges_.size(), 0);
+  parallel_for(ranges_.size(), [&](size_t r) {
+    for (size_t i = ranges_[r].begin; i < ranges_[r].end; ++i) {
+      sums[r] += numbers_[i];
+      out.pick_pdf[i] = static_cast<float>(numbers_[i]) * 0x1p-24f;
+    }
+  });
+  for (size_t r = 0; r < ranges_.size(); ++r)
+    out.shares[ranges_[r].part] += static_cast<double>(sums[r]) * 0x1p-24;
+}
+
+WeighedLights LightWeigher::weigh(std::span<const double> shares,
+                                  std::span<const NodeTilt> tilts) {
   WeighedLights out;
-  out.shares.assign(parts.size(), 0);
-  if (parts.by_tree)
-    weigh_tree(set, tree, parts, shares, tilts, out);
+  out.shares.assign(parts_.size(), 0);
+  if (parts_.by_tree)
+    weigh_tree(set_, tree_, parts_, shares, tilts, out);
   else
-    weigh_table(set, parts, shares, out);
+    weigh_table(shares, out);
   return out;
 }
 

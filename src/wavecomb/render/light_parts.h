@@ -61,10 +61,35 @@ struct WeighedLights {
   void apply(LightView& view) const;
 };
 
-/// Lights of which part i is chosen with probability shares[i] (> 0, sum 1), to within rounding to
-/// numbers of 24 bits and the floor of build_pick_table. Within a part all is as before, but for
-/// the odds at the nodes of `tilts`. `tree`: of the set, with nodes where there are tilts.
-WeighedLights weigh_lights(const LightSet& set, const LightTree& tree, const LightParts& parts,
-                           std::span<const double> shares, std::span<const NodeTilt> tilts);
+/// Gives the lights of a set other shares, any number of times.
+///
+/// Contract: what it was made of outlives it.
+class LightWeigher {
+ public:
+  /// `tree`: of the set, with nodes where there will be tilts.
+  LightWeigher(const LightSet& set, const LightTree& tree, const LightParts& parts);
+
+  /// Lights of which part i is chosen with probability shares[i] (> 0, sum 1), to within rounding to
+  /// numbers of 24 bits and the floor of build_pick_table. Within a part all is as before, but for
+  /// the odds at the nodes of `tilts`.
+  WeighedLights weigh(std::span<const double> shares, std::span<const NodeTilt> tilts);
+
+ private:
+  /// The lights of a part with numbers from begin to end.
+  struct Range {
+    size_t begin, end;
+    uint32_t part;
+  };
+  void weigh_table(std::span<const double> shares, WeighedLights& out);
+
+  const LightSet& set_;
+  const LightTree& tree_;
+  const LightParts& parts_;
+  // By power alone: ranges, what each light has there, and room for a table in the making.
+  std::vector<Range> ranges_;
+  std::vector<float> by_power_;
+  std::vector<double> weights_;
+  std::vector<uint32_t> numbers_;
+};
 
 }  // namespace wavecomb

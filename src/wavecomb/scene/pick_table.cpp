@@ -60,11 +60,13 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   for (size_t g = 0; g < 2; ++g)
     for (const double w : groups[g]) sum[g] += w / largest;
   const double total = sum[0] + sum[1];
-  const auto share = [&](double w) {
-    return w > 0
-               ? (1 - floor_share) * (w / largest / total) + floor_share / static_cast<double>(lit)
-               : 0;
-  };
+  std::vector<double> shares(n);
+  for (size_t i = 0; i < n; ++i)
+    shares[i] = weights[i] > 0 ? (1 - floor_share) * (weights[i] / largest / total) +
+                                     floor_share / static_cast<double>(lit)
+                               : 0;
+  const std::span<const double> shares_of[2] = {std::span(shares).first(first_triangle),
+                                                std::span(shares).subspan(first_triangle)};
 
   // The numbers of a group are a multiple of those of its bins, and there are bins for all its
   // lights. Few and large bins stay in the cache; 1024 for all numbers divide them well enough.
@@ -75,7 +77,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   uint32_t unit = 14;
   while (unit > 0 && least(0, unit) + least(1, unit) > kNumbers) --unit;
   double first_share = 0;
-  for (const double w : groups[0]) first_share += share(w);
+  for (const double share : shares_of[0]) first_share += share;
   const auto wanted = static_cast<uint64_t>(std::nearbyint(first_share * kNumbers)) >> unit << unit;
   table.split = static_cast<uint32_t>(std::clamp<uint64_t>(
       wanted, least(0, unit), lit_of[1] > 0 ? kNumbers - least(1, unit) : kNumbers));
@@ -89,7 +91,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     const std::span<uint32_t> counts(numbers.data() + (g == 0 ? 0 : first_triangle),
                                      groups[g].size());
     double all = 0, running = 0;
-    for (const double w : groups[g]) all += share(w);
+    for (const double share : shares_of[g]) all += share;
     // One number each, and the others by share: rounding the running sum makes the sum exact.
     const auto free = static_cast<double>(numbers_of[g] - lit_of[g]);
     const auto up_to = [&](double part) {
@@ -100,7 +102,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     for (size_t i = 0; i < counts.size(); ++i) {
       if (!(groups[g][i] > 0)) continue;
       last = i;
-      running += share(groups[g][i]);
+      running += shares_of[g][i];
       const uint32_t to = up_to(running);
       counts[i] = 1 + to - given;
       given = to;
