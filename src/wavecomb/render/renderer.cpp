@@ -47,14 +47,20 @@ struct WavefrontRenderer::Impl {
   double build_s = 0;
   RenderStatistics statistics;
   CostProfile profile;  ///< after the last render
-  LightCalibrationCache light_calibrations, trial_calibrations;
+  LightCalibrationCache light_calibrations;
   GuideTrainingCache trainings;
 
-  /// Renders with settings whose transport is chosen.
+  /// What trials before a picture share.
+  struct TrialMeans {
+    const Settings& picture;            ///< for which lights are weighed
+    std::optional<LightAiming> aiming;  ///< of the first with light paths
+  };
+  /// Renders with settings whose transport is chosen; a trial with its means.
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
-                 LightCalibrationCache& calibrations, Watch& watch);
+                 Watch& watch, TrialMeans* trial = nullptr);
   /// A small picture, for choose_transport; ends where `outer` is stopped.
-  TransportTrial try_out(const Settings& settings, bool wants_squares, const Watch& outer);
+  TransportTrial try_out(const Settings& settings, bool wants_squares, TrialMeans& means,
+                         const Watch& outer);
 };
 
 namespace {
@@ -170,7 +176,7 @@ const CostProfile& WavefrontRenderer::cost_profile() const {
 }
 
 TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, bool wants_squares,
-                                                const Watch& outer) {
+                                                TrialMeans& means, const Watch& outer) {
   RenderOptions options;
   options.wants_camera_squares = wants_squares;
   options.progress = [&](const RenderStatus&) {
@@ -178,7 +184,7 @@ TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, bool w
   };
   Watch watch(options.interval_s);
   TransportTrial trial;
-  Picture picture = render(settings, {}, options, trial_calibrations, watch);
+  Picture picture = render(settings, {}, options, watch, &means);
   trial.beauty = std::move(picture.beauty);
   for (AovLayer& layer : picture.aovs)
     if (layer.name == aov_name(Aov::kByLightPaths)) trial.by_light_paths = std::move(layer.values);
@@ -192,23 +198,24 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
   if (settings.transport != Transport::kAuto)
-    return impl_->render(settings, {}, options, impl_->light_calibrations, watch);
+    return impl_->render(settings, {}, options, watch);
+  Impl::TrialMeans means{settings, {}};
   const TransportChoice choice = choose_transport(
       *impl_->scene, settings,
-      [&](const Settings& s, bool squares) { return impl_->try_out(s, squares, watch); },
+      [&](const Settings& s, bool squares) { return impl_->try_out(s, squares, means, watch); },
       [&] { return watch.stopped(); });
   Settings chosen = settings;
   chosen.transport = choice.transport;
   if (chosen.time_limit > 0)
     chosen.time_limit = std::max(1e-6f, chosen.time_limit - static_cast<float>(choice.seconds));
-  Picture picture = impl_->render(chosen, choice.share, options, impl_->light_calibrations, watch);
+  Picture picture = impl_->render(chosen, choice.share, options, watch);
   impl_->statistics.transport = choice;
   return picture;
 }
 
 Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
-                                        const RenderOptions& options,
-                                        LightCalibrationCache& calibrations, Watch& watch) {
+                                        const RenderOptions& options, Watch& watch,
+                                        TrialMeans* trial) {
   const Scene& scene = *this->scene;
   const uint32_t lanes = choose_lanes(settings.lanes);
   const LaneKernels kernels = lane_kernels(lanes);
@@ -283,13 +290,17 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   LightAiming aiming;
   const TrainingMeans means{lanes, threads, wave_size};
   const auto work = [&] {
-    lights = &calibrations.get(this->scene, *accel, scene_view, settings,
-                               [&] { return watch.stopped(); });
+    lights = &light_calibrations.get(this->scene, *accel, scene_view,
+                                     trial ? trial->picture : settings,
+                                     [&] { return watch.stopped(); });
     lights->weighed.apply(context.scene.lights);
     if (settings.joins_light()) send_paths(scene, context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
     if (settings.joins_light() && settings.light_aim) {
-      aiming = learn_to_aim(context, scene, means, [&] { return watch.stopped(); });
+      aiming = trial && trial->aiming
+                   ? *trial->aiming
+                   : learn_to_aim(context, scene, means, [&] { return watch.stopped(); });
+      if (trial) trial->aiming = aiming;
       if (aiming.aim.count > 0) context.scene.lights.aim = &aiming.aim;
     }
     training = learned_before.empty()
@@ -305,7 +316,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     if (!watch.stopped()) {
       const std::lock_guard lock(mutex);
       learned = std::make_shared<const Learned>(
-          Learned{this->scene, scene_view.lights.by_tree, calibrations.last(), training});
+          Learned{this->scene, scene_view.lights.by_tree, light_calibrations.last(), training});
     }
     loop.run();
   };
