@@ -11,6 +11,12 @@ LightPathRefusal light_path_refusal(const Settings& s) {
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
   if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which knows no light of such paths", "none"};
+  if (s.merge_radius <= 0) return {};
+  if (s.connects()) return {"merge_radius", "merge_radius 0"};
+  if (s.keeps_error()) return {"merge_radius and errors of pixels", "merge_radius 0"};
+  for (const Aov aov : {Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
+    if (s.aovs.has(aov))
+      return {"merge_radius and parts of the light as AOVs", "merge_radius 0"};
   return {};
 }
 

@@ -103,6 +103,9 @@ struct Settings {
   /// Paths from lights go where others before the first pass have brought something
   /// (render/light_aiming.h).
   bool light_aim = true;
+  /// Pixels, within which paths from lights end at what the camera sees in mirrors and through glass
+  /// (integrate/visible_points.h); 0: they never do.
+  float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change
   std::vector<std::string> light_groups;          ///< of Aov::kLightGroups, by name; empty: all
@@ -145,6 +148,8 @@ struct Settings {
   bool joins_light() const { return transport == Transport::kLight || connects(); }
   /// Whether vertices of camera paths connect to those of paths from lights.
   bool connects() const { return transport == Transport::kBdpt; }
+  /// Whether paths from lights end at what is seen in mirrors and through glass.
+  bool merges() const { return transport == Transport::kLight && merge_radius > 0; }
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Pixels that are rendered.
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }

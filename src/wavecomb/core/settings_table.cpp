@@ -187,6 +187,10 @@ std::vector<SettingInfo> work_settings() {
           {{"off", "As lights shine, wherever that is."},
            {"on", "Mostly where some before the first pass brought light to the picture."}},
           "Where paths from lights are aimed."),
+      number<&S::merge_radius>("merge_radius", "Merge within", 0, 64,
+                               "Pixels, by which caustics that are seen in mirrors or through "
+                               "glass may be blurred so that light paths find them.",
+                               "never"),
       choice<&S::firefly>(
           "firefly", "Fireflies",
           {{"keep", "They stay: nothing is biased."},

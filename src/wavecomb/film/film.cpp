@@ -87,6 +87,7 @@ std::vector<Film::Block> Film::blocks() {
   add("errors", errors_);
   splats_.for_each_block(add);
   cascades_.for_each_block(add);
+  add("visible_points", visible_);
   return out;
 }
 
@@ -102,6 +103,7 @@ Film::Layers Film::finish(const std::vector<std::string>& many_names) && {
   release(pixels_);
   splats_ = {};
   cascades_ = {};
+  release(visible_);
   layers.deep = aovs_.take_deep(layers.samples);
   layers.albedo = aovs_.take(Aov::kAlbedo, layers.samples).values;
   layers.normal = aovs_.take(Aov::kNormal, layers.samples).values;

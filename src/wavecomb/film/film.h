@@ -48,6 +48,19 @@ class Film {
     splats_ = SplatLayer(pixels_.size(), unit, paths, scale, has_error());
     aovs_.keep_splats(unit);
   }
+  /// Keeps a row of so many words for each pixel from now on (integrate/visible_points.h).
+  static constexpr size_t kVisibleWords = 16;
+  void keep_visible_points() { visible_.assign(pixels_.size() * kVisibleWords, 0.f); }
+  bool has_visible_points() const { return !visible_.empty(); }
+  std::span<const float> visible_points() const { return visible_; }
+  float* visible_point(size_t i) { return visible_.data() + i * kVisibleWords; }
+  /// Adds a splat to a list, which goes to the film where it is full.
+  void collect(SplatList& list, const SplatList::Splat& splat) {
+    if (list.add(splat)) return;
+    splats_.add(list);
+    list.clear();
+    (void)list.add(splat);
+  }
   /// Keeps samples by brightness from now on; the beauty is then reweighted. `darkest`: the
   /// brightness of their first layer.
   void keep_cascades(float darkest) { cascades_ = Cascades(window_, darkest); }
@@ -67,7 +80,7 @@ class Film {
   /// Memory of the sums.
   size_t bytes() const {
     return pixels_.size() * sizeof(Pixel) + aovs_.bytes() + errors_.size() * sizeof(ErrorSums) +
-           splats_.bytes() + cascades_.bytes();
+           splats_.bytes() + cascades_.bytes() + visible_.size() * sizeof(float);
   }
 
   /// Means: rgb interleaved; black where a pixel has neither samples nor splats. Reweighted, where
@@ -116,6 +129,7 @@ class Film {
   std::vector<ErrorSums> errors_;
   SplatLayer splats_;  ///< empty where none are kept
   Cascades cascades_;  ///< likewise
+  std::vector<float> visible_;
 };
 
 }  // namespace wavecomb

@@ -25,7 +25,7 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> all =
       path.throughput * escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
-                                            depth == 0, path.link, path.ratio, path.time,
+                                            depth == 0, path.link, path.joined(), path.time,
                                             path.diffuse);
   const Mask<F> ok = active & is_finite(all.x) & is_finite(all.y) & is_finite(all.z);
   const float limit = clamp_limit(settings, depth);
@@ -35,7 +35,7 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
     if (!is_wanted(i)) continue;
     const Color<F> le =
         infinite_light_radiance<F>(scene.lights, i, path.o, path.dir, path.pdf, delta, active,
-                                   depth == 0, path.link, path.ratio, path.time, path.diffuse);
+                                   depth == 0, path.link, path.joined(), path.time, path.diffuse);
     add(i, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
   }
 }

@@ -7,6 +7,7 @@
 #include "wavecomb/film/splat_filter.h"
 #include "wavecomb/integrate/camera_ray.h"
 #include "wavecomb/integrate/path_state.h"
+#include "wavecomb/integrate/visible_points.h"
 #include "wavecomb/light/emission.h"
 #include "wavecomb/surface/motion.h"
 
@@ -66,13 +67,25 @@ struct LightPathSetup {
   const SplatFilter& filter;
   float share;           ///< 1 / N, N as many paths as the picture has pixels
   float camera_squares;  ///< as WaveContext says
+  const Merger* merger;  ///< null where vertices are not merged
 };
 
 /// Of a WaveContext.
 template <typename Context>
-inline LightPathSetup light_path_setup(const Context& context) {
+inline LightPathSetup light_path_setup(const Context& context, const Merger* merger = nullptr) {
   return {*context.camera, *context.splat_filter, context.light_path_share(),
-          context.camera_squares};
+          context.camera_squares, context.lessons ? nullptr : merger};
+}
+
+/// What camera paths are shaded with, beside which paths from lights may be.
+template <typename Context>
+inline ShadeSettings camera_shade_settings(const Context& context) {
+  ShadeSettings s(*context.settings);
+  if (context.merges()) {
+    s.merge_scale = context.settings->merge_radius / kConeShare;
+    s.light_paths = 1.f / context.light_path_share();
+  }
+  return s;
 }
 
 /// The time of the path of a pixel and sample: that of the camera's path, where it is connected to

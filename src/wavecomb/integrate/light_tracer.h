@@ -19,7 +19,8 @@ class LightTracer {
   LightTracer(const WaveContext& context, ReferenceWorker& worker)
       : context_(context),
         settings_(ShadeSettings(*context.settings).of_light_paths()),
-        setup_(light_path_setup(context)),
+        merger_{context.visible, &worker.splats, context.film},
+        setup_(light_path_setup(context, context.merges() ? &merger_ : nullptr)),
         clock_(worker.clock),
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
@@ -110,6 +111,7 @@ class LightTracer {
 
   const WaveContext& context_;
   const ShadeSettings settings_;
+  const Merger merger_;
   const LightPathSetup setup_;
   PhaseClock& clock_;
   Counts& counts_;

@@ -41,6 +41,8 @@ namespace detail {
 
 /// Density of camera paths over light paths below which they are as good as none.
 inline constexpr float kLeastRatio = 1e-9f;
+/// Cosine between the normals of a point and of what ends there.
+inline constexpr float kLeastAlike = 0.7f;
 
 /// What a path from a light finds at a vertex: the surface, and the light's side.
 template <typename Bsdf, typename F, typename Interaction>
@@ -145,6 +147,17 @@ WAVECOMB_INLINE void note_shown(const Vertex<F, kFeatures>& v, const Place& plac
         place.at.bsdf, looker.local, place.l);
 }
 
+/// What a splat is of, of which camera paths are `others` times as dense.
+template <typename F>
+WAVECOMB_INLINE Color<F> shown_light(const LightPathSetup& setup, const Color<F>& light,
+                                     const F& others) {
+  if (setup.camera_squares <= 0.f) [[likely]]
+    return light;
+  const F y = luminance<F>(light);
+  const F y2 = y * F(y * F(1.f / setup.camera_squares));
+  return Color<F>(F(y2 * F(F(1.f + others) / max(others, F(kLeastRatio)))));
+}
+
 /// Shows the vertex to the camera.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
@@ -164,16 +177,65 @@ WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPa
   const F seen = place.turn(looker.w) * c.density;
   const F others = place.others(v.path.pdf, e.pdf) * F(seen * setup.share);
   const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
-  Color<F> light = place.flux * e.f_cos * brightness;
-  if (setup.camera_squares > 0.f) [[unlikely]] {
-    const F y = luminance<F>(light);
-    const F y2 = y * F(y * F(1.f / setup.camera_squares));
-    light = Color<F>(F(y2 * F(F(1.f + others) / max(others, F(kLeastRatio)))));
-  }
-  ask_whether_seen<F>(place, looker, c.to, light, out.v);
+  const Color<F> light = place.flux * e.f_cos * brightness;
+  ask_whether_seen<F>(place, looker, c.to, shown_light<F>(setup, light, others), out.v);
   out.x = c.x;
   out.y = c.y;
   note_shown<F>(v, place, looker);
+}
+
+/// Ends the path at what the camera sees in mirrors and through glass near by (visible_point.h). One
+/// point of each lane at a time.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
+WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
+                           const Place& place) {
+  using U = UInt<F>;
+  constexpr size_t kLanes = kWidth<F>;
+  const auto& at = place.at;
+  const Mask<F> wanted = place.active & at.bsdf.has_non_delta();
+  if (!Bsdf::kHasNonDelta || none(wanted)) return;
+  const VisibleGrid& grid = *setup.merger->grid;
+  alignas(64) float x[kLanes], y[kLanes], z[kLanes], on[kLanes];
+  alignas(64) uint32_t pixel[kLanes] = {};
+  store(x, at.s.p.x);
+  store(y, at.s.p.y);
+  store(z, at.s.p.z);
+  store(on, select(wanted, F(1.f), F(0.f)));
+  std::array<VisibleGrid::Search, kLanes> searches;
+  for (size_t i = 0; i < kLanes; ++i)
+    if (on[i] != 0) searches[i] = VisibleGrid::Search(grid, x[i], y[i], z[i]);
+  for (;;) {
+    bool goes_on = false;
+    for (size_t i = 0; i < kLanes; ++i) {
+      on[i] = on[i] != 0 && searches[i].next(pixel[i]) ? 1.f : 0.f;
+      goes_on |= on[i] != 0;
+    }
+    if (!goes_on) return;
+    const Mask<F> found = load<F>(on) > 0.f;
+    const U index = load<U>(pixel);
+    const auto point = load_row<VisiblePoint, F>(grid.points(), index, found);
+    const Vec3<F> local = place.frame.to_local(point.w);
+    const F turned = abs(dot(at.s.ng, unpack_normal<F>(point.normal)));
+    const Mask<F> sees = found & at.is_consistent(point.w, local) & (turned > kLeastAlike) &
+                         not_(at.bends(v, place.frame, -point.w)) &
+                         Mask<F>(point.depth + (v.depth + 1u) <= U(v.settings.max_depth));
+    if (none(sees)) continue;
+    const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(local), place.l);
+    const F area = F(point.radius * point.radius) * kPi;
+    const F seen = place.inverse_cos / select(sees, area, F(1.f));
+    const F others = place.others(v.path.pdf, e.pdf) * F(seen * setup.share);
+    const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
+    const Color<F> light = place.flux * e.f_cos * point.light * brightness;
+    const Color<F> shown =
+        select<F>(sees, clean<F>(shown_light<F>(setup, light, others), 0.f), Color<F>(F(0.f)));
+    alignas(64) float r[kLanes], g[kLanes], b[kLanes];
+    store(r, shown.x);
+    store(g, shown.y);
+    store(b, shown.z);
+    for (size_t i = 0; i < kLanes; ++i)
+      if (on[i] != 0 && (r[i] > 0 || g[i] > 0 || b[i] > 0))
+        setup.merger->film->collect(*setup.merger->splats, {pixel[i], r[i], g[i], b[i]});
+  }
 }
 
 /// Shows the vertex to that of a camera path.
@@ -270,6 +332,8 @@ WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   detail::show_to_camera<Bsdf, F>(v, setup, place, r_light, out);
+  if (setup.merger) [[unlikely]]
+    detail::merge<Bsdf, F>(v, setup, place);
   if (v.depth + 1 >= v.settings.max_depth) return out;
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));

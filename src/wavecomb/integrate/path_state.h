@@ -9,6 +9,7 @@
 #include "wavecomb/core/vec.h"
 #include "wavecomb/integrate/features.h"
 #include "wavecomb/integrate/light_vertices.h"
+#include "wavecomb/integrate/visible_point.h"
 #include "wavecomb/learn/guide_view.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/surface/hit.h"
@@ -30,6 +31,9 @@ struct ShadeSettings {
   bool filters_textures_whole;
   bool shows_sky;  ///< to the camera itself: domes and distant lights
   bool connects;   ///< vertices of camera paths and of paths from lights, where those are joined
+  /// Radius within which vertices are merged, over the width of a path's cone; 0: none are.
+  float merge_scale = 0;
+  float light_paths = 0;  ///< that a sample has, where vertices are merged
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -69,8 +73,9 @@ struct PathState {
   UInt<F> receiver;   ///< LightReceiver::normal of the vertex before
   UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
   F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
-  F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one. Of a path from
-                      ///< a light: density of the bounce before, 0 where it was none to connect to
+  F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one; less: only
+                      ///< deltas so far, which merging waits behind. Of a path from a light:
+                      ///< density of the bounce before, 0 where it was none to connect to
   // Where paths know what they are inside of (InsideRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< what collides, by material
@@ -78,6 +83,8 @@ struct PathState {
   /// Share of what the bounce before scatters that is diffuse, where lights have multipliers.
   Color<F> diffuse{F(0.f)};
 
+  /// How dense paths from lights are over this one.
+  F joined() const { return max(ratio, F(0.f)); }
   LightReceiver<F> vertex_before() const {
     LightReceiver<F> from(o, receiver);
     from.time = time;
@@ -198,6 +205,7 @@ struct Vertex {
   const Mask<F>& active;
   const GuideView* guide = nullptr;     ///< the field that guides bounces, or is to be learned
   ConnectionOffer<F>* offer = nullptr;  ///< null where nothing is connected; of joint kernels
+  VisibleOffer<F>* visible = nullptr;   ///< null where nothing is merged; of joint kernels
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// What AOVs are to be given; null where nothing is.

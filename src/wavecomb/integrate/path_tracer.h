@@ -30,14 +30,15 @@ class PathTracer {
   PathTracer(const WaveContext& context, ReferenceWorker& worker, const Media& media)
       : context_(context),
         media_(media),
-        settings_(*context.settings),
+        settings_(camera_shade_settings(context)),
         clock_(worker.clock),
         counts_(worker.counts),
         rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),
         history_(worker.history),
         light_aovs_(worker.light_aovs),
-        vertices_(worker.light_vertices) {}
+        vertices_(worker.light_vertices),
+        visible_(worker.visible) {}
 
   /// Radiance of the path of a task of one, as the camera's exposure shows it; what else it found
   /// is in the AOVs' slot 0.
@@ -45,6 +46,7 @@ class PathTracer {
     aovs_.clear(1);
     history_.clear(1);
     radiance_ = {};
+    if (visible_) visible_.clear(1);
     const uint32_t last = trace_path(*task.pixels, task.first_sample);
     aovs_.end_path(last, radiance(), 1);
     if (history_) context_.histories->ended(history_, radiance(), task);
@@ -289,9 +291,13 @@ class PathTracer {
     if constexpr (!Media::kAny)
       if (context_.joins_light()) {
         if (vertices_) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
-        return kShadeJointVertex<F>[scene.material_program[material]](
+        VisibleOffer<F> visible;
+        const VertexResult<F> v = kShadeJointVertex<F>[scene.material_program[material]](
             {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
-             context_.guide, vertices_ ? &offer_ : nullptr});
+             context_.guide, vertices_ ? &offer_ : nullptr, visible_ ? &visible : nullptr});
+        if (visible.seen)
+          store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
+        return v;
       }
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
     return kernels[scene.material_program[material]]({scene, settings_, key, depth, mesh_hit,
@@ -345,6 +351,7 @@ class PathTracer {
   PathHistory& history_;
   LightPathAovs& light_aovs_;
   LightVertices& vertices_;   ///< that of the path from the light, where it is connected
+  const VisibleRows& visible_;  ///< the point that the path leaves
   ConnectionOffer<F> offer_;  ///< of the vertex, with it
   RadianceRow<F> radiance_;
   InsideRow<F> inside_{};         ///< where paths know what they are inside of

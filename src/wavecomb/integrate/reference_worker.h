@@ -15,6 +15,7 @@ struct ReferenceWorker {
         history(1, context.kept_vertices()),
         splats(context.joins_light() ? Wave::kSplats : 0),
         light_vertices(context.connects() ? 1 : 0),
+        visible(context.merges() ? 1 : 0),
         light_aovs(context.joins_light() ? LightPathAovs(1, context.film->aovs().layout(),
                                                          context.aovs, context.connects())
                                          : LightPathAovs()),
@@ -27,6 +28,7 @@ struct ReferenceWorker {
   PathHistory history;
   SplatList splats;  ///< of paths from lights
   LightVertices light_vertices;
+  VisibleRows visible;
   LightPathAovs light_aovs;
   SoaBlock walks;  ///< below surfaces
   InteriorBuffers interiors;

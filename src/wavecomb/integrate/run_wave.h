@@ -29,7 +29,7 @@ struct CameraPaths {
   /// hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
   static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
   static ShadeSettings settings(const WaveContext& context) {
-    return ShadeSettings(*context.settings);
+    return camera_shade_settings(context);
   }
   void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                uint32_t depth) const {
@@ -86,8 +86,12 @@ struct LightPaths {
   }
   static void connect(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
   static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
-  static void resolve(Wave& /*wave*/, const WaveContext& context, const WaveTask& its_task,
+  static void resolve(Wave& wave, const WaveContext& context, const WaveTask& its_task,
                       uint32_t /*depth*/) {
+    if (context.merges()) {
+      context.film->splats().add(wave.splats);
+      wave.splats.clear();
+    }
     count_light_paths(context, its_task);
   }
 };

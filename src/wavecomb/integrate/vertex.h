@@ -65,6 +65,9 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   JointVertex<F> joint{};
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     joint = joint_vertex<Bsdf, F>(v, at, frame);
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+    if (v.visible) [[unlikely]]
+      leave_point<F>(v, at, joint);
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));

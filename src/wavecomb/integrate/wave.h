@@ -21,6 +21,7 @@
 #include "wavecomb/integrate/path_aovs.h"
 #include "wavecomb/integrate/path_history.h"
 #include "wavecomb/integrate/path_pool.h"
+#include "wavecomb/integrate/visible_points.h"
 #include "wavecomb/integrate/phase_clock.h"
 #include "wavecomb/integrate/ray_recorder.h"
 #include "wavecomb/integrate/shading_record.h"
@@ -66,6 +67,10 @@ struct WaveContext {
   /// of a pixel's samples were it left to camera paths (light_vertex.h); 0: they bring light.
   float camera_squares = 0;
 
+  const VisibleGrid* visible = nullptr;  ///< whom paths from lights are merged with; null: nobody
+
+  /// Whether they are.
+  bool merges() const { return visible != nullptr; }
   /// Whether paths start at lights, too.
   bool joins_light() const { return splat_filter != nullptr; }
   /// Whether vertices of camera paths connect to theirs.
@@ -124,6 +129,7 @@ struct Wave {
         ray_chooser(kRayOrders),
         shadow_chooser(kRayOrders),
         light_vertices(context.connects() ? capacity : 0),
+        visible(context.merges() ? capacity : 0),
         light_aovs(context.joins_light() ? LightPathAovs(capacity, context.film->aovs().layout(),
                                                          context.aovs, context.connects())
                                          : LightPathAovs()) {}
@@ -154,6 +160,7 @@ struct Wave {
   PhaseClock clock;
   Counts counts;
   LightVertices light_vertices;
+  VisibleRows visible;
   LightPathAovs light_aovs;  ///< of paths from lights
   /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
   /// connected to the vertices of camera paths in their slots.
@@ -163,7 +170,7 @@ struct Wave {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +
            shading.bytes() + shadows.bytes() + columns.bytes() + times.bytes() + walks.bytes() +
            ways.bytes() + interiors.bytes() + splats.bytes() + light_vertices.bytes() +
-           light_aovs.bytes();
+           visible.bytes() + light_aovs.bytes();
   }
 };
 

@@ -12,7 +12,7 @@ namespace wavecomb {
 
 PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
                    LightPathShare light_share, Film& film, PassRunner& runner, RenderCosts& costs,
-                   Watch& watch)
+                   Watch& watch, std::function<void()> before_lights)
     : settings_(settings),
       rules_{settings.spp, settings.min_spp,     settings.is_adaptive(), settings.time_limit > 0,
              step,         settings.progressive, pilot_samples(settings)},
@@ -22,6 +22,7 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
       runner_(runner),
       costs_(costs),
       watch_(watch),
+      before_lights_(std::move(before_lights)),
       order_(morton_pixel_order(settings.rendered())) {
   if (!pass_.allotment.counts.empty()) {
     const auto& counts = pass_.allotment.counts;
@@ -72,7 +73,10 @@ void PassLoop::run() {
     const double begin = seconds();
     const auto halted = [this] { return watch_.halted() || is_late(); };
     runner_.run(plan, halted);
-    if (!from_lights.batches.empty()) runner_.run(from_lights, halted, true);
+    if (!from_lights.batches.empty()) {
+      if (before_lights_) before_lights_();
+      runner_.run(from_lights, halted, true);
+    }
     film_.note_light_paths();
     samples_per_s_ =
         static_cast<double>(runner_.samples_done() - before) / std::max(1e-9, seconds() - begin);

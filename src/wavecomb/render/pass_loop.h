@@ -38,8 +38,11 @@ class PassLoop {
  public:
   /// `pass`: of the film, where it comes from a checkpoint. `step`: samples a pixel that a pass of
   /// a render that is not adaptive adds. `light_share`: of paths from lights, where there are any.
+  /// `before_lights`: called before the paths of a pass that start at lights, after the others; or
+  /// null.
   PassLoop(const Settings& settings, uint32_t step, PassState pass, LightPathShare light_share,
-           Film& film, PassRunner& runner, RenderCosts& costs, Watch& watch);
+           Film& film, PassRunner& runner, RenderCosts& costs, Watch& watch,
+           std::function<void()> before_lights = nullptr);
 
   void run();
   RenderStatus status() const;
@@ -63,6 +66,7 @@ class PassLoop {
   PassRunner& runner_;
   RenderCosts& costs_;
   Watch& watch_;
+  std::function<void()> before_lights_;
   std::vector<uint32_t> order_;
   std::vector<uint32_t> light_order_;  ///< of the numbers of paths from lights
   AllotmentFacts allotment_;

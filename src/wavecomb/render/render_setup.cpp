@@ -28,6 +28,8 @@ uint32_t wave_size_for(const Settings& settings, uint64_t pixels) {
 }
 
 uint32_t pass_step(const Settings& settings, uint64_t pixels, uint32_t wave_size) {
+  // One sample of a pixel is seen in mirrors at a time.
+  if (settings.merges()) return 1;
   const auto fill = static_cast<uint32_t>((wave_size + pixels - 1) / pixels);
   return std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});
 }

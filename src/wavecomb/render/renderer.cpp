@@ -245,6 +245,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
     film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
                      double{light_share.paths()});
   }
+  if (settings.merges()) film.keep_visible_points();
   if (settings.firefly == Firefly::kReweight)
     film.keep_cascades(scene_brightness(scene) * kDarkestShare);
   PassState pass;
@@ -275,13 +276,17 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
       &aovs};
 
   if (settings.joins_light()) context.splat_filter = &splat_filter;
+  VisibleGrid visible;
+  if (settings.merges()) context.visible = &visible;
   context.light_paths = light_share.paths();
   const Clock::time_point start = Clock::now();
   const std::unique_ptr<Integrator> integrator =
       make_integrator(settings.integrator, context, lanes, threads, wave_size);
   PassRunner runner(*integrator, threads, wave_size);
   PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), light_share,
-                film, runner, costs, watch);
+                film, runner, costs, watch, [&] {
+                  if (settings.merges()) visible.build(film.visible_points());
+                });
   const LightCalibration* lights = nullptr;
   std::vector<std::string> without_paths;
   if (settings.joins_light()) without_paths = lights_without_paths(scene);

@@ -19,7 +19,8 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
   const CameraSetup& camera = *context.camera;
   const LightVertices& vertices = wave.light_vertices;
   const bool connects = wave.light_use == Wave::LightUse::kConnect;
-  const LightPathSetup setup = light_path_setup(context);
+  const Merger merger{context.visible, &wave.splats, context.film};
+  const LightPathSetup setup = light_path_setup(context, context.merges() ? &merger : nullptr);
   VertexAovs<F> aovs;
   aovs.wants_events = wave.light_aovs.wants_events();
   for (size_t i = begin; i < end; i += kWidth<F>) {

@@ -16,10 +16,7 @@ inline void add_splat(const WaveContext& context, SplatList& list, uint32_t samp
   context.splat_filter->spread(film, x, y, [&](size_t pixel, float weight) {
     const SplatList::Splat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
                                  c.z * weight, SplatLayer::is_in_half(sample)};
-    if (list.add(splat)) return;
-    film.splats().add(list);
-    list.clear();
-    (void)list.add(splat);
+    film.collect(list, splat);
   });
 }
 

@@ -43,7 +43,7 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
   if (scene.lights.sends_paths()) [[unlikely]]
     w = joint_bounce_weight<F>(
         path.pdf, hit.pdf, not_(Mask<F>(path.pdf > 0.f)),
-        F(path.ratio * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
+        F(path.joined() * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
   if (scene.lights.has_effects) [[unlikely]]
     hit.radiance = hit.radiance * LightEffect<F>(scene.lights, light, active)
                                       .of_hit(not_(path.pdf > 0.f), depth == 0, path.diffuse);
@@ -60,7 +60,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le =
       escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active, depth == 0,
-                          path.link, path.ratio, path.time, path.diffuse);
+                          path.link, path.joined(), path.time, path.diffuse);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
@@ -98,7 +98,7 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
       const F density =
           emission_density<F>(scene.lights, base + v.hit.prim, v.path.o, v.path.dir, v.t, known);
       w = joint_bounce_weight<F>(v.path.pdf, light_pdf, not_(Mask<F>(v.path.pdf > 0.f)),
-                                 F(v.path.ratio * density));
+                                 F(v.path.joined() * density));
     }
   }
   const Color<F> e = clean<F>(at.throughput * emission * w, clamp_limit(v.settings, v.depth));

@@ -19,6 +19,9 @@
 /// x_i+1, of which each has, beside what it shares with R,
 ///   E_i = d^2 / p->_i   (d their distance)   in place of   p<-_i+1  and all that R has before:
 ///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
+/// Where vertices are merged, paths whose bounces were all deltas have another third technique: one
+/// that ends within r of x_k, the first vertex behind them that scatters otherwise, too. It begins
+/// with pi r^2 in place of 1 / (G |g w_k|). The bounce at x_k, if a delta, ends it.
 /// E is 0 where either of the two scatters as a delta, where x_i+1 is none that paths from lights
 /// go to, and where it is looked at out of what absorbs.
 #pragma once
@@ -45,6 +48,8 @@ struct JointVertex {
   F ratio;
   F inverse_cos;  ///< 1 / |g w|
   F linked;       ///< E of the vertex before and this one
+  Mask<F> merges;  ///< lanes where paths from lights may end (visible_point.h)
+  F radius2;       ///< within this distance, squared
 
   /// R with this vertex for a direction `world` to the light, `local` in the frame, which light
   /// samples or bounces take with density 1: p<- |g l| / |g w|.
@@ -53,7 +58,10 @@ struct JointVertex {
                             const Vec3<F>& world, const Vec3<F>& local) const {
     const F turn = abs(dot(at.s.ng, world)) * inverse_cos;
     F r = ratio * turn;
-    if (v.depth > 0) r *= at.bsdf.eval(at.bsdf.view(local), wo).pdf;
+    if (v.depth > 0) {
+      const F back = at.bsdf.eval(at.bsdf.view(local), wo).pdf;
+      r *= select(merges, F(1.f), back);
+    }
     return v.settings.connects ? fma(linked, turn, r) : r;
   }
 };
@@ -61,7 +69,7 @@ struct JointVertex {
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const Interaction& at,
                                             const Frame<F>& frame) {
-  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f), F(0.f)};
+  if constexpr (Bsdf::kOnFibre) return {F(0.f), F(0.f), F(0.f), Mask<F>(false), F(0.f)};
   const Vec3<F>& dir = v.path.dir;
   const F seen = dot(at.s.ng, dir);
   const Frame<F> unbent = at.unbent_frame(v);
@@ -76,8 +84,30 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
   }
   // Who looks out of what absorbs: paths from lights do not know how far it is.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
-  return {select(reached, v.path.ratio, F(0.f)), F(1.f / select(seen != 0.f, abs(seen), F(1.f))),
-          min(linked, F(kMostRatio))};
+  JointVertex<F> joint{select(reached, v.path.joined(), F(0.f)),
+                       F(1.f / select(seen != 0.f, abs(seen), F(1.f))),
+                       min(linked, F(kMostRatio)), Mask<F>(false), F(0.f)};
+  if (v.settings.merge_scale > 0.f) [[unlikely]] {
+    const F radius = v.path.cone_width * v.settings.merge_scale;
+    joint.radius2 = radius * radius;
+    joint.merges = reached & (v.path.ratio < 0.f) & (joint.radius2 > 0.f);
+    if constexpr (Bsdf::kHasNonDelta)
+      joint.merges = joint.merges & at.bsdf.has_non_delta();
+    else
+      joint.merges = Mask<F>(false);
+    joint.ratio = select(joint.merges, F(joint.radius2 * F(abs(seen) * (kPi * v.settings.light_paths))),
+                         joint.ratio);
+  }
+  return joint;
+}
+
+/// Leaves a point where paths from lights may end.
+template <typename F, uint32_t kFeatures, typename Interaction>
+WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interaction& at,
+                                 const JointVertex<F>& joint) {
+  v.visible->seen = v.active & joint.merges;
+  v.visible->row = {at.s.p,        sqrt(joint.radius2),     -v.path.dir,
+                    pack_normal<F>(at.s.ng), clean<F>(at.throughput, 0.f), UInt<F>(v.depth)};
 }
 
 /// What the vertex offers to one of a path from a light: with w its direction there, all that
@@ -118,6 +148,13 @@ WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& a
                  F(abs(wo.z) / select(z > 0.f, z, F(1.f)));
     by_angle = select(passes_one_way<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
+    r = min(max(r, F(0.f)), F(kMostRatio));
+    if (v.settings.merge_scale > 0.f) [[unlikely]] {
+      const Mask<F> waits =
+          v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & (v.path.ratio < 0.f));
+      r = select(waits & not_(joint.merges), F(-1.f), select(b.is_delta & joint.merges, F(0.f), r));
+    }
+    return r;
   }
   return min(max(r, F(0.f)), F(kMostRatio));
 }
