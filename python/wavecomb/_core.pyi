@@ -620,6 +620,9 @@ class Settings:
     """Where paths begin. Default: path."""
     light_aim: Literal["off", "on"]
     """Where paths from lights are aimed. Default: on."""
+    merge_radius: float
+    """Pixels, by which caustics that are seen in mirrors or through glass may be blurred so that
+    light paths find them. Default: never. 0: never."""
     firefly: Literal["keep", "reweight"]
     """What becomes of samples much brighter than others. Default: keep."""
     roulette_depth: int

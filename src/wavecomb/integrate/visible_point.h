@@ -6,7 +6,7 @@
 /// scatters otherwise, too, leaves a point there: T Le of all that light does there is what its
 /// pixel sees. No path from a light can be shown to the camera through a mirror; but one whose
 /// vertex lies within r of the point, r a share of a pixel as it is seen there, is taken to end at
-/// the point. Such points are the eye's, as in progressive photon mapping (T. Hachisuka et al. 2008),
+/// the point. Such points are the eye's (T. Hachisuka et al., "Progressive Photon Mapping", 2008),
 /// and light is splatted to their pixels: sums of integers, whatever the order.
 ///
 /// A pass has one sample of each pixel, which leaves one point at most; paths from lights come
