@@ -182,8 +182,7 @@ class Making {
   using Values = std::array<Value, kBrickVoxels>;
   using Mask = openvdb::util::NodeMask<3>;
 
-  [[gnu::noinline]] explicit Making(const Value& background)
-      : grid_(Grid::create(background)) {}
+  [[gnu::noinline]] explicit Making(const Value& background) : grid_(Grid::create(background)) {}
   [[gnu::noinline]] void add_tile(int level, const openvdb::Coord& xyz, const Value& value) {
     grid_->tree().addTile(level, xyz, value, true);
   }

@@ -263,9 +263,8 @@ TEST(LightParts, TheTreeIsOne) {
   EXPECT_EQ(parts.of(0), 0u);
   for (uint32_t i = 1; i < set.size(); ++i) EXPECT_EQ(parts.of(i), 1u);
   const NodeTilt tilt{0, 4};
-  const WeighedLights weighed =
-      LightWeigher(set, scene->light_tree(1), parts)
-          .weigh(std::vector<double>{0.25, 0.75}, {&tilt, 1});
+  const WeighedLights weighed = LightWeigher(set, scene->light_tree(1), parts)
+                                    .weigh(std::vector<double>{0.25, 0.75}, {&tilt, 1});
   LightView view = scene->view().lights;
   view.tree = scene->light_tree(1).view();
   const LightTreeNode before = view.tree.nodes[0];

@@ -84,15 +84,13 @@ TEST(LightChoice, IsAsOftenAsStated) {
     const LightView power = lights.view(), tree = by_tree(lights);
     const LightParts table_parts = parts_of(lights.set, false),
                      tree_parts = parts_of(lights.set, true);
-    const WeighedLights table =
-        LightWeigher(lights.set, lights.set.tree, table_parts)
-            .weigh(odd_shares(table_parts.size()), {});
+    const WeighedLights table = LightWeigher(lights.set, lights.set.tree, table_parts)
+                                    .weigh(odd_shares(table_parts.size()), {});
     std::vector<NodeTilt> tilts;
     for (uint32_t i = 0; i < std::min<size_t>(lights.set.tree.nodes.size(), 40); i += 3)
       tilts.push_back({i, i % 2 ? 6.f : 0.2f});
-    const WeighedLights tilted =
-        LightWeigher(lights.set, lights.set.tree, tree_parts)
-            .weigh(odd_shares(tree_parts.size()), tilts);
+    const WeighedLights tilted = LightWeigher(lights.set, lights.set.tree, tree_parts)
+                                     .weigh(odd_shares(tree_parts.size()), tilts);
     LightView calibrated = power, calibrated_tree = tree;
     table.apply(calibrated);
     tilted.apply(calibrated_tree);

@@ -85,7 +85,8 @@ TEST(CameraSquares, AreTheVarianceOfCameraPaths) {
   const uint32_t metal = b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.9f, 0.9f}, 0.2f));
   b.add_to_group(0, b.add_mesh(make_mesh(ground(3), floor)));
   b.add_to_group(0, b.add_mesh(make_mesh(ground(3).transform(translate(0, 2, 0)), metal)));
-  Light lamp = make_light(LightKind::kRect, {500, 500, 500}, translate(0, 0.05f, 0) * rotate(0, 90));
+  Light lamp =
+      make_light(LightKind::kRect, {500, 500, 500}, translate(0, 0.05f, 0) * rotate(0, 90));
   lamp.width = lamp.height = 0.1f;
   b.add_light(lamp);
   b.set_camera(make_camera({0.8, 1.5, 0.8}, {0.8, 0, 0.7}, 0.5f));

@@ -15,8 +15,7 @@ LightPathRefusal light_path_refusal(const Settings& s) {
   if (s.connects()) return {"merge_radius", "merge_radius 0"};
   if (s.keeps_error()) return {"merge_radius and errors of pixels", "merge_radius 0"};
   for (const Aov aov : {Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
-    if (s.aovs.has(aov))
-      return {"merge_radius and parts of the light as AOVs", "merge_radius 0"};
+    if (s.aovs.has(aov)) return {"merge_radius and parts of the light as AOVs", "merge_radius 0"};
   return {};
 }
 

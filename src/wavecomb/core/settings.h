@@ -103,8 +103,8 @@ struct Settings {
   /// Paths from lights go where others before the first pass have brought something
   /// (render/light_aiming.h).
   bool light_aim = true;
-  /// Pixels, within which paths from lights end at what the camera sees in mirrors and through glass
-  /// (integrate/visible_points.h); 0: they never do.
+  /// Pixels, within which paths from lights end at what the camera sees in mirrors and through
+  /// glass (integrate/visible_points.h); 0: they never do.
   float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
   AovSet aovs;  ///< to be kept beside the beauty, which they do not change

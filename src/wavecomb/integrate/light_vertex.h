@@ -22,11 +22,11 @@
 ///   T' f' |cos|  T f(w, l) |cos l|  |g w| / |g l|  v / d^2,
 ///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2).
 ///
-/// How noisy camera paths would be that had to find a path's light alone is known without them: with
-/// c what it brings with its weight v = 1 / (1 + x), x is how dense they are over light paths, the
-/// whole of it is c (1 + x), and a camera path's sample has the second moment
-///   E[sum over light paths of (c (1 + x))^2 / x],   of which v is the part that is light paths' own:
-///   c^2 (1 + x) / x.
+/// How noisy camera paths would be that had to find a path's light alone is known without them:
+/// with c what it brings with its weight v = 1 / (1 + x), x is how dense they are over light paths,
+/// the whole of it is c (1 + x), and a camera path's sample has the second moment
+///   E[sum over light paths of (c (1 + x))^2 / x],   of which v is the part that is light paths'
+///   own: c^2 (1 + x) / x.
 #pragma once
 
 #include "wavecomb/integrate/camera_connection.h"
@@ -184,8 +184,8 @@ WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPa
   note_shown<F>(v, place, looker);
 }
 
-/// Ends the path at what the camera sees in mirrors and through glass near by (visible_point.h). One
-/// point of each lane at a time.
+/// Ends the path at what the camera sees in mirrors and through glass near by (visible_point.h).
+/// One point of each lane at a time.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                            const Place& place) {

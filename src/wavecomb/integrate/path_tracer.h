@@ -295,8 +295,7 @@ class PathTracer {
         const VertexResult<F> v = kShadeJointVertex<F>[scene.material_program[material]](
             {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
              context_.guide, vertices_ ? &offer_ : nullptr, visible_ ? &visible : nullptr});
-        if (visible.seen)
-          store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
+        if (visible.seen) store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
         return v;
       }
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
@@ -350,9 +349,9 @@ class PathTracer {
   PathAovs& aovs_;
   PathHistory& history_;
   LightPathAovs& light_aovs_;
-  LightVertices& vertices_;   ///< that of the path from the light, where it is connected
+  LightVertices& vertices_;     ///< that of the path from the light, where it is connected
   const VisibleRows& visible_;  ///< the point that the path leaves
-  ConnectionOffer<F> offer_;  ///< of the vertex, with it
+  ConnectionOffer<F> offer_;    ///< of the vertex, with it
   RadianceRow<F> radiance_;
   InsideRow<F> inside_{};         ///< where paths know what they are inside of
   std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted

@@ -23,11 +23,11 @@ namespace wavecomb {
 template <typename F>
 struct VisiblePoint {
   Vec3<F> p;
-  F radius;          ///< 0: there is none
-  Vec3<F> w;         ///< unit, to where it is seen from
-  UInt<F> normal;    ///< pack_normal of the geometric one
-  Color<F> light;    ///< of the pixel, for a unit of radiance along w, before the exposure
-  UInt<F> depth;     ///< vertices of the camera's path before it
+  F radius;        ///< 0: there is none
+  Vec3<F> w;       ///< unit, to where it is seen from
+  UInt<F> normal;  ///< pack_normal of the geometric one
+  Color<F> light;  ///< of the pixel, for a unit of radiance along w, before the exposure
+  UInt<F> depth;   ///< vertices of the camera's path before it
   WAVECOMB_FIELDS(p, radius, w, normal, light, depth)
 };
 inline constexpr size_t kVisibleWords = kRowWords<VisiblePoint>;
@@ -51,9 +51,7 @@ class VisibleRows {
   explicit operator bool() const { return rows != nullptr; }
   size_t bytes() const { return block_.bytes(); }
   /// Forgets the points of slots below `slots`.
-  void clear(size_t slots) const {
-    std::memset(rows, 0, slots * kVisibleWords * sizeof(float));
-  }
+  void clear(size_t slots) const { std::memset(rows, 0, slots * kVisibleWords * sizeof(float)); }
   const float* row(size_t slot) const { return rows + slot * kVisibleWords; }
 
  private:

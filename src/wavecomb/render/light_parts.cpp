@@ -188,8 +188,7 @@ void LightWeigher::weigh_table(std::span<const double> shares, WeighedLights& ou
   parallel_for(ranges_.size(), [&](size_t r) {
     const Range& range = ranges_[r];
     const double factor = shares[range.part] / parts_.power[range.part];
-    for (size_t i = range.begin; i < range.end; ++i)
-      weights_[i] = double{by_power_[i]} * factor;
+    for (size_t i = range.begin; i < range.end; ++i) weights_[i] = double{by_power_[i]} * factor;
   });
   out.pick = build_pick_table(weights_, set_.first_triangle(), out.pick_bins, numbers_);
   out.pick_pdf.resize(numbers_.size());
@@ -204,8 +203,7 @@ void LightWeigher::weigh_table(std::span<const double> shares, WeighedLights& ou
     out.shares[ranges_[r].part] += static_cast<double>(sums[r]) * 0x1p-24;
 }
 
-WeighedLights LightWeigher::weigh(std::span<const double> shares,
-                                  std::span<const NodeTilt> tilts) {
+WeighedLights LightWeigher::weigh(std::span<const double> shares, std::span<const NodeTilt> tilts) {
   WeighedLights out;
   out.shares.assign(parts_.size(), 0);
   if (parts_.by_tree)

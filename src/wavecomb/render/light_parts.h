@@ -69,9 +69,9 @@ class LightWeigher {
   /// `tree`: of the set, with nodes where there will be tilts.
   LightWeigher(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
-  /// Lights of which part i is chosen with probability shares[i] (> 0, sum 1), to within rounding to
-  /// numbers of 24 bits and the floor of build_pick_table. Within a part all is as before, but for
-  /// the odds at the nodes of `tilts`.
+  /// Lights of which part i is chosen with probability shares[i] (> 0, sum 1), to within rounding
+  /// to numbers of 24 bits and the floor of build_pick_table. Within a part all is as before, but
+  /// for the odds at the nodes of `tilts`.
   WeighedLights weigh(std::span<const double> shares, std::span<const NodeTilt> tilts);
 
  private:

@@ -197,8 +197,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   settings.check();
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
-  if (settings.transport != Transport::kAuto)
-    return impl_->render(settings, {}, options, watch);
+  if (settings.transport != Transport::kAuto) return impl_->render(settings, {}, options, watch);
   Impl::TrialMeans means{settings, {}};
   const TransportChoice choice = choose_transport(
       *impl_->scene, settings,
@@ -295,9 +294,9 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   LightAiming aiming;
   const TrainingMeans means{lanes, threads, wave_size};
   const auto work = [&] {
-    lights = &light_calibrations.get(this->scene, *accel, scene_view,
-                                     trial ? trial->picture : settings,
-                                     [&] { return watch.stopped(); });
+    lights =
+        &light_calibrations.get(this->scene, *accel, scene_view, trial ? trial->picture : settings,
+                                [&] { return watch.stopped(); });
     lights->weighed.apply(context.scene.lights);
     if (settings.joins_light()) send_paths(scene, context.scene.lights);
     costs.start(context, kernels, options.profile, [&] { return watch.halted(); });

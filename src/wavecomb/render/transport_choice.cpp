@@ -16,8 +16,8 @@ namespace {
 /// picture, and pixels of it at least and at most.
 constexpr uint32_t kTransportSamples = 8;
 constexpr uint64_t kLeastTransportPixels = 576, kMostTransportPixels = 16'384;
-/// Of the samples of a render, a trial has a pixel's: four pictures, of which three cost three times
-/// as much, are then a fiftieth of the render at most.
+/// Of the samples of a render, a trial has a pixel's: four pictures, of which three cost three
+/// times as much, are then a fiftieth of the render at most.
 constexpr uint64_t kTransportShare = 500;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
 /// Cost of a vertex in rays, and of one whose kernels know of light paths, for which there are no
@@ -98,8 +98,7 @@ TransportGain transport_gain(const TransportTrials& trials, double longer) {
   }
   const double path_cost = cost_of(trials.without, kPathVertex);
   const double camera_cost = cost_of(trials.without, kJointVertex);
-  const double joint_cost =
-      0.5 * (cost_of(with[0], kJointVertex) + cost_of(with[1], kJointVertex));
+  const double joint_cost = 0.5 * (cost_of(with[0], kJointVertex) + cost_of(with[1], kJointVertex));
   const double light_cost = std::max(0.0, joint_cost - camera_cost);
   TransportGain best;
   for (int exponent = -kMostShare; exponent <= kMostShare; ++exponent) {

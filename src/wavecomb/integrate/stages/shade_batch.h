@@ -58,10 +58,10 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
         offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
     VisibleOffer<F> visible;
     const bool merges = (kFeatures & kJoined) != 0 && wave.visible;
-    const VertexResult<F> v = take_steps<Bsdf, F>(
-        V{context.scene, settings, path.key, depth, hit, r.geom, t, material, state,
-          wants_aovs ? &aovs : nullptr, active, context.guide, connects ? &offer : nullptr,
-          merges ? &visible : nullptr});
+    const VertexResult<F> v =
+        take_steps<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
+                              state, wants_aovs ? &aovs : nullptr, active, context.guide,
+                              connects ? &offer : nullptr, merges ? &visible : nullptr});
     if constexpr ((kFeatures & kJoined) != 0)
       if (merges && any(visible.seen)) [[unlikely]]
         store_row<VisiblePoint, F>(wave.visible.rows, slot, visible.row, visible.seen);

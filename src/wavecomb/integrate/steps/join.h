@@ -46,8 +46,8 @@ inline Mask<F> passes_one_way(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>
 template <typename F>
 struct JointVertex {
   F ratio;
-  F inverse_cos;  ///< 1 / |g w|
-  F linked;       ///< E of the vertex before and this one
+  F inverse_cos;   ///< 1 / |g w|
+  F linked;        ///< E of the vertex before and this one
   Mask<F> merges;  ///< lanes where paths from lights may end (visible_point.h)
   F radius2;       ///< within this distance, squared
 
@@ -85,8 +85,8 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
   // Who looks out of what absorbs: paths from lights do not know how far it is.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
   JointVertex<F> joint{select(reached, v.path.joined(), F(0.f)),
-                       F(1.f / select(seen != 0.f, abs(seen), F(1.f))),
-                       min(linked, F(kMostRatio)), Mask<F>(false), F(0.f)};
+                       F(1.f / select(seen != 0.f, abs(seen), F(1.f))), min(linked, F(kMostRatio)),
+                       Mask<F>(false), F(0.f)};
   if (v.settings.merge_scale > 0.f) [[unlikely]] {
     const F radius = v.path.cone_width * v.settings.merge_scale;
     joint.radius2 = radius * radius;
@@ -95,8 +95,9 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
       joint.merges = joint.merges & at.bsdf.has_non_delta();
     else
       joint.merges = Mask<F>(false);
-    joint.ratio = select(joint.merges, F(joint.radius2 * F(abs(seen) * (kPi * v.settings.light_paths))),
-                         joint.ratio);
+    joint.ratio =
+        select(joint.merges, F(joint.radius2 * F(abs(seen) * (kPi * v.settings.light_paths))),
+               joint.ratio);
   }
   return joint;
 }
@@ -106,8 +107,12 @@ template <typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interaction& at,
                                  const JointVertex<F>& joint) {
   v.visible->seen = v.active & joint.merges;
-  v.visible->row = {at.s.p,        sqrt(joint.radius2),     -v.path.dir,
-                    pack_normal<F>(at.s.ng), clean<F>(at.throughput, 0.f), UInt<F>(v.depth)};
+  v.visible->row = {at.s.p,
+                    sqrt(joint.radius2),
+                    -v.path.dir,
+                    pack_normal<F>(at.s.ng),
+                    clean<F>(at.throughput, 0.f),
+                    UInt<F>(v.depth)};
 }
 
 /// What the vertex offers to one of a path from a light: with w its direction there, all that
@@ -150,8 +155,7 @@ WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& a
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
     r = min(max(r, F(0.f)), F(kMostRatio));
     if (v.settings.merge_scale > 0.f) [[unlikely]] {
-      const Mask<F> waits =
-          v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & (v.path.ratio < 0.f));
+      const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & (v.path.ratio < 0.f));
       r = select(waits & not_(joint.merges), F(-1.f), select(b.is_delta & joint.merges, F(0.f), r));
     }
     return r;
