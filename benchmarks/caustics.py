@@ -3,9 +3,10 @@
 
     .venv/bin/python benchmarks/caustics.py caustics pool lens prism landscape mixed dragon
 
-For each stage a reference is rendered first, with light paths. A short render then tells how many
-samples each way has in ``--seconds``, and the ways are rendered in turns, each round with another
-seed. Way ``unaimed`` is ``light`` with ``--light-aim off``.
+For each stage a reference is rendered first, with light paths that are merged within half a pixel.
+Short renders then tell how many samples each way has in ``--seconds``, and the ways are rendered in
+turns, each round with another seed. Way ``merged`` is ``light`` with ``--merge-radius 1``, and
+``unaimed`` with ``--light-aim off``.
 
 Efficiency is 1 / (relMSE x seconds), relMSE the mean of (picture - reference)^2 over (reference^2 +
 0.01 mean^2). Seconds are of the clock, with all that is learned and tried before the first pass,
@@ -29,9 +30,10 @@ import wavecomb
 from wavecomb.picture.compare import TRIMMED_SHARE, luminance, trimmed_mean
 
 STAGES = ("caustics", "pool", "lens", "prism", "landscape", "mixed", "dragon")
-WAYS: dict[str, dict[str, str]] = {
+WAYS: dict[str, dict[str, Any]] = {
     "path": {"transport": "path"},
     "light": {"transport": "light"},
+    "merged": {"transport": "light", "merge_radius": 1.0},
     "unaimed": {"transport": "light", "light_aim": "off"},
     "auto": {"transport": "auto"},
 }
@@ -47,7 +49,11 @@ class Stage:
         self.scene = wavecomb.load(stage_file(path, name, triangles=options.triangles)).scene
         self.options = options
         picture, seconds = self.render(
-            options.reference, REFERENCE_SEED, transport="light", aovs=("techniques",)
+            options.reference,
+            REFERENCE_SEED,
+            transport="light",
+            merge_radius=0.5,
+            aovs=("techniques",),
         )
         log(f"{name}: reference of {options.reference} samples in {seconds:.0f} s")
         self.truth = np.asarray(picture.beauty, np.float64)
@@ -70,14 +76,17 @@ class Stage:
         return picture, time.perf_counter() - begin
 
     def samples(self, way: str) -> int:
-        """As many as `way` has in the time of a round."""
+        """As many as `way` has in the time of a round: the line through two renders."""
         spp, most = 4, self.options.reference // 4
+        done, before = 0, 0.0
         while True:
             _, seconds = self.render(spp, TRIAL_SEED, **WAYS[way])
-            more = self.options.seconds / max(seconds, 1e-3)
-            if more < 4 or spp >= most:
-                return max(1, min(most, round(spp * more)))
-            spp = min(most, 2 * spp)
+            each = max(1e-4, (seconds - before) / (spp - done))
+            wanted = max(1, min(most, round(spp + (self.options.seconds - seconds) / each)))
+            if wanted < 1.3 * spp or spp >= most:
+                return wanted
+            done, before = spp, seconds
+            spp = min(wanted, 4 * spp)
 
     def errors(self, picture: wavecomb.Picture) -> dict[str, float]:
         """relMSE, by FIGURES; 0 for caustics where there are none."""

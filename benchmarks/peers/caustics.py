@@ -7,10 +7,11 @@
 
 Each renderer is asked for as many samples as it has in ``--seconds``, by a trial, in rounds of
 shuffled order; a picture is written for each, in one row with the reference, which is Wavecomb's
-with light paths, of other seeds. relMSE = mean of (x - r)^2 / (r^2 + 0.01 mean(r)^2), of the whole
-picture and of the pixels whose light is mostly that of light paths in the reference (caustics).
-Materials are those of the bridges: where a peer's is only the nearest, its error has that in it,
-so means are printed, too. ptracer has no MIS and does not find what the camera sees through glass.
+with light paths, of other seeds, merged within half a pixel. relMSE = mean of (x - r)^2 / (r^2 +
+0.01 mean(r)^2), of the whole picture and of the pixels whose light is mostly that of light paths in
+the reference (caustics). Materials are those of the bridges: where a peer's is only the nearest,
+its error has that in it, so means are printed, too. ptracer has no MIS and does not find what the
+camera sees through glass.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ STAGES = ("caustics", "lens", "pool", "prism", "landscape")
 COLUMNS: dict[str, tuple[str, dict[str, Any]]] = {
     "wavecomb path": ("wavecomb", {"transport": "path"}),
     "wavecomb light": ("wavecomb", {"transport": "light"}),
+    "wavecomb merged": ("wavecomb", {"transport": "light", "merge_radius": 1.0}),
     "wavecomb auto": ("wavecomb", {"transport": "auto"}),
     "mitsuba path": ("mitsuba-llvm-multijitter", {}),
     "mitsuba ptracer": ("mitsuba-llvm-ptracer", {}),
@@ -173,7 +175,8 @@ def reference(job: Job, args: argparse.Namespace) -> tuple[Image, NDArray[np.boo
 
     made = wavecomb.render(
         wavecomb.load(job.stage, isolate=False).scene, size=(args.size, args.size),
-        spp=args.reference, seed=REFERENCE_SEED, transport="light", aovs=("techniques",),
+        spp=args.reference, seed=REFERENCE_SEED, transport="light", merge_radius=0.5,
+        aovs=("techniques",),
         filter="box", filter_width=1.0, max_depth=args.max_depth, threads=args.threads,
     )  # fmt: skip
     truth = np.asarray(made.beauty, np.float64)
