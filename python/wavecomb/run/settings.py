@@ -22,6 +22,8 @@ _ERROR_BYTES_PER_PIXEL = 100
 _CASCADE_BYTES_PER_PIXEL = 96 + 12
 # Of sums of splats, for the beauty and each layer that has some.
 _SPLAT_BYTES_PER_PIXEL = 48
+# Of what light paths are merged with: its row, and its places in the grid.
+_VISIBLE_BYTES_PER_PIXEL = 64 + 48
 # Of a deep one, at most: sums in the film, and samples in the picture.
 _DEEP_BYTES_PER_PIXEL = 1 + 4
 _DEEP_BYTES_PER_SAMPLE = 40 + 24
@@ -120,6 +122,7 @@ def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1
     if settings.transport != "path":
         sums = 1 + keeps_error(settings) + aov_names.splat_layers(aovs, light_groups)
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4  # and the samples of a light path
+        each += _VISIBLE_BYTES_PER_PIXEL * (settings.merge_radius > 0)
     if aov_names.DEEP in settings.aovs:
         each += _DEEP_BYTES_PER_PIXEL + _DEEP_BYTES_PER_SAMPLE * settings.deep_samples
     width, height = picture_size(settings)

@@ -2,16 +2,17 @@
 /// Points that the camera sees in mirrors and through glass, and the paths from lights that end
 /// near them (docs/light-paths.md, "Merging").
 ///
-/// A camera path whose bounces so far were deltas, one or more, and that comes to a vertex that
-/// scatters otherwise, too, leaves a point there: T Le of all that light does there is what its
-/// pixel sees. No path from a light can be shown to the camera through a mirror; but one whose
-/// vertex lies within r of the point, r a share of a pixel as it is seen there, is taken to end at
-/// the point. Such points are the eye's (T. Hachisuka et al., "Progressive Photon Mapping", 2008),
+/// A camera path whose bounces so far were deltas, one or more, leaves a point at the first vertex
+/// that scatters otherwise, too. A path from a light cannot be shown to the camera through a mirror;
+/// but one whose vertex lies within r of the point, r in pixels as they are seen there, is taken to
+/// end at it. Such points are the eye's (T. Hachisuka et al., "Progressive Photon Mapping", 2008),
 /// and light is splatted to their pixels: sums of integers, whatever the order.
 ///
 /// A pass has one sample of each pixel, which leaves one point at most; paths from lights come
 /// after all of them.
 #pragma once
+
+#include <cstring>
 
 #include "wavecomb/core/fields.h"
 #include "wavecomb/core/soa.h"
@@ -45,8 +46,9 @@ class VisibleRows {
   VisibleRows() = default;
   /// `capacity` 0: nothing is merged.
   explicit VisibleRows(size_t capacity)
-      : block_(capacity > 0 ? SoaBlock(1, capacity * kVisibleWords) : SoaBlock()),
-        rows(capacity > 0 ? block_.floats(0) : nullptr) {}
+      : block_(capacity > 0 ? SoaBlock(1, capacity * kVisibleWords) : SoaBlock()) {
+    if (capacity > 0) rows = block_.floats(0);
+  }
 
   explicit operator bool() const { return rows != nullptr; }
   size_t bytes() const { return block_.bytes(); }
@@ -54,11 +56,10 @@ class VisibleRows {
   void clear(size_t slots) const { std::memset(rows, 0, slots * kVisibleWords * sizeof(float)); }
   const float* row(size_t slot) const { return rows + slot * kVisibleWords; }
 
+  float* rows = nullptr;
+
  private:
   SoaBlock block_;
-
- public:
-  float* rows = nullptr;
 };
 
 }  // namespace wavecomb
