@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Meshes, curves, points and instances of SceneBuilder.
+/// Meshes, curves, points, splats and instances of SceneBuilder.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -15,6 +15,7 @@
 #include "arguments.h"
 #include "bind.h"
 #include "scene_values.h"
+#include "wavecomb/curve/splat.h"
 #include "wavecomb/scene/scene.h"
 
 namespace nb = nanobind;
@@ -247,6 +248,49 @@ uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const 
   return builder.add_mesh(std::move(mesh));
 }
 
+/// Rows of splats and the radii around them.
+struct SplatArrays {
+  std::vector<SplatRow> rows;
+  std::vector<float> radii;
+};
+
+uint32_t add_splats(SceneBuilder& builder, const Array<float>& positions,
+                    const Array<float>& scales, const Array<float>& orientations,
+                    const Array<float>& opacities, const Array<float>& harmonics, uint32_t material,
+                    const std::string& name, const std::string& light_group,
+                    uint32_t asset_length) {
+  const std::string what = "mesh '" + name + "'";
+  auto arrays = std::make_unique<SplatArrays>();
+  arrays->rows =
+      splat_rows({scales.data(), scales.size()}, {orientations.data(), orientations.size()},
+                 {opacities.data(), opacities.size()}, what);
+  arrays->radii = splat_radii(arrays->rows);
+  size_t degree = 0;
+  while (degree < 3 && harmonics.ndim() == 3 && harmonics.shape(1) > (degree + 1) * (degree + 1))
+    ++degree;
+  if (harmonics.ndim() != 3 || harmonics.shape(1) != (degree + 1) * (degree + 1) ||
+      harmonics.shape(2) != 3)
+    throw Error(what + " needs harmonics of shape (n, 1, 3), (n, 4, 3), (n, 9, 3) or (n, 16, 3)");
+  Mesh mesh;
+  mesh.name = name;
+  mesh.primitive = Primitive::kSplat;
+  mesh.light_group = builder.light_group(light_group);
+  mesh.asset_length = asset_length;
+  mesh.material = material;
+  mesh.positions = {positions.data(), positions.size()};
+  mesh.radii = arrays->radii;
+  mesh.splats = arrays->rows;
+  mesh.harmonics = {harmonics.data(), harmonics.size()};
+  mesh.harmonics_degree = static_cast<uint32_t>(degree);
+  nb::list owners;
+  owners.append(nb::cast(positions));
+  owners.append(nb::cast(harmonics));
+  owners.append(
+      nb::capsule(arrays.release(), [](void* p) noexcept { delete static_cast<SplatArrays*>(p); }));
+  mesh.owner = hold(std::move(owners));
+  return builder.add_mesh(std::move(mesh));
+}
+
 void add_instances(SceneBuilder& builder, uint32_t parent, uint32_t child,
                    const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& transforms,
                    const std::optional<Array<uint32_t>>& materials,
@@ -309,6 +353,9 @@ void def_meshes(nb::class_<SceneBuilder>& builder) {
       .def("add_points", &add_points, "positions"_a, "radii"_a, nb::kw_only(), "uvs"_a = nb::none(),
            "face_materials"_a = nb::none(), "material"_a = kInheritMaterial,
            "attributes"_a = nb::dict(), "name"_a = "", "light_group"_a = "", "asset_length"_a = 0)
+      .def("add_splats", &add_splats, "positions"_a, "scales"_a, "orientations"_a, "opacities"_a,
+           "harmonics"_a, nb::kw_only(), "material"_a, "name"_a = "", "light_group"_a = "",
+           "asset_length"_a = 0)
       .def("add_instances", &add_instances, "parent"_a, "child"_a, "transforms"_a,
            "materials"_a = nb::none(), nb::kw_only(), "names"_a = nb::none(),
            "numbers"_a = nb::none(), "asset_lengths"_a = nb::none(), "motion"_a = nb::none());

@@ -89,6 +89,7 @@ void bind_scene(nb::module_& m) {
       .def_prop_ro("instanced_triangles", &Scene::instanced_triangles)
       .def_prop_ro("curve_segments", &Scene::curve_segments)
       .def_prop_ro("points", &Scene::points)
+      .def_prop_ro("splats", &Scene::splats)
       .def_prop_ro("mesh_count", [](const Scene& s) { return s.meshes().size(); })
       .def_prop_ro("instance_count", [](const Scene& s) { return s.instances().size(); })
       .def_prop_ro("volumes",

@@ -62,8 +62,10 @@ class Scene:
     @property
     def points(self) -> int: ...
     @property
+    def splats(self) -> int: ...
+    @property
     def mesh_count(self) -> int:
-        """Meshes, and prims of curves and points."""
+        """Meshes, and prims of curves, points and splats."""
     @property
     def instance_count(self) -> int: ...
     @property
@@ -339,6 +341,24 @@ class SceneBuilder:
     ) -> int:
         """Spheres: positions (n, 3), or (steps, n, 3) over the shutter, radii (n,), uvs (n, 2),
         face_materials (n,). Counts as a mesh; arrays are kept as in add_mesh."""
+    def add_splats(
+        self,
+        positions: NDArray[np.float32],
+        scales: NDArray[np.float32],
+        orientations: NDArray[np.float32],
+        opacities: NDArray[np.float32],
+        harmonics: NDArray[np.float32],
+        *,
+        material: int,
+        name: str = "",
+        light_group: str = "",
+        asset_length: int = 0,
+    ) -> int:
+        """Gaussian splats: middles (n, 3), standard deviations along their axes (n, 3), which are
+        positive, quaternions w, x, y, z (n, 4), opacities (n,) from 0 to 1, and real spherical
+        harmonics (n, k, 3), k 1, 4, 9 or 16, of what their colour is above 0.5. A material of
+        program emissive, which multiplies it. Counts as a mesh; positions and harmonics are kept
+        as in add_mesh."""
     def add_group(self, name: str = "", root: str = "") -> int:
         """A new empty group; group 0, the world, is there. root: the prim path that names of what
         is in it begin with, and that names of its instances take the place of."""

@@ -36,6 +36,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
         "triangles": {"unique": scene.triangles, "instanced": scene.instanced_triangles},
         "curve_segments": scene.curve_segments,
         "points": scene.points,
+        "splats": scene.splats,
         "meshes": scene.mesh_count,
         "instances": scene.instance_count,
         "bounds": [list(low), list(high)],
@@ -133,6 +134,8 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
         row("curve segments", f"{info['curve_segments']:,}")
     if info["points"]:
         row("points", f"{info['points']:,}")
+    if info["splats"]:
+        row("splats", f"{info['splats']:,}")
     row("meshes", f"{info['meshes']:,}")
     row("instances", f"{info['instances']:,}")
     low, high = info["bounds"]

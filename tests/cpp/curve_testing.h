@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Curves and points for tests.
+/// Curves, points and splats for tests.
 #pragma once
 
 #include "scene_testing.h"
 #include "wavecomb/curve/segment.h"
+#include "wavecomb/curve/splat.h"
 
 namespace wavecomb::curve_testing {
 
@@ -83,7 +84,52 @@ inline const std::vector<Primitive>& curved_primitives() {
   return all;
 }
 
-/// Curves and points of every kind, of every program, with textures, presence and instances
+/// Arrays of Gaussian splats.
+struct SplatData {
+  std::vector<float> positions, scales, orientations, opacities, harmonics, radii;
+  std::vector<SplatRow> rows;
+  uint32_t degree = 0;
+};
+
+/// A mesh that owns them, with rows made.
+inline Mesh make_splats(SplatData data, uint32_t material, std::string name = "/World/splats") {
+  data.rows = splat_rows(data.scales, data.orientations, data.opacities, "splats");
+  data.radii = splat_radii(data.rows);
+  const auto owner = std::make_shared<const SplatData>(std::move(data));
+  Mesh mesh;
+  mesh.name = std::move(name);
+  mesh.primitive = Primitive::kSplat;
+  mesh.positions = owner->positions;
+  mesh.radii = owner->radii;
+  mesh.splats = owner->rows;
+  mesh.harmonics = owner->harmonics;
+  mesh.harmonics_degree = owner->degree;
+  mesh.material = material;
+  mesh.owner = owner;
+  return mesh;
+}
+
+/// `n` splats in a ball of radius `size`, of scales up to `scale`.
+inline SplatData random_splats(uint32_t n, float size, float scale, uint32_t degree,
+                               uint32_t seed) {
+  SplatData data;
+  data.degree = degree;
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (uint32_t i = 0; i < n; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      data.positions.push_back(size * uniform(rng));
+      data.scales.push_back(scale * (0.55f + 0.45f * uniform(rng)));
+    }
+    for (int k = 0; k < 4; ++k) data.orientations.push_back(2 * uniform(rng));
+    data.opacities.push_back(i % 7 == 0 ? 0.002f : 0.5f + 0.5f * uniform(rng));
+    for (uint32_t k = 0; k < 3 * (degree + 1) * (degree + 1); ++k)
+      data.harmonics.push_back(uniform(rng));
+  }
+  return data;
+}
+
+/// Curves, points and splats of every kind, of every program, with textures, presence and instances
 /// (mirrored, stretched), beside triangles.
 inline ScenePtr hairy() {
   SceneBuilder b;
@@ -118,6 +164,8 @@ inline ScenePtr hairy() {
     b.add_to_group(0, b.add_mesh(make_curves(std::move(data))));
     b.add_to_group(group, b.add_mesh(make_curves(strands(primitive, 6, 3, 0.5f, 0.04f, seed++))));
   }
+  b.add_to_group(0, b.add_mesh(make_splats(random_splats(40, 1.2f, 0.3f, 3, 70), materials[6])));
+  b.add_to_group(group, b.add_mesh(make_splats(random_splats(9, 0.5f, 0.2f, 1, 71), materials[6])));
   for (uint32_t i = 0; i < materials.size(); ++i) {
     const float x = -1.8f + 0.6f * static_cast<float>(i);
     b.add_instance(0, group,

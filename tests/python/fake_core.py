@@ -81,6 +81,7 @@ class Fake:
             instanced_triangles=90000,
             curve_segments=0,
             points=0,
+            splats=0,
             mesh_count=2,
             instance_count=90,
             light_count=3,

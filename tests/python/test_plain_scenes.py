@@ -17,7 +17,9 @@ from wavecomb.scenes import SCENES, SceneError, write_scene
 from wavecomb.scenes import materials as looks
 
 SMALL = {"triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5}
-NOT_PLAIN = {"heavy", "smoke", "clouds", "fog", "fur", "head", "candles", "drinks"}
+NOT_PLAIN = {
+    "heavy", "smoke", "clouds", "fog", "fur", "head", "candles", "drinks", "splats",
+}  # fmt: skip
 PLAIN = sorted(set(SCENES) - NOT_PLAIN)
 NODES = {"UsdPreviewSurface", "UsdUVTexture", "UsdPrimvarReader_float2", "UsdTransform2d"}
 

@@ -30,6 +30,7 @@ from wavecomb.usd import LoadedStage
 
 SMALL = {
     "triangles": 12_000, "teapot_level": 4, "texture_size": 64, "texture_mb": 0.5, "voxels": 24,
+    "splats": 2_000,
 }  # fmt: skip
 
 

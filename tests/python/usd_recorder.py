@@ -133,6 +133,22 @@ class Recorder:
     def add_points(self, positions, radii, **options):
         return self._add_curved(len(radii), (2,), positions, radii, options, kind="sphere")
 
+    def add_splats(self, positions, scales, orientations, opacities, harmonics, **options):
+        n = len(positions)
+        assert positions.shape == scales.shape == (n, 3) and orientations.shape == (n, 4)
+        assert opacities.shape == (n,) and harmonics.shape[::2] == (n, 3)
+        assert harmonics.shape[1] in (1, 4, 9, 16)
+        arrays = positions, scales, orientations, opacities, harmonics
+        assert all(a.dtype == np.float32 and a.flags.c_contiguous for a in arrays)
+        self.meshes.append(
+            {
+                "kind": "splat", "positions": positions, "scales": scales,
+                "orientations": orientations, "opacities": opacities, "harmonics": harmonics,
+                **options,
+            }
+        )  # fmt: skip
+        return len(self.meshes) - 1
+
     def _add_curved(self, count, uv_shape, positions, radii, options, **what):
         assert positions.dtype == radii.dtype == np.float32 and positions.flags.c_contiguous
         assert positions.shape[-2:] == (len(radii), 3) and radii.shape == (len(radii),)

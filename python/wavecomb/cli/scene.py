@@ -30,6 +30,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
         "wavecomb scene lights -o street.usdc --lights 10000",
         "wavecomb scene smoke -o smoke.usdc --voxels 500",
         "wavecomb scene head -o head.usdc --strands 1000000",
+        "wavecomb scene splats -o capture.usdc --capture point_cloud.ply",
         "wavecomb scene mixed -o plain.usdc --plain --lamps",
     ),
 )
@@ -56,6 +57,13 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 @click.option("--lights", type=click.IntRange(min=1), metavar="N", help="lights: how many.")
 @click.option("--lamps", is_flag=True, help="mixed, dragon: a key, a fill and a dim dome.")
 @click.option("--strands", type=click.IntRange(min=1), metavar="N", help="fur, head: how many.")
+@click.option("--splats", type=click.IntRange(min=1), metavar="N", help="splats: how many.")
+@click.option(
+    "--capture",
+    type=click.Path(),
+    metavar="FILE",
+    help="splats: a PLY of 3D Gaussian splats instead.",
+)
 @click.option(
     "--voxels",
     type=click.IntRange(min=16),

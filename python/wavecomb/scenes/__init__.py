@@ -25,6 +25,7 @@ from wavecomb.scenes.lights import build_lights
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.room import build_room
+from wavecomb.scenes.splats import build_splats
 from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.studio import build_studio
@@ -70,6 +71,7 @@ SCENES: dict[str, SceneInfo] = {
     "landscape": SceneInfo("a glass ring in wide hills in the sun", 1.0, build_landscape),
     "fur": SceneInfo("a striped, furry egg: see --strands", 0.1, build_fur),
     "head": SceneInfo("a head of brown hair: see --strands", 0.1, build_head),
+    "splats": SceneInfo("a dragon of Gaussian splats: see --splats", 0.1, build_splats),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
 """Every scene by name."""

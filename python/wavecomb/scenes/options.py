@@ -32,6 +32,8 @@ class SceneOptions:
         lights: How many ``lights`` has.
         lamps: Whether ``mixed`` and ``dragon`` are lit by a key, a fill and a dim dome.
         strands: How many ``fur`` and ``head`` have.
+        splats: How many ``splats`` has.
+        capture: PLY file of 3D Gaussian splats that ``splats`` holds in place of all else, or None.
         voxels: Along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
             the metallic workflow, no program named. ``heavy`` has no such form, nor has hair,
@@ -53,6 +55,8 @@ class SceneOptions:
     lights: int = 1000
     lamps: bool = False
     strands: int = 100_000
+    splats: int = 60_000
+    capture: Path | str | None = None
     voxels: int = 160
     plain: bool = False
 
@@ -64,6 +68,8 @@ class SceneOptions:
             raise SceneError(f"voxels must be from 16 to 4096, not {self.voxels}")
         if not 1 <= self.strands <= 20_000_000:
             raise SceneError(f"strands must be from 1 to 20000000, not {self.strands}")
+        if not 1 <= self.splats <= 20_000_000:
+            raise SceneError(f"splats must be from 1 to 20000000, not {self.splats}")
         if self.seed < 0:
             raise SceneError(f"seed must not be negative: {self.seed}")
 

@@ -194,3 +194,13 @@ def read_ply(data: bytes) -> RawMesh:
     if points is None or faces is None:
         raise ValueError("it has no vertices or no faces")
     return RawMesh(points, faces, uv)
+
+
+def ply_vertices(data: bytes) -> dict[str, np.ndarray]:
+    """PLY: all columns of the vertices, which are no lists, by name, float64 (n,)."""
+    style, elements, offset = _ply_header(data)
+    if not elements or elements[0].name != "vertex":
+        raise ValueError("it does not begin with vertices")
+    if any(count_kind for _, _, count_kind in elements[0].properties):
+        raise ValueError("its vertices have lists")
+    return _PlyBody(data, offset, style).scalars(elements[0])

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "wavecomb/core/hash.h"
+#include "wavecomb/curve/splat.h"
 #include "wavecomb/surface/hit.h"
 #include "wavecomb/surface/presence.h"
 #include "wavecomb/surface/uv.h"
@@ -23,6 +24,21 @@ void mark_unseen(const Scene& scene, std::vector<uint8_t>& filtered) {
   }
 }
 
+/// Whether what is there with that probability is.
+bool is_drawn(float opacity, uint32_t instance, uint32_t mesh, uint32_t prim, uint32_t slot,
+              const PresenceKeys& keys) {
+  if (opacity >= 1.f) return true;
+  if (!(opacity > 0.f)) return false;
+  const uint32_t path =
+      hash_u32(keys.pixel_hash[slot * keys.stride], keys.sample[slot * keys.stride]);
+  const uint32_t where = hash_u32(instance * 0x9e3779b9u + mesh, prim);
+  return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
+}
+
+const SplatRow& splat_of(const SceneView& scene, uint32_t mesh, uint32_t prim) {
+  return reinterpret_cast<const SplatRow*>(scene.meshes[mesh].normals)[prim];
+}
+
 }  // namespace
 
 std::vector<uint8_t> filtered_meshes(const Scene& scene) {
@@ -31,6 +47,8 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   if (scene.view().lights.links.members) filtered.assign(filtered.size(), 1);  // shadow linking
   if (scene.view().lights.links.members) return filtered;
   if (scene.view().visibility) mark_unseen(scene, filtered);
+  for (size_t m = 0; m < filtered.size(); ++m)
+    if (geometry.meshes[m].primitive == Primitive::kSplat) filtered[m] = 1;
   const InteriorView& interiors = scene.view().interiors;
   if (!scene.view().has_presence && !interiors.media) return filtered;
   const auto needs = [&](uint32_t m) {
@@ -80,6 +98,9 @@ bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint
 
 bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32_t prim, float u,
                 float v, uint32_t slot, const PresenceKeys& keys) {
+  if (scene.has_curves && (scene.meshes[mesh].flags & kIsSplat) != 0)
+    return is_drawn(splat_alpha(splat_of(scene, mesh, prim), u, v), instance, mesh, prim, slot,
+                    keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[instance].material, mesh, prim, true);
   // Who looks what shadow rays pass inside of meshes finds the bounds himself (medium/interiors.h).
@@ -88,12 +109,7 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
   const Vec2<float> uv = hit_uv<float>(scene.meshes, mesh, prim, u, v, true);
   const float opacity = opacity_at<float>(scene.materials, scene.meshes, scene.instances, material,
                                           instance, {mesh, prim, u, v}, uv, true);
-  if (opacity >= 1.f) return true;
-  if (!(opacity > 0.f)) return false;
-  const uint32_t path =
-      hash_u32(keys.pixel_hash[slot * keys.stride], keys.sample[slot * keys.stride]);
-  const uint32_t where = hash_u32(instance * 0x9e3779b9u + mesh, prim);
-  return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
+  return is_drawn(opacity, instance, mesh, prim, slot, keys);
 }
 
 bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,

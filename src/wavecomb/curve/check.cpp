@@ -5,11 +5,12 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/curve/segment.h"
+#include "wavecomb/curve/splat.h"
 
 namespace wavecomb {
 
 void check_curves(const Mesh& mesh, const std::string& name) {
-  const bool points = mesh.primitive == Primitive::kSphere;
+  const bool points = mesh.is_dots();
   const size_t vertices = mesh.vertex_count();
   const auto need = [&](size_t has, size_t want, const char* what) {
     if (has != want)
@@ -18,6 +19,7 @@ void check_curves(const Mesh& mesh, const std::string& name) {
   };
   if (vertices > kCurveFirstPoint / 4 || mesh.primitive_count() > kCurveFirstPoint / 4)
     throw Error(name + " has too many points for 32-bit offsets; split it");
+  if (mesh.primitive == Primitive::kSplat) check_splats(mesh, name);
   need(mesh.radii.size(), vertices, "radii");
   if (mesh.is_ribbon()) need(mesh.normals.size(), 3 * vertices * mesh.steps, "normal coordinates");
   if (points) need(mesh.indices.size(), 0, "indices");
@@ -45,7 +47,7 @@ void check_curves(const Mesh& mesh, const std::string& name) {
 }
 
 uint32_t curve_flags(const Mesh& mesh) {
-  if (mesh.primitive == Primitive::kSphere) return kIsSphere;
+  if (mesh.is_dots()) return mesh.primitive == Primitive::kSplat ? kIsSplat : kIsSphere;
   return (mesh.is_ribbon() ? kIsRibbon : kIsTube) | (mesh.is_cubic() ? kIsCubic : 0u);
 }
 

@@ -24,9 +24,7 @@ class CurveClumps {
   static constexpr uint32_t kPieces = 8;  ///< of a clump, at most
 
   /// Whether a mesh is one of those that clumps are for.
-  static bool serve(const Mesh& mesh) {
-    return mesh.is_curved() && mesh.primitive != Primitive::kSphere && !mesh.deforms();
-  }
+  static bool serve(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
 
   /// Does two things, one beside the other or one after the other.
   using Task = std::function<void()>;

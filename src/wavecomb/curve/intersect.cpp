@@ -8,6 +8,7 @@
 #include "wavecomb/curve/bezier.h"
 #include "wavecomb/curve/leaves.h"
 #include "wavecomb/curve/segment.h"
+#include "wavecomb/curve/splat.h"
 
 namespace wavecomb {
 namespace {
@@ -367,15 +368,18 @@ void intersect_sphere(const Mesh& mesh, uint32_t prim, const PointsAt& points, c
 }  // namespace
 
 Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step) {
-  const bool point = mesh.primitive == Primitive::kSphere;
+  const bool point = mesh.is_dots();
   const size_t first = point ? prim : first_point(mesh, prim);
   const size_t n = point ? 1 : mesh.segment_points();
   Bounds box;
   for (size_t k = first; k < first + n; ++k) {
     const float* p = &mesh.positions[3 * (step * mesh.vertex_count() + k)];
-    const auto reach = [r = mesh.radii[k]](float x) { return 1e-6f * std::abs(x) + 1.00001f * r; };
-    box.add({p[0] - reach(p[0]), p[1] - reach(p[1]), p[2] - reach(p[2])});
-    box.add({p[0] + reach(p[0]), p[1] + reach(p[1]), p[2] + reach(p[2])});
+    const Vec3<float> r =
+        mesh.splats.empty() ? Vec3<float>(mesh.radii[k]) : splat_reach(mesh.splats[k]);
+    const auto reach = [](float x, float by) { return 1e-6f * std::abs(x) + 1.00001f * by; };
+    const Vec3<float> by(reach(p[0], r.x), reach(p[1], r.y), reach(p[2], r.z));
+    box.add({p[0] - by.x, p[1] - by.y, p[2] - by.z});
+    box.add({p[0] + by.x, p[1] + by.y, p[2] + by.z});
   }
   return box;
 }
@@ -387,6 +391,8 @@ CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const Curve
   CurveHits hits;
   if (mesh.primitive == Primitive::kSphere)
     intersect_sphere(mesh, piece.prim, points, ray, tfar, outside, hits);
+  else if (mesh.primitive == Primitive::kSplat)
+    intersect_splat(mesh.splats[piece.prim], points.position(piece.prim), of, tfar, hits);
   else
     SegmentTest(mesh, piece.prim, points, ray, tfar, query, hits).run(outside, piece.node);
   return hits;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "wavecomb/curve/segment.h"
+#include "wavecomb/curve/splat_surface.h"
 #include "wavecomb/curve/uv.h"
 #include "wavecomb/surface/surface_reader.h"
 
@@ -124,15 +125,16 @@ template <typename F>
 }
 
 /// The surface at hits on curves and points. Of no use to triangles; never inlined, so that scenes
-/// without curves do not pay for its registers.
+/// without curves do not pay for its registers. Splats face `dir`, along which they were met.
 template <typename F>
 __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHit<F>& hit,
-                                            bool with_uv, const Mask<F>& active, Surface<F>& out) {
+                                            const Vec3<F>& dir, bool with_uv, const Mask<F>& active,
+                                            Surface<F>& out) {
   using U = UInt<F>;
   const MeshReader<F> mesh(scene.meshes, hit.mesh, active);
   InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const auto is = [&](uint32_t flag) { return active & Mask<F>((mesh.flags & flag) != U(0u)); };
-  const Mask<F> spheres = is(kIsSphere), ribbons = is(kIsRibbon);
+  const Mask<F> spheres = is(kIsDots), ribbons = is(kIsRibbon), splats = is(kIsSplat);
   const Mask<F> strands = active & not_(spheres);
   CurveSegment<F> s;
   s.cubic = is(kIsCubic);
@@ -162,12 +164,18 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
            F(kPi * s.r[0])},
           spheres);
   }
+  if (any(splats)) {
+    const SplatMap<F> map(mesh, hit.prim, splats);
+    const Vec3<F> p = s.p[0] + splat_offset<F>(map, maps, hit.u, hit.v, dir);
+    merge(c, {p, c.n, c.dpdu, c.size, c.du, c.dv}, splats);
+  }
 
   Surface<F> r;
   r.p = maps.point(c.p);
   const Vec3<F> n = maps.map_normal(c.n);
   const F len2 = length_squared(n);
   r.ng = n * F(1.f / sqrt(select(len2 > 0.f, len2, F(1.f))));
+  r.ng = select<F>(splats, -dir, r.ng);
   r.ns = r.ng;
   const auto magnitude = [&](int i, const F& t) {
     const Vec3<F> row = abs3(maps.row[i]);

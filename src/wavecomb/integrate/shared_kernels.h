@@ -46,8 +46,8 @@
   KEYWORD template GraphPoint<F> graph_point<F>(const SceneView&, const MeshHit<F>&,               \
                                                 const Surface<F>&, const Vec3<F>&,                 \
                                                 const Footprint<F>&, const Mask<F>&);              \
-  KEYWORD template void detail::setup_curved<F>(const SceneView&, const MeshHit<F>&, bool,         \
-                                                const Mask<F>&, Surface<F>&);                      \
+  KEYWORD template void detail::setup_curved<F>(                                                   \
+      const SceneView&, const MeshHit<F>&, const Vec3<F>&, bool, const Mask<F>&, Surface<F>&);     \
   KEYWORD template Vec3<F> detail::read_texture<F>(const MaterialView&,                            \
                                                    const detail::RecordReader<F>&, const Vec2<F>&, \
                                                    const Footprint<F>&, const Mask<F>&);           \

@@ -45,6 +45,7 @@ struct BsdfTraits {
   static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
   static constexpr bool kReadsIor = false;      ///< the index of refraction says something
   static constexpr bool kOnSurface = true;      ///< shades hits; or else it has an `interact`
+  static constexpr bool kOnSplats = false;      ///< emits what splats do where it is on those
   /// Scatters as a whole fibre does, about an axis: its frame has x along it (curve/fibre.h), both
   /// sides are one, and paths from lights do not go there, since it is not reciprocal.
   static constexpr bool kOnFibre = false;

@@ -82,6 +82,11 @@ uint64_t hash_geometry(const Scene& scene) {
     h.add_array(m.radii);
     h.add(m.primitive, m.normals_at, m.uvs_at, m.material);
     if (m.deforms()) h.add(m.steps);
+    if (!m.splats.empty()) {
+      h.add_array(std::span<const float>(reinterpret_cast<const float*>(m.splats.data()),
+                                         16 * m.splats.size()));
+      h.add_array(m.harmonics);
+    }
     for (const MeshAttribute& a : m.attributes) {
       h.add(a.id, a.rate, a.width);
       h.add_array(a.values);

@@ -15,7 +15,7 @@ uint64_t address(const void* p) {
 
 /// How many values an attribute of that rate has on a mesh; 0 for a rate that such a mesh has not.
 size_t value_count(const Mesh& mesh, AttributeRate rate) {
-  const bool strands = mesh.is_curved() && mesh.primitive != Primitive::kSphere;
+  const bool strands = mesh.is_strands();
   switch (rate) {
     case AttributeRate::kConstant:
       return 1;

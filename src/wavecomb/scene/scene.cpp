@@ -99,7 +99,7 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.has_emissive_meshes = !lights_->emissive.empty();
   v.has_curves = std::any_of(meshes().begin(), meshes().end(),
                              [](const Mesh& mesh) { return mesh.is_curved(); });
-  v.has_presence = materials_->has_presence;
+  v.has_presence = materials_->has_presence || splats() > 0;
   if (links_) v.lights.links = links_->view();
 }
 
@@ -182,7 +182,7 @@ uint64_t Scene::unique_triangles() const {
 uint64_t Scene::curve_segments() const {
   uint64_t n = 0;
   for (const Mesh& mesh : meshes())
-    if (mesh.is_curved() && mesh.primitive != Primitive::kSphere) n += mesh.primitive_count();
+    if (mesh.is_strands()) n += mesh.primitive_count();
   return n;
 }
 
@@ -190,6 +190,12 @@ uint64_t Scene::points() const {
   uint64_t n = 0;
   for (const Mesh& mesh : meshes())
     if (mesh.primitive == Primitive::kSphere) n += mesh.primitive_count();
+  return n;
+}
+
+uint64_t Scene::splats() const {
+  uint64_t n = 0;
+  for (const Mesh& mesh : meshes()) n += mesh.splats.size();
   return n;
 }
 
@@ -203,7 +209,8 @@ SceneBytes Scene::bytes() const {
   SceneBytes b;
   for (const Mesh& m : meshes())
     b.meshes += m.positions.size_bytes() + m.indices.size_bytes() + m.normals.size_bytes() +
-                m.uvs.size_bytes() + m.face_materials.size_bytes() + m.radii.size_bytes();
+                m.uvs.size_bytes() + m.face_materials.size_bytes() + m.radii.size_bytes() +
+                m.splats.size_bytes() + m.harmonics.size_bytes();
   for (const Mesh& m : meshes())
     for (const MeshAttribute& a : m.attributes) b.meshes += a.values.size_bytes();
   b.meshes += tangents_->bytes();

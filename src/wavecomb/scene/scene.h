@@ -107,6 +107,7 @@ class Scene {
   /// Segments of curves and points, each counted once.
   uint64_t curve_segments() const;
   uint64_t points() const;
+  uint64_t splats() const;
   SceneBytes bytes() const;
   /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }

@@ -49,6 +49,11 @@ MeshRecord make_mesh_record(const Mesh& mesh) {
   r.uvs = address(mesh.uvs.data());
   r.face_materials = address(mesh.face_materials.empty() ? nullptr : mesh.face_materials.data());
   r.radii = address(mesh.radii.data());
+  if (mesh.primitive == Primitive::kSplat) {
+    r.normals = address(mesh.splats.data());
+    r.uvs = address(mesh.harmonics.data());
+    r.flags |= mesh.harmonics_degree << kHarmonicsShift;
+  }
   r.material = mesh.material;
   r.uv_density = uv_density(mesh);
   if (mesh.normals_at == Attribute::kVertex) r.flags |= kNormalsPerVertex;

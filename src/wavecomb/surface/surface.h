@@ -128,7 +128,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   }
   if (kWithCurves && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);
-    if (any(curved)) detail::setup_curved<F>(scene, hit, with_uv, curved, s);
+    if (any(curved)) detail::setup_curved<F>(scene, hit, dir, with_uv, curved, s);
   }
   s.unbent = s.ns;
   s.ns = facing_normal<F>(dir, s.ng, s.ns);

@@ -64,7 +64,7 @@ inline Vec2<F> hit_uv(const MeshRecord* meshes, const UInt<F>& mesh, const UInt<
   }
   if (any(curved)) {
     const Vec2<F> c =
-        detail::curve_uv<F>(reader, prim, u, v, curved, curved & not_(is(kIsSphere))).uv;
+        detail::curve_uv<F>(reader, prim, u, v, curved, curved & not_(is(kIsDots))).uv;
     uv = {select(curved, c.x, uv.x), select(curved, c.y, uv.y)};
   }
   return uv;

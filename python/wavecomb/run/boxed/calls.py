@@ -288,6 +288,16 @@ CALLS: dict[str, Call] = {
         "meshes",
         keeps=True,
     ),
+    "add_splats": Call(
+        {
+            "positions": array(_FLOATS, 2), "scales": array(_FLOATS, 2),
+            "orientations": array(_FLOATS, 2), "opacities": array(_FLOATS, 1),
+            "harmonics": array(_FLOATS, 3),
+        },
+        {"material": whole, "name": text, "light_group": text, "asset_length": whole},
+        "meshes",
+        keeps=True,
+    ),
     "add_group": Call({}, {"name": text, "root": text}, "groups"),
     "add_to_group": Call({"group": whole, "mesh": whole}),
     "add_instances": Call(

@@ -16,7 +16,7 @@ from wavecomb.run.boxed.wire import Sender
 from wavecomb.usd.looks.texture import Prepared
 
 _NOTHING = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)
-_SHAPES = ("add_mesh", "add_curves", "add_points", "replace_mesh")
+_SHAPES = ("add_mesh", "add_curves", "add_points", "add_splats", "replace_mesh")
 
 
 class RemoteScene:

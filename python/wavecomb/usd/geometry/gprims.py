@@ -16,6 +16,7 @@ from wavecomb.usd.geometry.nurbs_patch import PatchReader
 from wavecomb.usd.geometry.points import PointReader
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.skeleton import Skeletons
+from wavecomb.usd.geometry.splats import SplatArrays, SplatReader
 from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.looks.assign import Draw
@@ -65,7 +66,7 @@ class GprimReader:
 
     def _changes(self, kind: str, prim: Usd.Prim) -> bool:
         """Whether the shape of a gprim may change over time."""
-        return kind != "shape" and deforms(prim, self.skeletons.of(prim))
+        return kind not in ("shape", "splats") and deforms(prim, self.skeletons.of(prim))
 
     def read(
         self,
@@ -79,7 +80,7 @@ class GprimReader:
         Those of the frame before where they are the same.
 
         Args:
-            kind: mesh, patch, shape, curves or points.
+            kind: mesh, patch, shape, curves, points or splats.
             draw: The gprim.
             names: Primvars to take texture coordinates from, the first there is.
             detail: Of curves; what it makes of them is of one view, and not kept.
@@ -91,6 +92,8 @@ class GprimReader:
 
         def read(report: LoadReport) -> MeshArrays | CurveArrays | None:
             strands: CurveArrays | None
+            if kind == "splats":
+                return SplatReader(self.time, report).splats(draw.prim, draw.matrix)
             if kind in ("curves", "points"):
                 if kind == "curves":
                     curves = CurveReader(self.time, report)
@@ -133,7 +136,8 @@ def add_shape(
 ) -> int:
     """Adds arrays to the scene; gives their number there.
 
-    ``options``: Keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` all take.
+    ``options``: Keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` all take; of
+    splats those of ``add_splats``.
     """
     # What is not there is not said: a stage may have a hundred thousand of them.
     if isinstance(shape, MeshArrays):
@@ -142,6 +146,15 @@ def add_shape(
         if shape.uvs is not None:
             options["uvs"] = shape.uvs
         return builder.add_mesh(shape.positions, shape.triangles, **options)
+    if isinstance(shape, SplatArrays):
+        return builder.add_splats(
+            shape.positions,
+            shape.scales,
+            shape.orientations,
+            shape.opacities,
+            shape.harmonics,
+            **options,
+        )
     options = {**_OPTIONS, **options}
     if shape.segments is None:
         return builder.add_points(shape.positions, shape.radii, uvs=shape.uvs, **options)

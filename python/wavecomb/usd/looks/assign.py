@@ -46,7 +46,7 @@ class Draw:
     """A gprim to draw.
 
     Attributes:
-        prim: Mesh, implicit shape, curves or points.
+        prim: Mesh, implicit shape, curves, points or splats.
         matrix: From it to its group.
         inherited: Constant primvars of its ancestors.
         subsets: GeomSubset prims that bind materials.
@@ -54,7 +54,7 @@ class Draw:
         subset_materials: Bound to each subset.
         track: In place of ``matrix`` where that changes while the shutter is open.
         names: Properties that it has opinions of (``authored_names``).
-        kind: What it is to the walk: mesh, patch, shape, curves or points.
+        kind: What it is to the walk: mesh, patch, shape, curves, points or splats.
         parent: The prim that it is a child of, where the walk came from there.
     """
 

@@ -48,6 +48,9 @@ PREVIEW = "preview"
 LAMP = 1.0
 """Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
 
+SPLATS = Surface("splats", "emissive", {"emission": (1.0, 1.0, 1.0)})
+"""What Gaussian splats wear: it multiplies the light that they have."""
+
 
 def bound_materials(
     prims: Sequence[Usd.Prim], purposes: Sequence[str] = BINDING_PURPOSES
@@ -291,6 +294,10 @@ class MaterialTable:
             surface = fallback_surface((r, g, b), float(opacity), varying=varying)
             number = self._plain[key] = self.add(self.varied(surface, varying))
         return number
+
+    def splats(self) -> int:
+        """Material id of Gaussian splats, which have light of their own."""
+        return self.add(SPLATS)
 
     def _convert(self, material: UsdShade.Material) -> Surface:
         prim = material.GetPrim()

@@ -54,9 +54,11 @@ _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 
 _WORDS = {
     "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
+    "splats": "splats",
 }  # fmt: skip
 _COUNTS = {
     "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
+    "splats": "splats",
 }  # fmt: skip
 DRAWN_COUNTS = (*_COUNTS.values(), "volumes")
 """Counts of ``LoadReport`` for what is drawn."""
@@ -206,6 +208,13 @@ class GroupBuilder:
         if kind in STRANDS.values() and uniform_scale(draw.matrix) is None:
             own = replace(draw, matrix=IDENTITY)
             return self._draw_alone(group, own, draw.matrix, scope)
+        if kind == "splats":
+            if not _only_moves(draw.matrix):
+                own = replace(draw, matrix=IDENTITY)
+                return self._draw_alone(group, own, draw.matrix, scope)
+            if draw.material is not None:
+                self.report.missing("materials of splats (they have colours)", draw.prim.GetPath())
+            draw = replace(draw, material=None, subsets=(), subset_materials=[])
         if scope.override:
             draw.subsets = ()
         lamp = self.mesh_lights.of(draw, kind)
@@ -234,6 +243,8 @@ class GroupBuilder:
             return
         if lamp is not None and lamp.material is not None:
             worn = Worn(lamp.material)
+        elif kind == "splats":
+            worn = Worn(self.materials.splats())
         else:
             worn = self._materials(draw, shape, scope)
         material, faces = worn.material, None
@@ -287,8 +298,8 @@ class GroupBuilder:
     ) -> None:
         """Adds a gprim as an instance of its own, placed by ``matrix``.
 
-        For what moves as a whole, by ``steps`` (s, 4, 4), and for curves or points that a transform
-        makes oval.
+        For what moves as a whole, by ``steps`` (s, 4, 4), for curves or points that a transform
+        makes oval, and for splats that it turns: their colours turn with them.
         """
         path = draw.prim.GetPath()
         child = Group(str(path), self.report.place(path))
@@ -439,3 +450,8 @@ class GroupBuilder:
             "point", path, inner.bound, inner.override, placed.purpose, inner.alias, look.key, worn,
         )  # fmt: skip
         return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)
+
+
+def _only_moves(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform is a translation."""
+    return all(matrix.GetRow3(k) == IDENTITY.GetRow3(k) for k in range(3))

@@ -17,6 +17,7 @@ from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import SHAPES
 from wavecomb.usd.geometry.shutter import Motion, Track
 from wavecomb.usd.geometry.skeleton import Skeletons
+from wavecomb.usd.geometry.splats import SPLATS
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import Light, LightReader
 from wavecomb.usd.looks.assign import Draw, Parent
@@ -34,7 +35,7 @@ Matrices = NDArray[np.float64]
 STRANDS = {
     "BasisCurves": "curves", "NurbsCurves": "curves", "HermiteCurves": "curves", "Points": "points",
 }  # fmt: skip
-DRAWN = frozenset(("mesh", "patch", "shape", *STRANDS.values()))
+DRAWN = frozenset(("mesh", "patch", "shape", "splats", *STRANDS.values()))
 """Kinds of prims that become geometry."""
 
 
@@ -103,6 +104,8 @@ class Traversal:
                 kind = "shape"
             elif name in STRANDS:
                 kind = STRANDS[name]
+            elif name == SPLATS:
+                kind = "splats"
             elif name in LIGHT_KINDS:
                 kind = "light"
             elif prim.IsA(UsdVol.Volume):

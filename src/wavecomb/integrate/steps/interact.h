@@ -10,6 +10,7 @@
 
 #include "wavecomb/core/frame.h"
 #include "wavecomb/curve/fibre.h"
+#include "wavecomb/curve/splat_surface.h"
 #include "wavecomb/graph/hit_point.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/material/params.h"
@@ -128,6 +129,9 @@ WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, cons
   const Vec2<F> uv = s.uv;
   auto params = fetch_for<Bsdf, kVertexInputs<Bsdf>, F>(v.scene.materials, v.material, uv,
                                                         footprint, make_point, v.active);
+  if constexpr (Bsdf::kOnSplats && Vertex<F, kFeatures>::has(kCurves))
+    if (v.scene.has_curves) [[unlikely]]
+      params.emission *= splat_radiance<F>(v.scene, v.hit, path.dir, v.active);
   Color<F> throughput = path.throughput;
   if (v.knows_inside()) [[unlikely]] {
     if constexpr (Bsdf::kReadsIor && Bsdf::kTransmits)

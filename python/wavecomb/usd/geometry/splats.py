@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""UsdVol's ParticleField3DGaussianSplat as arrays for the core."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Usd
+
+from wavecomb.usd.geometry.curves import Array, CurveArrays, thick_extent
+from wavecomb.usd.geometry.mesh_arrays import bake, check_matrix
+from wavecomb.usd.geometry.primvar import as_array
+from wavecomb.usd.geometry.strands import lay_out_points
+from wavecomb.usd.stage.report import LoadReport
+
+SPLATS = "ParticleField3DGaussianSplat"
+"""The type of the prims."""
+
+LEAST_SCALE, MOST_SCALE = 1e-9, 1e9
+"""Between which the core takes scales."""
+
+_MOST_DEGREE = 3
+_REACH = 3.0
+_SH = "radiance:sphericalHarmonics"
+
+
+@dataclass
+class SplatArrays(CurveArrays):
+    """Gaussian splats in their group's space; ``radii`` are of balls around them.
+
+    Attributes:
+        scales: (n, 3) standard deviations along their axes.
+        orientations: (n, 4) quaternions w, x, y, z.
+        opacities: (n,) from 0 to 1.
+        harmonics: (n, k, 3), k 1, 4, 9 or 16: spherical harmonics of the colour less 0.5.
+    """
+
+    scales: Array
+    orientations: Array
+    opacities: Array
+    harmonics: Array
+
+
+class SplatReader:
+    """Reads splats of one stage."""
+
+    def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
+        self.time = time
+        self.report = report
+
+    def splats(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> SplatArrays | None:
+        """Splats in their group's space; None where there are none.
+
+        Args:
+            prim: A ParticleField3DGaussianSplat.
+            matrix: From the prim to its group: a translation.
+
+        Raises:
+            MeshError: They cannot be drawn.
+        """
+        check_matrix(matrix)
+        found = self._values(prim, "positions", 3)
+        if found is None or len(found) == 0:
+            return None
+        n = len(found)
+        positions = bake(found, matrix)
+        scales = self._fitting(prim, "scales", (1.0, 1.0, 1.0), n)
+        turns = self._fitting(prim, "orientations", (0.0, 0.0, 0.0, 1.0), n)
+        opacities = self._fitting(prim, "opacities", (1.0,), n)[:, 0]
+        harmonics = self._harmonics(prim, n)
+        with np.errstate(over="ignore", invalid="ignore"):
+            sizes = np.einsum("ij,ij->i", turns, turns)
+        bad = {
+            "middles that are not finite or absurdly far away": ~(np.abs(positions) < 1e18).all(1),
+            f"scales that are not from {LEAST_SCALE:g} to {MOST_SCALE:g}": ~(
+                (scales >= LEAST_SCALE) & (scales <= MOST_SCALE)
+            ).all(1),
+            "orientations of length zero or not finite": ~((sizes > 1e-20) & (sizes < 1e20)),
+            "opacities that are negative or not finite": ~((opacities >= 0) & (opacities < np.inf)),
+            "colours that are not finite": ~np.isfinite(harmonics).all((1, 2)),
+        }
+        kept = np.ones(n, bool)
+        for what, wrong in bad.items():
+            if wrong.any():
+                self.report.warn(f"splats left out: {what}", prim.GetPath(), int(wrong.sum()))
+                kept &= ~wrong
+        if not kept.any():
+            return None
+        if (high := int((opacities[kept] > 1).sum())) > 0:
+            self.report.warn("splats with opacities above 1: set to 1", prim.GetPath(), high)
+        if not kept.all():
+            positions, scales, turns, opacities, harmonics = (
+                values[kept] for values in (positions, scales, turns, opacities, harmonics)
+            )
+        radii = np.asarray(_REACH * scales.max(1), np.float32)
+        return SplatArrays(
+            "splat", positions, None, radii, None, None, thick_extent(positions, radii),
+            lay_out_points(len(positions)), _plain(scales), _plain(turns[:, [3, 0, 1, 2]]),
+            _plain(np.minimum(opacities, 1.0)), harmonics,
+        )  # fmt: skip
+
+    def _values(self, prim: Usd.Prim, name: str, width: int) -> NDArray[Any] | None:
+        """(n, width) of an attribute in floats, else in halves; None where neither has values."""
+        for full in (name, f"{name}h"):
+            attribute = prim.GetAttribute(full)
+            values = as_array(attribute.Get(self.time)) if attribute else None
+            if values is not None and len(values) and values.shape[1] == width:
+                return np.asarray(values, np.float32)
+        return None
+
+    def _fitting(
+        self, prim: Usd.Prim, name: str, otherwise: tuple[float, ...], count: int
+    ) -> NDArray[Any]:
+        """(count, width). As UsdVol says, what is too long is cut, what is too short ignored."""
+        values = self._values(prim, name, len(otherwise))
+        if values is not None and len(values) > count:
+            self.report.warn(f"more {name} than splats: the first count", prim.GetPath())
+        if values is not None and len(values) < count:
+            self.report.warn(f"fewer {name} than splats: ignored", prim.GetPath())
+            values = None
+        if values is None:
+            return np.broadcast_to(np.array(otherwise, np.float32), (count, len(otherwise)))
+        return values[:count]
+
+    def _harmonics(self, prim: Usd.Prim, count: int) -> Array:
+        """(count, k, 3) of the colours; grey where there are none that fit."""
+        degree = prim.GetAttribute(f"{_SH}Degree").Get()
+        degree = 3 if degree is None else int(degree)
+        values = self._values(prim, f"{_SH}Coefficients", 3)
+        wanted = count * (max(degree, 0) + 1) ** 2
+        if values is None:
+            self.report.warn("splats without colours: drawn grey", prim.GetPath())
+        elif degree < 0 or len(values) < wanted:
+            what = f"fewer harmonics of splats than degree {degree} asks for: drawn grey"
+            self.report.warn(what, prim.GetPath())
+            values = None
+        elif len(values) > wanted:
+            what = f"more harmonics of splats than degree {degree} asks for: the first count"
+            self.report.warn(what, prim.GetPath())
+        if values is None:
+            return np.zeros((count, 1, 3), np.float32)
+        harmonics = values[:wanted].reshape(count, -1, 3)
+        if degree > _MOST_DEGREE:
+            what = f"spherical harmonics of splats above degree {_MOST_DEGREE}"
+            self.report.missing(what, prim.GetPath())
+        return _plain(harmonics[:, : (_MOST_DEGREE + 1) ** 2])
+
+
+def _plain(values: NDArray[Any]) -> Array:
+    return np.ascontiguousarray(values, np.float32)
