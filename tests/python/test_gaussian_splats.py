@@ -18,7 +18,9 @@ from usd_recorder import Recorder, said
 import wavecomb
 from wavecomb import _core
 from wavecomb.cli import main
+from wavecomb.picture.image import linear_from_srgb
 from wavecomb.scenes import write_scene
+from wavecomb.scenes.capture import basis, linear_harmonics
 from wavecomb.usd import load_stage
 
 Floats = NDArray[np.float64]
@@ -184,7 +186,16 @@ def test_a_capture_becomes_a_stage(tmp_path: Path) -> None:
     columns = {name: rng.normal(size=5) for name in names}
     file = write_ply(tmp_path / "c.ply", columns)
     run = CliRunner().invoke(
-        main, ["scene", "splats", "-o", str(tmp_path / "c.usdc"), "--capture", str(file)]
+        main,
+        [
+            "scene",
+            "splats",
+            "-o",
+            str(tmp_path / "c.usdc"),
+            "--capture",
+            str(file),
+            "--capture-linear",
+        ],  # fmt: skip
     )
     assert run.exit_code == 0, run.output
     scene, told = recorded(tmp_path / "c.usdc")
@@ -199,6 +210,24 @@ def test_a_capture_becomes_a_stage(tmp_path: Path) -> None:
     bad = write_ply(tmp_path / "bad.ply", {name: columns[name] for name in "xyz"})
     with pytest.raises(ValueError, match=r"bad\.ply: not a capture of Gaussian splats: no opacity"):
         write_scene("splats", tmp_path / "d.usdc", capture=bad)
+
+
+def test_colours_of_captures_are_decoded() -> None:
+    """In each direction what is seen is that of sRGB; exactly where there is one colour."""
+    rng = np.random.default_rng(2)
+    views = rng.normal(size=(64, 3))
+    views /= np.linalg.norm(views, axis=1, keepdims=True)
+    grey = np.zeros((2, 1, 3))
+    grey[1] = (0.3 - 0.5) / 0.28209479
+    got = 0.5 + basis(views)[:, :1] @ linear_harmonics(grey)
+    assert got[0] == pytest.approx(linear_from_srgb(np.full((64, 3), 0.5)), rel=1e-4)
+    assert got[1] == pytest.approx(linear_from_srgb(np.full((64, 3), 0.3)), rel=1e-4)
+    several = rng.normal(size=(40, 16, 3)) * 0.05
+    several[:, 0] = rng.uniform(-0.8, 1.2, (40, 3))
+    encoded = 0.5 + basis(views) @ several
+    got = 0.5 + basis(views) @ linear_harmonics(several)
+    off = np.abs(got - linear_from_srgb(np.maximum(encoded, 0)))
+    assert off.max() < 0.03 and off.mean() < 0.003
 
 
 # Closed forms

@@ -65,6 +65,9 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     help="splats: a PLY of 3D Gaussian splats instead.",
 )
 @click.option(
+    "--capture-linear", is_flag=True, help="Colours of the capture are linear light, not sRGB."
+)
+@click.option(
     "--voxels",
     type=click.IntRange(min=16),
     metavar="N",

@@ -17,6 +17,10 @@ from wavecomb.scenes.stage import StageWriter
 
 _COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
 """Degree by how many coefficients there are beside the first."""
+_DIRECTIONS = 128
+"""In which colours are looked at."""
+_CHUNK = 1 << 15
+"""Splats whose colours are worked out at once."""
 
 
 @dataclass
@@ -76,6 +80,50 @@ def read_capture(path: Path) -> Splats:
         scales = np.exp(table("scale_", 3))
     positions = np.stack([columns[axis] for axis in "xyz"], axis=1)
     return Splats(positions, scales, table("rot_", 4), opacities, first)
+
+
+def basis(directions: FloatArray) -> FloatArray:
+    """Real spherical harmonics up to degree 3 of unit directions (n, 3): (n, 16).
+
+    With the phase of Condon and Shortley, as curve/harmonics.h has them.
+    """
+    x, y, z = directions.T
+    xx, yy, zz = x * x, y * y, z * z
+    high = 4 * zz - xx - yy
+    return np.stack(
+        [
+            np.full_like(x, 0.28209479),
+            -0.48860251 * y, 0.48860251 * z, -0.48860251 * x,
+            1.09254843 * x * y, -1.09254843 * y * z, 0.31539157 * (2 * zz - xx - yy),
+            -1.09254843 * x * z, 0.54627422 * (xx - yy),
+            -0.59004359 * y * (3 * xx - yy), 2.89061144 * x * y * z, -0.45704580 * y * high,
+            0.37317633 * z * (2 * zz - 3 * (xx + yy)), -0.45704580 * x * high,
+            1.44530572 * z * (xx - yy), -0.59004359 * x * (xx - 3 * yy),
+        ],
+        axis=1,
+    )  # fmt: skip
+
+
+def linear_harmonics(harmonics: FloatArray) -> FloatArray:
+    """Harmonics of linear light (n, k, 3), less 0.5, for those of colours in sRGB.
+
+    Colours are decoded in directions all over the sphere, and the harmonics are those of least
+    squares. What is below 0 there is 0.
+    """
+    from wavecomb.picture.image import linear_from_srgb
+
+    turn = np.arange(_DIRECTIONS) * (np.pi * (3.0 - 5.0**0.5))
+    z = 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+    r = np.sqrt(1.0 - z * z)
+    seen = basis(np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1))
+    seen = seen[:, : harmonics.shape[1]]
+    fit = np.linalg.pinv(seen)
+    out = np.empty(harmonics.shape, np.float64)
+    for first in range(0, len(harmonics), _CHUNK):
+        chunk = slice(first, first + _CHUNK)
+        colours = np.maximum(0.5 + seen @ harmonics[chunk], 0.0)
+        out[chunk] = fit @ (linear_from_srgb(colours) - 0.5)
+    return out
 
 
 def add_splats(writer: StageWriter, path: str, splats: Splats) -> None:

@@ -34,6 +34,8 @@ class SceneOptions:
         strands: How many ``fur`` and ``head`` have.
         splats: How many ``splats`` has.
         capture: PLY file of 3D Gaussian splats that ``splats`` holds in place of all else, or None.
+        capture_linear: Whether its colours are linear light; else they are in sRGB, as captures are
+            mostly trained.
         voxels: Along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
         plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
             the metallic workflow, no program named. ``heavy`` has no such form, nor has hair,
@@ -57,6 +59,7 @@ class SceneOptions:
     strands: int = 100_000
     splats: int = 60_000
     capture: Path | str | None = None
+    capture_linear: bool = False
     voxels: int = 160
     plain: bool = False
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.capture import Splats, add_splats, read_capture
+from wavecomb.scenes.capture import Splats, add_splats, linear_harmonics, read_capture
 from wavecomb.scenes.mesh import FloatArray, Mesh, face_areas
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
@@ -75,7 +75,10 @@ def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -
 def build_splats(writer: StageWriter, options: SceneOptions) -> None:
     """Floor, mirror, lamp, and the dragon; or a capture alone."""
     if options.capture is not None:
-        add_splats(writer, "/World/Objects/Capture", read_capture(Path(options.capture)))
+        capture = read_capture(Path(options.capture))
+        if not options.capture_linear:
+            capture.harmonics = linear_harmonics(capture.harmonics)
+        add_splats(writer, "/World/Objects/Capture", capture)
         return
     rng = np.random.default_rng([options.seed, 77])
     writer.material("Floor", looks.diffuse((0.42, 0.41, 0.39)))
