@@ -195,7 +195,7 @@ def test_a_capture_becomes_a_stage(tmp_path: Path) -> None:
             "--capture",
             str(file),
             "--capture-linear",
-        ],  # fmt: skip
+        ],
     )
     assert run.exit_code == 0, run.output
     scene, told = recorded(tmp_path / "c.usdc")
