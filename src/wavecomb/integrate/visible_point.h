@@ -3,10 +3,10 @@
 /// near them (docs/light-paths.md, "Merging").
 ///
 /// A camera path whose bounces so far were deltas, one or more, leaves a point at the first vertex
-/// that scatters otherwise, too. A path from a light cannot be shown to the camera through a mirror;
-/// but one whose vertex lies within r of the point, r in pixels as they are seen there, is taken to
-/// end at it. Such points are the eye's (T. Hachisuka et al., "Progressive Photon Mapping", 2008),
-/// and light is splatted to their pixels: sums of integers, whatever the order.
+/// that scatters otherwise, too. A path from a light cannot be shown to the camera through a
+/// mirror; but one whose vertex lies within r of the point, r in pixels as they are seen there, is
+/// taken to end at it. Such points are the eye's (T. Hachisuka et al., "Progressive Photon
+/// Mapping", 2008), and light is splatted to their pixels: sums of integers, whatever the order.
 ///
 /// A pass has one sample of each pixel, which leaves one point at most; paths from lights come
 /// after all of them.
