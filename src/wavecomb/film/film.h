@@ -2,6 +2,7 @@
 /// The picture while it grows.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -51,14 +52,19 @@ class Film {
   /// Keeps a row of so many words for each pixel from now on (integrate/visible_points.h).
   static constexpr size_t kVisibleWords = 16;
   void keep_visible_points() { visible_.assign(pixels_.size() * kVisibleWords, 0.f); }
-  bool has_visible_points() const { return !visible_.empty(); }
   std::span<const float> visible_points() const { return visible_; }
-  float* visible_point(size_t i) { return visible_.data() + i * kVisibleWords; }
-  /// Adds a splat to a list, which goes to the film where it is full.
-  void collect(SplatList& list, const SplatList::Splat& splat) {
-    if (list.add(splat)) return;
+  void set_visible_point(size_t i, const float* row) {
+    std::copy_n(row, kVisibleWords, visible_.data() + i * kVisibleWords);
+  }
+  /// Adds all of a list, which is empty then.
+  void take(SplatList& list) {
     splats_.add(list);
     list.clear();
+  }
+  /// Adds a splat to a list, which is taken where it is full.
+  void collect(SplatList& list, const SplatList::Splat& splat) {
+    if (list.add(splat)) return;
+    take(list);
     (void)list.add(splat);
   }
   /// Keeps samples by brightness from now on; the beauty is then reweighted. `darkest`: the

@@ -124,10 +124,7 @@ class LightTracer {
 /// Gives the film what the paths of a task have brought.
 inline void end_light_task(const WaveContext& context, ReferenceWorker& worker,
                            const WaveTask& task) {
-  if (!context.lessons) {
-    context.film->splats().add(worker.splats);
-    worker.splats.clear();
-  }
+  if (!context.lessons) context.film->take(worker.splats);
   count_light_paths(context, task);
 }
 

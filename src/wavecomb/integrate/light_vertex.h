@@ -29,6 +29,8 @@
 ///   own: c^2 (1 + x) / x.
 #pragma once
 
+#include <array>
+
 #include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/light_path.h"
 #include "wavecomb/integrate/steps/note_events.h"

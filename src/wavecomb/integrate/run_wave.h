@@ -88,10 +88,7 @@ struct LightPaths {
   static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
   static void resolve(Wave& wave, const WaveContext& context, const WaveTask& its_task,
                       uint32_t /*depth*/) {
-    if (context.merges()) {
-      context.film->splats().add(wave.splats);
-      wave.splats.clear();
-    }
+    if (context.merges()) context.film->take(wave.splats);
     count_light_paths(context, its_task);
   }
 };

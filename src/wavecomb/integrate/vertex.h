@@ -63,11 +63,11 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   const auto seen = at.bsdf.view(wo);
   const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
   JointVertex<F> joint{};
-  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface) {
     joint = joint_vertex<Bsdf, F>(v, at, frame);
-  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     if (v.visible) [[unlikely]]
       leave_point<F>(v, at, joint);
+  }
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));

@@ -22,7 +22,6 @@ class VisibleGrid {
  public:
   /// `points`: rows by pixel, which stay where they are.
   void build(std::span<const float> points);
-  size_t bytes() const { return (starts_.size() + entries_.size()) * sizeof(uint32_t); }
   const float* points() const { return points_; }
 
   /// Goes through the points that a place lies within the radius of.

@@ -30,8 +30,8 @@ struct LightParts {
   uint32_t of(uint32_t light) const;
 };
 
-/// Most lights of a table that are weighed: 8 bytes each, and 16 more meanwhile, beside the 64 of
-/// the light itself. Each has one of 2^24 numbers whatever its share: half of them are left.
+/// Most lights of a table that are weighed: 8 bytes each, and some 30 more meanwhile, beside the 64
+/// of the light itself. Each has one of 2^24 numbers whatever its share: half of them are left.
 inline constexpr size_t kMostWeighed = size_t{1} << 23;
 
 /// The parts of the lights of a scene, chosen by tree or by power. Empty where there is nothing to

@@ -66,8 +66,7 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
     }
   }
   if (context.lessons) return;
-  context.film->splats().add(wave.splats);
-  wave.splats.clear();
+  context.film->take(wave.splats);
 }
 
 }  // namespace wavecomb

@@ -19,11 +19,12 @@
 /// x_i+1, of which each has, beside what it shares with R,
 ///   E_i = d^2 / p->_i   (d their distance)   in place of   p<-_i+1  and all that R has before:
 ///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
+/// E is 0 where either of the two scatters as a delta, where x_i+1 is none that paths from lights
+/// go to, and where it is looked at out of what absorbs.
+///
 /// Where vertices are merged, paths whose bounces were all deltas have another third technique: one
 /// that ends within r of x_k, the first vertex behind them that scatters otherwise, too. It begins
 /// with pi r^2 in place of 1 / (G |g w_k|). The bounce at x_k, if a delta, ends it.
-/// E is 0 where either of the two scatters as a delta, where x_i+1 is none that paths from lights
-/// go to, and where it is looked at out of what absorbs.
 #pragma once
 
 #include "wavecomb/integrate/steps/interact.h"
@@ -153,14 +154,13 @@ WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& a
                  F(abs(wo.z) / select(z > 0.f, z, F(1.f)));
     by_angle = select(passes_one_way<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
-    r = min(max(r, F(0.f)), F(kMostRatio));
-    if (v.settings.merge_scale > 0.f) [[unlikely]] {
-      const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & (v.path.ratio < 0.f));
-      r = select(waits & not_(joint.merges), F(-1.f), select(b.is_delta & joint.merges, F(0.f), r));
-    }
-    return r;
   }
-  return min(max(r, F(0.f)), F(kMostRatio));
+  r = min(max(r, F(0.f)), F(kMostRatio));
+  if (v.settings.merge_scale > 0.f) [[unlikely]] {
+    const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & (v.path.ratio < 0.f));
+    r = select(waits & not_(joint.merges), F(-1.f), select(b.is_delta & joint.merges, F(0.f), r));
+  }
+  return r;
 }
 
 }  // namespace wavecomb
