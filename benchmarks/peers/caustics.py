@@ -8,10 +8,10 @@
 Each renderer is asked for as many samples as it has in ``--seconds``, by a trial, in rounds of
 shuffled order; a picture is written for each, in one row with the reference, which is Wavecomb's
 with light paths, of other seeds, merged within half a pixel. relMSE = mean of (x - r)^2 / (r^2 +
-0.01 mean(r)^2), of the whole picture and of the pixels whose light is mostly that of light paths in
-the reference (caustics). Materials are those of the bridges: where a peer's is only the nearest,
-its error has that in it, so means are printed, too. ptracer has no MIS and does not find what the
-camera sees through glass.
+0.01 mean(r)^2) without the worst thousandth of the pixels, of the whole picture and of those whose
+light is mostly that of light paths in the reference (caustics). Materials are those of the bridges:
+where a peer's is only the nearest, its error has that in it, so means are printed, too. ptracer has
+no MIS and does not find what the camera sees through glass.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ from report import commit, machine
 sys.path.insert(0, str(ROOT / "benchmarks"))
 from pictures import white_of, write_row
 from sitting import ratio, show, summary, write_result
+
+from wavecomb.picture.compare import trimmed_mean
 
 STAGES = ("caustics", "lens", "pool", "prism", "landscape")
 COLUMNS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -97,11 +99,12 @@ def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
             process.close()
             shown.setdefault(column, image)
             error = ((image - truth) ** 2 * scale).mean(2)
+            some = error[mask] if mask.any() else np.zeros(1)
             took = float(answer["seconds"])
             costs[column]["seconds"].append(took)
             costs[column]["spp"].append(answer["spp"])
-            costs[column]["whole"].append(float(error.mean()) * took)
-            costs[column]["caustics"].append(float(error[mask].mean() if mask.any() else 0) * took)
+            costs[column]["whole"].append(trimmed_mean(error) * took)
+            costs[column]["caustics"].append(trimmed_mean(some) * took)
     rows = [shown[column].astype(np.float32) for column in args.columns]
     row = args.pictures / f"beside-{name}.png"
     write_row(row, [truth.astype(np.float32), *rows], white_of(truth.astype(np.float32)))

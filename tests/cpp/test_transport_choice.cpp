@@ -59,14 +59,14 @@ TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
 TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
   // v 1 + 3 without, (1 + 1) at s = 1, and light paths cost what camera paths cost.
   const TransportGain gain = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
-  const double path = kRays + 0.7 * kRecords, joint = kRays + 1.2 * kRecords;
+  const double path = kRays + 0.7 * kRecords, joint = kRays + 0.8 * kRecords;
   EXPECT_EQ(gain.share.exponent, 0);
   EXPECT_NEAR(gain.gain, 4 * path / (2 * 2 * joint), 0.15);
 }
 
 TEST(TransportGain, AsksForManyLightPathsWhereTheyAreTheNoise) {
-  EXPECT_EQ(gain_of(0.5f, 0.01f, 0.3f).share.exponent, 2);
-  EXPECT_EQ(gain_of(0.5f, 0.3f, 0.01f).share.exponent, -2);
+  EXPECT_EQ(gain_of(0.5f, 0.01f, 0.3f).share.exponent, 3);
+  EXPECT_EQ(gain_of(0.5f, 0.3f, 0.01f).share.exponent, -3);
 }
 
 TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {

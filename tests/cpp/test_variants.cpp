@@ -3,6 +3,7 @@
 #include <set>
 
 #include "wave_testing.h"
+#include "wavecomb/render/renderer.h"
 #include "wavecomb/scene/material_parts.h"
 
 namespace wavecomb {
@@ -147,6 +148,26 @@ TEST(Variants, NoVariantShowsInThePicture) {
     WaveRun run(scene, {s, lanes, 1}, accel);
     run.all(4096);
     expect_same_picture(reference.picture(), run.picture(), std::to_string(lanes) + " lanes");
+  }
+}
+
+/// Paths from lights have plain kernels of their own, of both kinds of paths.
+TEST(Variants, NoneShowsWhereLightIsJoined) {
+  WavefrontRenderer renderer(all_variants());
+  Settings s;
+  s.width = size_for_build(40, 4);
+  s.height = size_for_build(30, 4);
+  s.spp = 4;
+  s.max_depth = 5;
+  for (const Transport transport : {Transport::kLight, Transport::kBdpt}) {
+    s.transport = transport;
+    s.integrator = IntegratorKind::kReference;
+    const Picture reference = renderer.render(s);
+    s.integrator = IntegratorKind::kWavefront;
+    for (const char* policy : {"program", "none"}) {
+      s.policy = policy;
+      EXPECT_EQ(reference.beauty, renderer.render(s).beauty) << policy;
+    }
   }
 }
 

@@ -11,10 +11,11 @@
 
 namespace wavecomb {
 
-/// Logical not that is right for `bool` too (`~true` is not `false`).
+/// Logical not that is right for `bool` too (`~true` is not `false`), and for `bool & bool`, which
+/// is an int.
 template <typename M>
-inline M not_(const M& m) {
-  if constexpr (std::is_same_v<M, bool>)
+inline auto not_(const M& m) {
+  if constexpr (std::is_same_v<M, bool> || std::is_same_v<M, int>)
     return !m;
   else
     return ~m;

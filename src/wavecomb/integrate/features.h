@@ -22,7 +22,7 @@ enum Feature : uint32_t {
 };
 /// Renders that are joined by paths from the lights have kernels of their own; nothing walks there.
 inline constexpr uint32_t kPlain = kNotes, kEverything = 63 | kBelow | kInside,
-                          kJoint = 63 | kJoined;
+                          kPlainJoint = kNotes | kJoined, kJoint = 63 | kJoined;
 
 /// Whether there are plain kernels and least variants for packets of F: for the widest ones.
 /// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.

@@ -44,11 +44,21 @@ constexpr Kernels for_variants(Kernels kernels) {
     kernels[v] = kernels[static_cast<size_t>(program_of(v))];
   return kernels;
 }
-template <size_t kVariant, typename F>
+// Whatever lies between surfaces is not plain.
+template <size_t kVariant>
+inline constexpr bool kIsOfSurface =
+    static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount;
+template <size_t kVariant, typename F, uint32_t kFeatures>
 constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
-  // Whatever lies between surfaces is not plain.
-  if constexpr (static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount)
-    return &shade_batch<VariantBsdf<kVariant, F>, F, kPlain>;
+  if constexpr (kIsOfSurface<kVariant>)
+    return &shade_batch<VariantBsdf<kVariant, F>, F, kFeatures>;
+  else
+    return nullptr;
+}
+template <size_t kVariant, typename F>
+constexpr typename BatchKernels<F>::value_type plain_light_batch_kernel() {
+  if constexpr (kIsOfSurface<kVariant>)
+    return &shade_light_batch<VariantBsdf<kVariant, F>, F, kPlain>;
   else
     return nullptr;
 }
@@ -64,9 +74,13 @@ constexpr auto light_batch_kernels(ProgramList<Bsdf...>) {
   ((kernels[id_of<Bsdf, F>()] = &shade_light_batch<Bsdf, F, kEverything>), ...);
   return for_variants(kernels);
 }
-template <typename F, size_t... kVariant>
+template <typename F, uint32_t kFeatures, size_t... kVariant>
 constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
-  return BatchKernels<F>{plain_batch_kernel<kVariant, F>()...};
+  return BatchKernels<F>{plain_batch_kernel<kVariant, F, kFeatures>()...};
+}
+template <typename F, size_t... kVariant>
+constexpr auto plain_light_batch_kernels(std::index_sequence<kVariant...>) {
+  return BatchKernels<F>{plain_light_batch_kernel<kVariant, F>()...};
 }
 template <typename F, uint32_t kFeatures, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
@@ -104,6 +118,12 @@ inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Progra
 /// Plain kernels by variant; only where kHasPlain.
 template <typename F>
 inline constexpr auto kShadePlain =
-    detail::plain_batch_kernels<F>(std::make_index_sequence<kVariantCount>());
+    detail::plain_batch_kernels<F, kPlain>(std::make_index_sequence<kVariantCount>());
+template <typename F>
+inline constexpr auto kShadePlainJoint =
+    detail::plain_batch_kernels<F, kPlainJoint>(std::make_index_sequence<kVariantCount>());
+template <typename F>
+inline constexpr auto kShadePlainLight =
+    detail::plain_light_batch_kernels<F>(std::make_index_sequence<kVariantCount>());
 
 }  // namespace wavecomb

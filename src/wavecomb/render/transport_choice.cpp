@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 #include "wavecomb/core/backward_automaton.h"
 #include "wavecomb/core/clock.h"
@@ -20,14 +21,19 @@ constexpr uint64_t kLeastTransportPixels = 576, kMostTransportPixels = 16'384;
 /// times as much, are then a fiftieth of the render at most.
 constexpr uint64_t kTransportShare = 500;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
-/// Cost of a vertex in rays, and of one whose kernels know of light paths, for which there are no
-/// least variants of programs.
-constexpr double kPathVertex = 0.7, kJointVertex = 1.2;
+/// Cost of a vertex in rays, and of one whose kernels know of light paths.
+constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
+/// Of the pixels of a trial, the noisiest ones are looked at apart: one of them in a small picture
+/// may be all of its noise, and no two small pictures then tell the same.
+constexpr double kNoisiest = 0.01;
+/// What is hardly ever found is black in nearly all pixels and far too bright in the others. Its
+/// squared error counts up to so many squares of the light that there is.
+constexpr double kMostLost = 32;
 /// Efficiency that light paths must promise.
-constexpr double kWorthwhileLight = 1.3;
+constexpr double kWorthwhileLight = 1.2;
 /// Below this a material's lobe is sharp enough for light that it sends on to be seen.
 constexpr float kSharpRoughness = 0.4f;
-constexpr int kMostShare = 2;  ///< exponent of the share of light paths, and its negative
+constexpr int kMostShare = 3;  ///< exponent of the share of light paths, and its negative
 
 /// Width and height of a trial of as many pixels as a render of `settings` bears; 0: of none.
 std::array<uint32_t, 2> trial_size(const Settings& s) {
@@ -70,6 +76,39 @@ double cost_of(const TransportTrial& trial, double vertex) {
   return static_cast<double>(trial.rays) + vertex * static_cast<double>(trial.records);
 }
 
+/// Squared relative noise by pixel.
+using PixelNoise = std::vector<double>;
+
+double sum(const PixelNoise& noise) {
+  return std::accumulate(noise.begin(), noise.end(), 0.0);
+}
+
+/// Without the noisiest ones.
+double sum_of_most(PixelNoise noise) {
+  const auto most =
+      noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
+  if (most != noise.end()) std::nth_element(noise.begin(), most, noise.end());
+  return std::accumulate(noise.begin(), most, 0.0);
+}
+
+/// Of a sample: without light paths, of the camera's part with them, and of a light path.
+struct Costs {
+  double path, camera, light;
+};
+
+/// The best gain of noise `camera` and `light` with light paths, where camera paths would have
+/// `left` in place of the latter.
+TransportGain best_gain(double camera, double light, double left, const Costs& costs) {
+  TransportGain best;
+  for (int exponent = -kMostShare; exponent <= kMostShare; ++exponent) {
+    const double s = std::ldexp(1.0, exponent);
+    const double spent = (camera + light / s) * (costs.camera + s * costs.light);
+    const double gain = spent > 0 ? (camera + left) * costs.path / spent : 0;
+    if (gain > best.gain) best = {gain, {exponent}};
+  }
+  return best;
+}
+
 /// What a lobe of this roughness may be, where `varies`: anything.
 bool is_sharp(float roughness, bool varies) {
   return varies || roughness < kSharpRoughness;
@@ -84,30 +123,26 @@ TransportGain transport_gain(const TransportTrials& trials, double longer) {
   for (size_t i = 0; i < pixels; ++i)
     for (const TransportTrial& t : with) mean[i] += 0.5 * double{brightness(t.beauty, i)};
   const std::vector<double> scale = inverse_squares(mean, trials.width);
-  double camera = 0, light = 0, left = 0;
+  PixelNoise camera(pixels), light(pixels), left(pixels);
   for (size_t i = 0; i < pixels; ++i) {
     const double l0 = brightness(with[0].by_light_paths, i);
     const double l1 = brightness(with[1].by_light_paths, i);
     const double c0 = brightness(with[0].beauty, i) - l0, c1 = brightness(with[1].beauty, i) - l1;
     const auto squared = [](double d) { return d * d; };
-    light += 0.5 * squared(l0 - l1) * scale[i];
-    camera += 0.5 * squared(c0 - c1) * scale[i];
-    // Of what is hardly ever found no more is lost than there is.
-    const double lost = std::max(0.0, l0 * l1) * longer;
-    left += std::min(trials.variance[i] / kTransportSamples, lost) * scale[i];
+    light[i] = 0.5 * squared(l0 - l1) * scale[i];
+    camera[i] = 0.5 * squared(c0 - c1) * scale[i];
+    const double most = kMostLost * std::max(0.0, l0 * l1) * longer;
+    left[i] = std::min(trials.variance[i] / kTransportSamples, most) * scale[i];
   }
   const double path_cost = cost_of(trials.without, kPathVertex);
   const double camera_cost = cost_of(trials.without, kJointVertex);
   const double joint_cost = 0.5 * (cost_of(with[0], kJointVertex) + cost_of(with[1], kJointVertex));
-  const double light_cost = std::max(0.0, joint_cost - camera_cost);
-  TransportGain best;
-  for (int exponent = -kMostShare; exponent <= kMostShare; ++exponent) {
-    const double s = std::ldexp(1.0, exponent);
-    const double spent = (camera + light / s) * (camera_cost + s * light_cost);
-    const double gain = spent > 0 ? (camera + left) * path_cost / spent : 0;
-    if (gain > best.gain) best = {gain, {exponent}};
-  }
-  return best;
+  const Costs costs = {path_cost, camera_cost, std::max(0.0, joint_cost - camera_cost)};
+  const TransportGain of_all = best_gain(sum(camera), sum(light), sum(left), costs);
+  const TransportGain of_most =
+      best_gain(sum_of_most(std::move(camera)), sum_of_most(std::move(light)),
+                sum_of_most(std::move(left)), costs);
+  return of_all.gain > of_most.gain ? of_all : of_most;
 }
 
 bool focuses_light(const Scene& scene) {

@@ -4,29 +4,35 @@
 #include <cmath>
 
 #include "wavecomb/scene/light_builder.h"
+#include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {
 
 namespace {
 
+constexpr size_t kBand = size_t{1} << 16;
+
 /// Fills the bins of one group: light i has numbers[i] of the bins' 2^shift each, which they sum
-/// to.
+/// to. From the last bin on, each that is not full gets what it lacks from the last one that has
+/// more; if that then lacks something itself, it is the next to get it.
 void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
   const uint32_t size = 1u << shift;
-  std::vector<uint32_t> left(bins.size(), 0), small, large;
-  std::copy(numbers.begin(), numbers.end(), left.begin());
-  for (uint32_t b = 0; b < bins.size(); ++b) {
-    bins[b] = b << shift;  // full
-    if (left[b] != size) (left[b] < size ? small : large).push_back(b);
-  }
-  while (!small.empty()) {  // what one lacks another has
-    const uint32_t s = small.back(), l = large.back();
-    small.pop_back();
-    bins[s] = (l << shift) | left[s];
-    left[l] -= size - left[s];
-    if (left[l] > size) continue;
-    large.pop_back();
-    if (left[l] < size) small.push_back(l);
+  const auto given = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
+  for (uint32_t b = 0; b < bins.size(); ++b) bins[b] = b << shift;  // full
+  size_t next = bins.size(), rich = bins.size();
+  uint32_t left = size;  // of bin `rich`
+  for (;;) {
+    while (next > 0 && given(next - 1) >= size) --next;
+    if (next == 0) return;
+    size_t poor = --next;
+    for (uint32_t has = given(poor); has < size;) {
+      while (left <= size) left = given(--rich);
+      bins[poor] = (static_cast<uint32_t>(rich) << shift) | has;
+      left -= size - has;
+      if (left >= size) break;
+      poor = rich;
+      has = left;
+    }
   }
 }
 
@@ -56,17 +62,22 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   // has one of the 2^24 besides.)
   constexpr double floor_share = 0.01;
   const double largest = *std::max_element(weights.begin(), weights.end());
+  std::vector<double> shares(n);
+  const std::span<double> shares_of[2] = {std::span(shares).first(first_triangle),
+                                          std::span(shares).subspan(first_triangle)};
+  parallel_bands(n, kBand, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) shares[i] = weights[i] / largest;
+  });
   double sum[2] = {0, 0};
   for (size_t g = 0; g < 2; ++g)
-    for (const double w : groups[g]) sum[g] += w / largest;
+    for (const double share : shares_of[g]) sum[g] += share;
   const double total = sum[0] + sum[1];
-  std::vector<double> shares(n);
-  for (size_t i = 0; i < n; ++i)
-    shares[i] = weights[i] > 0 ? (1 - floor_share) * (weights[i] / largest / total) +
-                                     floor_share / static_cast<double>(lit)
-                               : 0;
-  const std::span<const double> shares_of[2] = {std::span(shares).first(first_triangle),
-                                                std::span(shares).subspan(first_triangle)};
+  parallel_bands(n, kBand, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i)
+      shares[i] = weights[i] > 0 ? (1 - floor_share) * (shares[i] / total) +
+                                       floor_share / static_cast<double>(lit)
+                                 : 0;
+  });
 
   // The numbers of a group are a multiple of those of its bins, and there are bins for all its
   // lights. Few and large bins stay in the cache; 1024 for all numbers divide them well enough.
@@ -90,24 +101,22 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     if (numbers_of[g] == 0) continue;
     const std::span<uint32_t> counts(numbers.data() + (g == 0 ? 0 : first_triangle),
                                      groups[g].size());
-    double all = 0, running = 0;
-    for (const double share : shares_of[g]) all += share;
+    double running = 0;
+    for (double& share : shares_of[g]) share = running += share;
+    const double all = running;
     // One number each, and the others by share: rounding the running sum makes the sum exact.
     const auto free = static_cast<double>(numbers_of[g] - lit_of[g]);
     const auto up_to = [&](double part) {
       return static_cast<uint32_t>(std::nearbyint(std::min(1.0, part / all) * free));
     };
-    uint32_t given = 0;
-    size_t last = 0;
-    for (size_t i = 0; i < counts.size(); ++i) {
-      if (!(groups[g][i] > 0)) continue;
-      last = i;
-      running += shares_of[g][i];
-      const uint32_t to = up_to(running);
-      counts[i] = 1 + to - given;
-      given = to;
-    }
-    counts[last] += static_cast<uint32_t>(free) - given;
+    parallel_bands(counts.size(), kBand, [&](size_t begin, size_t end) {
+      uint32_t before = begin > 0 ? up_to(shares_of[g][begin - 1]) : 0;
+      for (size_t i = begin; i < end; ++i) {
+        const uint32_t to = up_to(shares_of[g][i]);
+        counts[i] = groups[g][i] > 0 ? 1 + to - before : 0;
+        before = to;
+      }
+    });
 
     uint32_t shift = unit;
     while (numbers_of[g] >> shift < counts.size()) --shift;

@@ -51,8 +51,8 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   collect_connections<F>(wave, context, depth);
   if (wave.shading.size == 0) return;
   wave.light_use = Wave::LightUse::kConnect;
-  shade<F>(wave, context, ShadeSettings(*context.settings).of_light_paths(), depth,
-           kShadeLightBatch);
+  const ShadeSettings settings = ShadeSettings(*context.settings).of_light_paths();
+  shade<F>(wave, context, settings, depth, light_kernels_for(context, settings));
   wave.light_use = Wave::LightUse::kShow;
   compact_shadows<F>(wave);
   const ShadowQueue& q = wave.shadows;

@@ -73,10 +73,22 @@ template <typename F, typename Media>
 const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
                                            const ShadeSettings& settings) {
   if constexpr (!Media::kAny)
-    if (context.joins_light()) return kShadeJointBatch;
+    if (context.joins_light()) {
+      if constexpr (kHasPlain<JointLanes>)
+        if (is_plain(context, settings)) return kShadePlainJoint<JointLanes>;
+      return kShadeJointBatch;
+    }
   if constexpr (kHasPlain<F> && !Media::kAny)
     if (is_plain(context, settings)) return kShadePlain<F>;
   return kShadeBatch<F, typename Media::template Programs<F>>;
+}
+
+/// Those of paths from lights.
+inline const detail::BatchKernels<JointLanes>& light_kernels_for(const WaveContext& context,
+                                                                 const ShadeSettings& settings) {
+  if constexpr (kHasPlain<JointLanes>)
+    if (is_plain(context, settings)) return kShadePlainLight<JointLanes>;
+  return kShadeLightBatch;
 }
 
 /// Shades the whole queue with `kernels`, batch by batch.
