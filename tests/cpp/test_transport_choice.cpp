@@ -18,17 +18,18 @@ using namespace scene_testing;
 constexpr uint32_t kSide = 32;
 constexpr uint64_t kRays = 100'000, kRecords = 50'000;
 
-/// A picture of brightness 1, and `light` more with light paths, whose parts have noise of these
-/// deviations.
-TransportTrial trial(uint32_t seed, float camera_noise, float light_noise, float light) {
+/// A picture of brightness 1, and `light` more that a share of light paths finds, of parts with
+/// noise of these deviations. Light paths cost what camera paths cost.
+TransportTrial trial(uint32_t seed, LightPathShare share, float camera_noise, float light_noise,
+                     float light) {
   std::mt19937 rng(seed);
   std::normal_distribution<float> noise;
   TransportTrial out;
-  out.rays = 2 * kRays;
-  out.records = 2 * kRecords;
+  out.rays = static_cast<uint64_t>(kRays * (1 + share.paths()));
+  out.records = static_cast<uint64_t>(kRecords * (1 + share.paths()));
   for (uint32_t i = 0; i < kSide * kSide; ++i) {
     const float camera = 1 + camera_noise * noise(rng);
-    const float found = light + light_noise * noise(rng);
+    const float found = light + light_noise / std::sqrt(share.paths()) * noise(rng);
     for (int c = 0; c < 3; ++c) {
       out.beauty.push_back(camera + found);
       out.by_light_paths.push_back(found);
@@ -41,10 +42,10 @@ TransportTrial trial(uint32_t seed, float camera_noise, float light_noise, float
 TransportGain gain_of(float left, float camera_noise, float light_noise, float light = 1,
                       double longer = 8) {
   TransportTrials trials;
-  trials.without.rays = kRays;
-  trials.without.records = kRecords;
-  trials.with[0] = trial(3, camera_noise, light_noise, light);
-  trials.with[1] = trial(4, camera_noise, light_noise, light);
+  for (size_t k = 0; k < kTriedShares.size(); ++k)
+    for (uint32_t seed = 0; seed < 2; ++seed)
+      trials.with[k][seed] = trial(2 * static_cast<uint32_t>(k) + seed, kTriedShares[k],
+                                   camera_noise, light_noise, light);
   trials.variance.assign(kSide * kSide, 8.0 * left * left);
   trials.width = kSide;
   return transport_gain(trials, longer);
@@ -57,16 +58,45 @@ TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
 }
 
 TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
-  // v 1 + 3 without, (1 + 1) at s = 1, and light paths cost what camera paths cost.
+  // v 1 + 3 without, (1 + 1) at s = 1.
   const TransportGain gain = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
   const double path = kRays + 0.7 * kRecords, joint = kRays + 0.8 * kRecords;
   EXPECT_EQ(gain.share.exponent, 0);
   EXPECT_NEAR(gain.gain, 4 * path / (2 * 2 * joint), 0.15);
 }
 
-TEST(TransportGain, AsksForManyLightPathsWhereTheyAreTheNoise) {
-  EXPECT_EQ(gain_of(0.5f, 0.01f, 0.3f).share.exponent, 3);
+TEST(TransportGain, CountsWhatMergingCosts) {
+  TransportTrials trials;
+  for (size_t k = 0; k < kTriedShares.size(); ++k)
+    for (uint32_t seed = 0; seed < 2; ++seed)
+      trials.with[k][seed] = trial(seed, kTriedShares[k], 0.1f, 0.1f, 1);
+  trials.variance.assign(kSide * kSide, 8.0 * 0.1 * 0.1);
+  trials.width = kSide;
+  const double gain = transport_gain(trials, 8).gain;
+  trials.merges = true;
+  EXPECT_LT(transport_gain(trials, 8).gain, 0.97 * gain);
+}
+
+TEST(TransportGain, TakesManyLightPathsWhereTheyAreTheNoise) {
+  EXPECT_EQ(gain_of(0.5f, 0.01f, 0.3f).share.exponent, 0);
   EXPECT_EQ(gain_of(0.5f, 0.3f, 0.01f).share.exponent, -3);
+}
+
+TEST(TransportGain, LooksPastTheNoisiestPixels) {
+  const auto with_dots = [](uint32_t dots) {
+    TransportTrials trials;
+    for (size_t k = 0; k < kTriedShares.size(); ++k)
+      for (uint32_t seed = 0; seed < 2; ++seed) {
+        TransportTrial& t = trials.with[k][seed] = trial(seed, kTriedShares[k], 0.05f, 0.05f, 0.5f);
+        for (uint32_t i = 0; i < dots; ++i) t.beauty[3 * (i * 97 + seed)] += 500;
+      }
+    trials.variance.assign(kSide * kSide, 8.0 * 0.3 * 0.3);
+    trials.width = kSide;
+    return transport_gain(trials, 8).gain;
+  };
+  EXPECT_GT(with_dots(0), 3);
+  EXPECT_NEAR(with_dots(3), with_dots(0), 0.3 * with_dots(0)) << "six of 1,024 pixels";
+  EXPECT_LT(with_dots(10), 1.2) << "and twenty are too many";
 }
 
 TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {
@@ -74,7 +104,7 @@ TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {
   const TransportGain never = gain_of(1e6f, 0.05f, 0.05f, 0.5f);
   EXPECT_GT(never.gain, 20);
   EXPECT_LT(gain_of(1e6f, 0.05f, 0.05f, 0.5f, 1).gain, never.gain) << "no more than there is";
-  EXPECT_LT(gain_of(1e6f, 0.05f, 0.f, 0.001f).gain, 1) << "and this is hardly seen";
+  EXPECT_LT(gain_of(1e6f, 0.05f, 0.f, 0.001f).gain, 1.1) << "and this is hardly seen";
 }
 
 /// What light paths tell of the noise of camera paths, against that noise.

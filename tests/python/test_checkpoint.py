@@ -64,12 +64,12 @@ def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
     state: dict[str, Any] | None = None
     runs = 0
     for _ in range(200):
-        watcher = StopAt(random.Random(runs).randrange(2))
+        watcher = StopAt(random.Random(runs).randrange(2) if runs else 0)
         changed = _core.Settings(
             width=48, height=40, error=True, aovs=list(core_aovs()), **ending,
             threads=1 + runs % 2, wave_size=(64, 4096, 1000)[runs % 3],
         )  # fmt: skip
-        result = _core.render(cornell.scene, changed, watcher=watcher, state=state)
+        result = _core.render(cornell.scene, changed, watcher=watcher, state=state, interval=0.03)
         state = watcher.state
         runs += 1
         if not result.cancelled:

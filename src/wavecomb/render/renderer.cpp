@@ -59,8 +59,8 @@ struct WavefrontRenderer::Impl {
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
                  Watch& watch, TrialMeans* trial = nullptr);
   /// A small picture, for choose_transport; ends where `outer` is stopped.
-  TransportTrial try_out(const Settings& settings, bool wants_squares, TrialMeans& means,
-                         const Watch& outer);
+  TransportTrial try_out(const Settings& settings, LightPathShare share, bool wants_squares,
+                         TrialMeans& means, const Watch& outer);
 };
 
 namespace {
@@ -175,8 +175,9 @@ const CostProfile& WavefrontRenderer::cost_profile() const {
   return impl_->profile;
 }
 
-TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, bool wants_squares,
-                                                TrialMeans& means, const Watch& outer) {
+TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, LightPathShare share,
+                                                bool wants_squares, TrialMeans& means,
+                                                const Watch& outer) {
   RenderOptions options;
   options.wants_camera_squares = wants_squares;
   options.progress = [&](const RenderStatus&) {
@@ -184,7 +185,7 @@ TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, bool w
   };
   Watch watch(options.interval_s);
   TransportTrial trial;
-  Picture picture = render(settings, {}, options, watch, &means);
+  Picture picture = render(settings, share, options, watch, &means);
   trial.beauty = std::move(picture.beauty);
   for (AovLayer& layer : picture.aovs)
     if (layer.name == aov_name(Aov::kByLightPaths)) trial.by_light_paths = std::move(layer.values);
@@ -201,7 +202,9 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   Impl::TrialMeans means{settings, {}};
   const TransportChoice choice = choose_transport(
       *impl_->scene, settings,
-      [&](const Settings& s, bool squares) { return impl_->try_out(s, squares, means, watch); },
+      [&](const Settings& s, LightPathShare share, bool squares) {
+        return impl_->try_out(s, share, squares, means, watch);
+      },
       [&] { return watch.stopped(); });
   Settings chosen = settings;
   chosen.transport = choice.transport;

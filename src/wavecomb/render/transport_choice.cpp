@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <numeric>
 
 #include "wavecomb/core/backward_automaton.h"
@@ -16,24 +15,26 @@ namespace {
 /// Samples of a pixel of a trial, which Sobol's points and roulette are in as they are in the
 /// picture, and pixels of it at least and at most.
 constexpr uint32_t kTransportSamples = 8;
-constexpr uint64_t kLeastTransportPixels = 576, kMostTransportPixels = 16'384;
-/// Of the samples of a render, a trial has a pixel's: four pictures, of which three cost three
-/// times as much, are then a fiftieth of the render at most.
+constexpr uint64_t kLeastTransportPixels = 400, kMostTransportPixels = 16'384;
+/// Of the samples of a render, a trial has a pixel's: five pictures, of which three cost two or
+/// three times as much, are then a fiftieth of the render at most.
 constexpr uint64_t kTransportShare = 500;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
 /// Cost of a vertex in rays, and of one whose kernels know of light paths.
 constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
+/// Where light paths are merged, a camera path that may leave a point costs so much more, and a
+/// vertex of a light path.
+constexpr double kMergedPath = 1, kMergedVertex = 1;
 /// Of the pixels of a trial, the noisiest ones are looked at apart: one of them in a small picture
 /// may be all of its noise, and no two small pictures then tell the same.
 constexpr double kNoisiest = 0.01;
 /// What is hardly ever found is black in nearly all pixels and far too bright in the others. Its
 /// squared error counts up to so many squares of the light that there is.
-constexpr double kMostLost = 32;
+constexpr double kMostLost = 8;
 /// Efficiency that light paths must promise.
-constexpr double kWorthwhileLight = 1.2;
+constexpr double kWorthwhileLight = 1.3;
 /// Below this a material's lobe is sharp enough for light that it sends on to be seen.
 constexpr float kSharpRoughness = 0.4f;
-constexpr int kMostShare = 3;  ///< exponent of the share of light paths, and its negative
 
 /// Width and height of a trial of as many pixels as a render of `settings` bears; 0: of none.
 std::array<uint32_t, 2> trial_size(const Settings& s) {
@@ -72,8 +73,26 @@ std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t wi
   return out;
 }
 
-double cost_of(const TransportTrial& trial, double vertex) {
-  return static_cast<double>(trial.rays) + vertex * static_cast<double>(trial.records);
+/// Rays and vertices of a small picture.
+struct TrialWork {
+  double rays = 0, records = 0;
+
+  double cost(double vertex) const { return rays + vertex * records; }
+};
+TrialWork work_of(const std::array<TransportTrial, 2>& trials) {
+  TrialWork work;
+  for (const TransportTrial& t : trials) {
+    work.rays += 0.5 * static_cast<double>(t.rays);
+    work.records += 0.5 * static_cast<double>(t.records);
+  }
+  return work;
+}
+/// That of camera paths alone: what is left of two shares when none is.
+TrialWork work_without(const TransportTrials& trials) {
+  const TrialWork few = work_of(trials.with[0]), many = work_of(trials.with[1]);
+  const double a = double{kTriedShares[0].paths()}, b = double{kTriedShares[1].paths()};
+  const auto at_none = [&](double x, double y) { return (b * x - a * y) / (b - a); };
+  return {at_none(few.rays, many.rays), at_none(few.records, many.records)};
 }
 
 /// Squared relative noise by pixel.
@@ -91,24 +110,6 @@ double sum_of_most(PixelNoise noise) {
   return std::accumulate(noise.begin(), most, 0.0);
 }
 
-/// Of a sample: without light paths, of the camera's part with them, and of a light path.
-struct Costs {
-  double path, camera, light;
-};
-
-/// The best gain of noise `camera` and `light` with light paths, where camera paths would have
-/// `left` in place of the latter.
-TransportGain best_gain(double camera, double light, double left, const Costs& costs) {
-  TransportGain best;
-  for (int exponent = -kMostShare; exponent <= kMostShare; ++exponent) {
-    const double s = std::ldexp(1.0, exponent);
-    const double spent = (camera + light / s) * (costs.camera + s * costs.light);
-    const double gain = spent > 0 ? (camera + left) * costs.path / spent : 0;
-    if (gain > best.gain) best = {gain, {exponent}};
-  }
-  return best;
-}
-
 /// What a lobe of this roughness may be, where `varies`: anything.
 bool is_sharp(float roughness, bool varies) {
   return varies || roughness < kSharpRoughness;
@@ -117,32 +118,47 @@ bool is_sharp(float roughness, bool varies) {
 }  // namespace
 
 TransportGain transport_gain(const TransportTrials& trials, double longer) {
-  const TransportTrial(&with)[2] = trials.with;
-  const size_t pixels = with[0].beauty.size() / 3;
+  const std::array<TransportTrial, 2>& most = trials.with[kTriedShares.size() - 1];
+  const size_t pixels = most[0].beauty.size() / 3;
   std::vector<double> mean(pixels);
   for (size_t i = 0; i < pixels; ++i)
-    for (const TransportTrial& t : with) mean[i] += 0.5 * double{brightness(t.beauty, i)};
+    for (const auto& with : trials.with)
+      for (const TransportTrial& t : with)
+        mean[i] += 0.5 / kTriedShares.size() * double{brightness(t.beauty, i)};
   const std::vector<double> scale = inverse_squares(mean, trials.width);
-  PixelNoise camera(pixels), light(pixels), left(pixels);
+  const auto squared = [](double d) { return d * d; };
+  PixelNoise camera(pixels), left(pixels);
   for (size_t i = 0; i < pixels; ++i) {
-    const double l0 = brightness(with[0].by_light_paths, i);
-    const double l1 = brightness(with[1].by_light_paths, i);
-    const double c0 = brightness(with[0].beauty, i) - l0, c1 = brightness(with[1].beauty, i) - l1;
-    const auto squared = [](double d) { return d * d; };
-    light[i] = 0.5 * squared(l0 - l1) * scale[i];
+    const double l0 = brightness(most[0].by_light_paths, i);
+    const double l1 = brightness(most[1].by_light_paths, i);
+    const double c0 = brightness(most[0].beauty, i) - l0, c1 = brightness(most[1].beauty, i) - l1;
     camera[i] = 0.5 * squared(c0 - c1) * scale[i];
-    const double most = kMostLost * std::max(0.0, l0 * l1) * longer;
-    left[i] = std::min(trials.variance[i] / kTransportSamples, most) * scale[i];
+    const double bound = kMostLost * std::max(0.0, l0 * l1) * longer;
+    left[i] = std::min(trials.variance[i] / kTransportSamples, bound) * scale[i];
   }
-  const double path_cost = cost_of(trials.without, kPathVertex);
-  const double camera_cost = cost_of(trials.without, kJointVertex);
-  const double joint_cost = 0.5 * (cost_of(with[0], kJointVertex) + cost_of(with[1], kJointVertex));
-  const Costs costs = {path_cost, camera_cost, std::max(0.0, joint_cost - camera_cost)};
-  const TransportGain of_all = best_gain(sum(camera), sum(light), sum(left), costs);
-  const TransportGain of_most =
-      best_gain(sum_of_most(std::move(camera)), sum_of_most(std::move(light)),
-                sum_of_most(std::move(left)), costs);
-  return of_all.gain > of_most.gain ? of_all : of_most;
+  const TrialWork without = work_without(trials);
+  const double path_cost = without.cost(kPathVertex);
+  const double all_without = (sum(camera) + sum(left)) * path_cost;
+  const double most_without =
+      (sum_of_most(std::move(camera)) + sum_of_most(std::move(left))) * path_cost;
+  TransportGain best;
+  for (size_t k = 0; k < kTriedShares.size(); ++k) {
+    const auto& with = trials.with[k];
+    PixelNoise noise(pixels);
+    for (size_t i = 0; i < pixels; ++i)
+      noise[i] = 0.5 * scale[i] *
+                 squared(double{brightness(with[0].beauty, i)} - brightness(with[1].beauty, i));
+    const TrialWork work = work_of(with);
+    double cost = work.cost(kJointVertex);
+    if (trials.merges)
+      cost += kMergedPath * kTransportSamples * static_cast<double>(pixels) +
+              kMergedVertex * (work.records - without.records);
+    const double all = sum(noise) * cost, of_most = sum_of_most(std::move(noise)) * cost;
+    const double gain =
+        std::max(all > 0 ? all_without / all : 0, of_most > 0 ? most_without / of_most : 0);
+    if (gain > best.gain) best = {gain, kTriedShares[k]};
+  }
+  return best;
 }
 
 bool focuses_light(const Scene& scene) {
@@ -210,16 +226,16 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
   small.expressions.clear();
   TransportTrials trials;
   trials.width = width;
+  trials.merges = settings.merge_radius > 0;
   small.seed = kTransportSeeds[0];
-  small.transport = Transport::kPath;
-  trials.without = render(small, false);
   small.transport = Transport::kLight;
   small.aovs.bits = static_cast<uint32_t>(Aov::kByLightPaths);
-  const TransportTrial squares = stopped() ? TransportTrial() : render(small, true);
-  for (size_t i = 0; i < std::size(kTransportSeeds); ++i) {
-    small.seed = kTransportSeeds[i];
-    if (!stopped()) trials.with[i] = render(small, false);
-  }
+  const TransportTrial squares = render(small, kTriedShares.back(), true);
+  for (size_t k = 0; k < kTriedShares.size(); ++k)
+    for (size_t i = 0; i < kTransportSeeds.size(); ++i) {
+      small.seed = kTransportSeeds[i];
+      if (!stopped()) trials.with[k][i] = render(small, kTriedShares[k], false);
+    }
   if (stopped()) return choice;
   const double unit = scene_brightness(scene);
   for (size_t i = 0; i < squares.beauty.size() / 3; ++i)

@@ -3,17 +3,19 @@
 ///
 /// Not where they do not go with the settings or the scene, nor where no surface is clear or glossy
 /// or no light sends paths. Elsewhere a small picture of the whole view is rendered before the
-/// first pass, twice with light paths. How noisy it would be without them is not looked at, since
-/// what camera paths hardly find they may not meet in so few samples: light paths tell
-/// (integrate/light_vertex.h). With the errors e of a sample and its costs c, by rays and vertices
-/// at fixed costs, the efficiency of light paths to that without is
-///   (e_camera + e_left) c / ((e_camera + e_light / s) (c_camera + s c_light)),
-/// e_left that of what light paths bring, were it left to camera paths, and
-/// s how many of them there are for each camera path, a power of two.
+/// first pass, twice with each share of light paths that there may be: how noisy the two kinds of
+/// paths are depends on the weights that they have, and these on the share. How noisy it would be
+/// without light paths is not looked at, since what camera paths hardly find they may not meet in
+/// so few samples: light paths tell (integrate/light_vertex.h). With e_camera the squared error of
+/// the part that camera paths find beside light paths, e_left that of the other one were it left to
+/// camera paths, and c the cost without light paths, by rays and vertices at fixed costs, the
+/// efficiency of a share with the error e_s and the cost c_s is
+///   (e_camera + e_left) c / (e_s c_s).
 /// Nothing of it depends on seed, region, threads, waves or lanes; so parts of a picture, a resumed
 /// one and merged ones are rendered alike. Its samples are not in the picture.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -40,8 +42,13 @@ struct TransportTrial {
   std::vector<float> by_light_paths;  ///< the part of it that light paths found; empty: none
   uint64_t rays = 0, records = 0;     ///< that it took
 };
-/// With true, by_light_paths is RenderOptions::wants_camera_squares, over that brightness.
-using RenderTrial = std::function<TransportTrial(const Settings&, bool)>;
+/// With a share of light paths. With true, by_light_paths is RenderOptions::wants_camera_squares,
+/// over that brightness.
+using RenderTrial = std::function<TransportTrial(const Settings&, LightPathShare, bool)>;
+
+/// The shares that are tried. The better one has nearly what the best of 1/16 to 2 has, on stages
+/// with caustics (docs/light-paths.md).
+inline constexpr std::array<LightPathShare, 2> kTriedShares = {{{-3}, {0}}};
 
 /// Whether anything in the scene reflects or passes light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
@@ -55,10 +62,10 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
 
 /// Trials of `width` columns.
 struct TransportTrials {
-  TransportTrial without;        ///< for its cost
-  TransportTrial with[2];        ///< of two seeds
+  std::array<TransportTrial, 2> with[kTriedShares.size()];  ///< by share, of two seeds
   std::vector<double> variance;  ///< of a sample, of what is left to camera paths, by pixel
   uint32_t width = 0;
+  bool merges = false;
 };
 struct TransportGain {
   double gain = 0;  ///< the best efficiency to that without
