@@ -46,8 +46,8 @@ struct TransportTrial {
 /// over that brightness.
 using RenderTrial = std::function<TransportTrial(const Settings&, LightPathShare, bool)>;
 
-/// The shares that are tried. The better one has nearly what the best of 1/16 to 2 has, on stages
-/// with caustics (docs/light-paths.md).
+/// The shares that are tried. Around the better one efficiency is flat on stages with caustics,
+/// merged or not.
 inline constexpr std::array<LightPathShare, 2> kTriedShares = {{{-3}, {0}}};
 
 /// Whether anything in the scene reflects or passes light sharply enough for caustics.
