@@ -48,39 +48,30 @@ constexpr Kernels for_variants(Kernels kernels) {
 template <size_t kVariant>
 inline constexpr bool kIsOfSurface =
     static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount;
-template <size_t kVariant, typename F, uint32_t kFeatures>
+enum class PathsOf : uint8_t { kCamera, kLights };
+template <PathsOf kPaths, typename Bsdf, typename F, uint32_t kFeatures>
+constexpr typename BatchKernels<F>::value_type batch_kernel() {
+  if constexpr (kPaths == PathsOf::kCamera)
+    return &shade_batch<Bsdf, F, kFeatures>;
+  else
+    return &shade_light_batch<Bsdf, F, kFeatures>;
+}
+template <PathsOf kPaths, size_t kVariant, typename F, uint32_t kFeatures>
 constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
   if constexpr (kIsOfSurface<kVariant>)
-    return &shade_batch<VariantBsdf<kVariant, F>, F, kFeatures>;
+    return batch_kernel<kPaths, VariantBsdf<kVariant, F>, F, kFeatures>();
   else
     return nullptr;
 }
-template <size_t kVariant, typename F>
-constexpr typename BatchKernels<F>::value_type plain_light_batch_kernel() {
-  if constexpr (kIsOfSurface<kVariant>)
-    return &shade_light_batch<VariantBsdf<kVariant, F>, F, kPlain>;
-  else
-    return nullptr;
-}
-template <typename F, uint32_t kFeatures, typename... Bsdf>
+template <PathsOf kPaths, typename F, uint32_t kFeatures, typename... Bsdf>
 constexpr auto batch_kernels(ProgramList<Bsdf...>) {
   BatchKernels<F> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F, kFeatures>), ...);
+  ((kernels[id_of<Bsdf, F>()] = batch_kernel<kPaths, Bsdf, F, kFeatures>()), ...);
   return for_variants(kernels);
 }
-template <typename F, typename... Bsdf>
-constexpr auto light_batch_kernels(ProgramList<Bsdf...>) {
-  BatchKernels<F> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_light_batch<Bsdf, F, kEverything>), ...);
-  return for_variants(kernels);
-}
-template <typename F, uint32_t kFeatures, size_t... kVariant>
+template <PathsOf kPaths, typename F, uint32_t kFeatures, size_t... kVariant>
 constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
-  return BatchKernels<F>{plain_batch_kernel<kVariant, F, kFeatures>()...};
-}
-template <typename F, size_t... kVariant>
-constexpr auto plain_light_batch_kernels(std::index_sequence<kVariant...>) {
-  return BatchKernels<F>{plain_light_batch_kernel<kVariant, F>()...};
+  return BatchKernels<F>{plain_batch_kernel<kPaths, kVariant, F, kFeatures>()...};
 }
 template <typename F, uint32_t kFeatures, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
@@ -100,7 +91,8 @@ constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
 /// The kernels of the programs of a list: shade_batch, for the wave, by variant (all of a program
 /// are the program), and shade_vertex, for the reference, by ProgramId.
 template <typename F, typename List>
-inline constexpr auto kShadeBatch = detail::batch_kernels<F, kEverything>(List{});
+inline constexpr auto kShadeBatch =
+    detail::batch_kernels<detail::PathsOf::kCamera, F, kEverything>(List{});
 template <typename F, typename List>
 inline constexpr auto kShadeVertex = detail::vertex_kernels<F, kEverything>(List{});
 /// The lanes of kernels where paths start at lights, too: the widest of the library, whatever those
@@ -108,9 +100,10 @@ inline constexpr auto kShadeVertex = detail::vertex_kernels<F, kEverything>(List
 using JointLanes = Lanes<WAVECOMB_MAX_LANES>;
 /// The same where paths from lights share in the weights, and for those paths.
 inline constexpr auto kShadeJointBatch =
-    detail::batch_kernels<JointLanes, kJoint>(Programs<JointLanes>{});
+    detail::batch_kernels<detail::PathsOf::kCamera, JointLanes, kJoint>(Programs<JointLanes>{});
 inline constexpr auto kShadeLightBatch =
-    detail::light_batch_kernels<JointLanes>(Programs<JointLanes>{});
+    detail::batch_kernels<detail::PathsOf::kLights, JointLanes, kEverything>(
+        Programs<JointLanes>{});
 template <typename F>
 inline constexpr auto kShadeJointVertex = detail::vertex_kernels<F, kJoint>(Programs<F>{});
 template <typename F>
@@ -118,12 +111,15 @@ inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Progra
 /// Plain kernels by variant; only where kHasPlain.
 template <typename F>
 inline constexpr auto kShadePlain =
-    detail::plain_batch_kernels<F, kPlain>(std::make_index_sequence<kVariantCount>());
+    detail::plain_batch_kernels<detail::PathsOf::kCamera, F, kPlain>(
+        std::make_index_sequence<kVariantCount>());
 template <typename F>
 inline constexpr auto kShadePlainJoint =
-    detail::plain_batch_kernels<F, kPlainJoint>(std::make_index_sequence<kVariantCount>());
+    detail::plain_batch_kernels<detail::PathsOf::kCamera, F, kPlainJoint>(
+        std::make_index_sequence<kVariantCount>());
 template <typename F>
 inline constexpr auto kShadePlainLight =
-    detail::plain_light_batch_kernels<F>(std::make_index_sequence<kVariantCount>());
+    detail::plain_batch_kernels<detail::PathsOf::kLights, F, kPlain>(
+        std::make_index_sequence<kVariantCount>());
 
 }  // namespace wavecomb
