@@ -41,16 +41,26 @@ def linear(encoded: Pixels) -> Pixels:
     return np.where(low, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def write_row(file: Path, images: Sequence[Pixels], white: float, enlarged: int = 1) -> None:
-    """A PNG of images side by side; ``white`` is the value that is shown as white."""
-    row = np.concatenate(list(images), axis=1)
-    row = row.repeat(enlarged, axis=0).repeat(enlarged, axis=1)
-    values = np.clip(row / max(white, 1e-6), 0, 1) ** (1 / 2.2)
+def write_row(
+    file: Path, images: Sequence[Pixels], white: float, enlarged: int = 1, columns: int = 0
+) -> None:
+    """A PNG or JPEG of images side by side; ``white`` is the value that is shown as white.
+
+    They are as many to a row as ``columns`` says, or all; what is left of the last row is black.
+    """
+    columns = columns or len(images)
+    black = np.zeros_like(images[0])
+    shown = [*images, *[black] * (-len(images) % columns)]
+    rows = [shown[i : i + columns] for i in range(0, len(shown), columns)]
+    sheet = np.concatenate([np.concatenate(row, axis=1) for row in rows], axis=0)
+    sheet = sheet.repeat(enlarged, axis=0).repeat(enlarged, axis=1)
+    values = np.clip(sheet / max(white, 1e-6), 0, 1) ** (1 / 2.2)
     pixels = np.ascontiguousarray(255 * values + 0.5, np.uint8)
     out = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8"))
     out.set_pixels(oiio.ROI(), pixels)
+    out.specmod()["compression"] = "jpeg:88"
     with replacing(file) as part:
-        out.write(str(part), "uint8", "png")
+        out.write(str(part), "uint8", "jpeg" if file.suffix == ".jpg" else "png")
 
 
 def white_of(reference: Pixels) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -99,12 +100,13 @@ def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
         return done.stdout.strip()
 
     changed = git("status", "--porcelain", "--", "src", "python", "bindings", "CMakeLists.txt")
-    script = Path(sys.argv[0]).name
+    script = Path(sys.argv[0]).resolve()
+    named = script.relative_to(ROOT) if script.is_relative_to(ROOT) else script.name
     document = {
         "schema": schema,
         "commit": git("rev-parse", "HEAD"),
         "changed": changed.splitlines(),
-        "command": " ".join([f"benchmarks/{script}", *_what_counts(sys.argv[1:])]),
+        "command": shlex.join([str(named), *_what_counts(sys.argv[1:])]),
         "machine": machine(),
         "load": os.getloadavg(),
         **content,
@@ -116,7 +118,7 @@ def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
 
 def _what_counts(words: Sequence[str]) -> list[str]:
     """Arguments without those that say where files go on this machine."""
-    kept, places = [], ("--folder", "--output")
+    kept, places = [], ("--folder", "--output", "--cache", "--pictures")
     for before, word in zip(("", *words), words, strict=False):
         if before not in places and word.split("=")[0] not in places:
             kept.append(word)

@@ -6,12 +6,12 @@
     python benchmarks/peers/caustics.py caustics --quick        # does it run?
 
 Each renderer is asked for as many samples as it has in ``--seconds``, by a trial, in rounds of
-shuffled order; a picture is written for each, in one row with the reference, which is Wavecomb's
-with light paths, of other seeds, merged within half a pixel. relMSE = mean of (x - r)^2 / (r^2 +
-0.01 mean(r)^2) without the worst thousandth of the pixels, of the whole picture and of those whose
-light is mostly that of light paths in the reference (caustics). Materials are those of the bridges:
-where a peer's is only the nearest, its error has that in it, so means are printed, too. ptracer has
-no MIS and does not find what the camera sees through glass.
+shuffled order; a picture is written for each, three to a row, after the reference, which is
+Wavecomb's with light paths, of other seeds, merged within half a pixel. relMSE = mean of (x - r)^2
+/ (r^2 + 0.01 mean(r)^2) without the worst thousandth of the pixels, of the whole picture and of
+those whose light is mostly that of light paths in the reference (caustics). Materials are those of
+the bridges: where a peer's is only the nearest, its error has that in it, so means are printed,
+too. ptracer has no MIS and does not find what the camera sees through glass.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--reference", type=int, default=8192, help="samples a pixel")
     parser.add_argument("--cache", type=Path, default=ROOT / "out" / "peers")
-    parser.add_argument("--pictures", type=Path, help="folder of the rows of pictures")
+    parser.add_argument("--pictures", type=Path, help="folder of the sheets of pictures")
     output = ROOT / "benchmarks" / "results" / "peers-caustics.json"
     parser.add_argument("--output", type=Path, default=output)
     parser.add_argument("--quick", action="store_true", help="small; for trying the program")
@@ -80,7 +80,7 @@ def main() -> None:
 
 
 def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one stage, and its row of pictures."""
+    """All figures of one stage, and its sheet of pictures."""
     job = prepare(name, args)
     truth, mask = reference(job, args)
     scale = 1.0 / (truth**2 + 0.01 * float(truth.mean()) ** 2)
@@ -106,9 +106,10 @@ def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
             costs[column]["whole"].append(trimmed_mean(error) * took)
             costs[column]["caustics"].append(trimmed_mean(some) * took)
     rows = [shown[column].astype(np.float32) for column in args.columns]
-    row = args.pictures / f"beside-{name}.png"
-    write_row(row, [truth.astype(np.float32), *rows], white_of(truth.astype(np.float32)))
-    print(f"{name}: {row}: reference, {', '.join(args.columns)}", flush=True)
+    sheet = args.pictures / f"beside-{name}.jpg"
+    seen = truth.astype(np.float32)
+    write_row(sheet, [seen, *rows], white_of(seen), columns=3)
+    print(f"{name}: {sheet}: reference, {', '.join(args.columns)}", flush=True)
     out: dict[str, Any] = {}
     best = "wavecomb auto" if "wavecomb auto" in args.columns else args.columns[0]
     for column, cost in costs.items():
