@@ -6,7 +6,12 @@
 
 #include "chi_square.h"
 #include "parts.h"
+#include "wavecomb/core/frame.h"
+#include "wavecomb/film/film.h"
+#include "wavecomb/film/splat_filter.h"
+#include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/camera_ray.h"
+#include "wavecomb/render/light_paths.h"
 
 namespace wavecomb {
 namespace {
@@ -156,6 +161,102 @@ TEST(CameraSamples, FillTheLensEvenly) {
                    }});
     }
   battery.judge();
+}
+
+// Paths from lights find a point where the camera's own ray to it passes, as densely as the rays of
+// a pixel do: the area on the picture, in pixels, of a small one across the ray.
+TEST(CameraConnections, AreTheWayBack) {
+  const FilterTable table(FilterKind::kGaussian, 3);
+  Random random(17);
+  for (const CameraCase& seen : kCameras) {
+    Camera made = make_camera(seen.projection, seen.lens);
+    // Turned, mirrored, and of another scale along each axis.
+    made.to_world.row[0] = {0.6f, -1.1f, 0.3f};
+    made.to_world.row[1] = {0.9f, 0.8f, -0.2f};
+    made.to_world.row[2] = {0.1f, 0.4f, 1.3f};
+    made.to_world.t = {2, -1, 0.5f};
+    const CameraSetup setup(made, kWidth, kHeight, table);
+    for (int i = 0; i < 200; ++i) {
+      const float u = random(), v = random(), x = kWidth * random(), y = kHeight * random();
+      const float t = 1.f + 8.f * random();
+      const CameraRay<float> ray = ray_through<float>(setup, x, y, u, v, 0.f, true);
+      const Vec3<float> p = fma(ray.d, t, ray.o);
+      const auto at = [&](const Vec3<float>& point) {
+        return connect_to_camera<float>(setup, point, u, v, 0.f, true);
+      };
+      const CameraConnection<float> c = at(p);
+      ASSERT_TRUE(c.valid) << seen.name;
+      ASSERT_NEAR(c.x, x, 2e-4f) << seen.name;
+      ASSERT_NEAR(c.y, y, 2e-4f) << seen.name;
+      const float inverse = inverse_camera_density<float>(setup, 0.f, p, ray.d, true);
+      if (seen.lens == 0) {
+        ASSERT_NEAR(inverse * c.density, 1.f, 1e-4f) << seen.name;
+      }
+      const Frame<float> across = make_frame(ray.d);
+      const float step = 2e-3f * t;
+      const auto moved = [&](const Vec3<float>& way) {
+        const CameraConnection<float> a = at(fma(way, -step, p)), b = at(fma(way, step, p));
+        return std::array<double, 2>{(double{b.x} - double{a.x}) / (2 * double{step}),
+                                     (double{b.y} - double{a.y}) / (2 * double{step})};
+      };
+      const auto s = moved(across.s), r = moved(across.t);
+      const double area = std::abs(s[0] * r[1] - s[1] * r[0]);
+      // Near a pole of a latlong picture its columns converge.
+      const double latitude = setup.y1 - y * setup.step_y;
+      if (seen.projection != Projection::kLatlong || std::abs(latitude) < 1.3) {
+        ASSERT_NEAR(area / double{c.density}, 1, 0.01) << seen.name;
+      }
+    }
+  }
+}
+
+// A picture of all directions goes on at its other edge, and beyond a pole half a turn on: light
+// counts for as much there as in the middle, and where the camera's samples see it.
+TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
+  constexpr uint32_t kAcross = 24, kDown = 12;
+  const FilterTable table(FilterKind::kGaussian, 4);
+  Camera made = make_camera(Projection::kLatlong, 0);
+  made.window[0] = -static_cast<float>(kPiD);
+  made.window[1] = static_cast<float>(kPiD);
+  made.window[2] = -0.5f * static_cast<float>(kPiD);
+  made.window[3] = 0.5f * static_cast<float>(kPiD);
+  const CameraSetup setup(made, kAcross, kDown, table);
+  const Region all{0, 0, kAcross, kDown};
+  const SplatFilter filter = splat_filter_of(setup, table, all);
+  const Film film(all, {}, false);
+  Random random(5);
+  for (int i = 0; i < 300; ++i) {
+    // Near the edges; a camera's sample of the pixel there may lie beyond them.
+    const float x = 4 * random() - 2 + (i % 2 ? kAcross : 0);
+    const float y = i % 3 == 0 ? 4 * random() - 2 + (i % 2 ? kDown : 0) : kDown * random();
+    const CameraRay<float> ray = ray_through<float>(setup, x, y, 0.f, 0.f, 0.f, true);
+    const CameraConnection<float> c =
+        connect_to_camera<float>(setup, ray.o + ray.d, 0.f, 0.f, 0.f, true);
+    ASSERT_TRUE(c.valid);
+    ASSERT_TRUE(filter.reaches<float>(c.x, c.y));
+    double sum = 0;
+    std::vector<double> weight(kAcross * kDown);
+    filter.spread(film, c.x, c.y, [&](size_t pixel, float w) {
+      weight[pixel] += double{w};
+      sum += double{w};
+    });
+    EXPECT_NEAR(sum, 1, 0.02) << x << " " << y;
+    // The pixels whose samples lie at (x, y) itself.
+    for (uint32_t row = 0; row < kDown; ++row)
+      for (uint32_t column = 0; column < kAcross; ++column) {
+        const float own = table.density(x - (static_cast<float>(column) + 0.5f)) *
+                          table.density(y - (static_cast<float>(row) + 0.5f));
+        EXPECT_GE(weight[film.index(column, row)], double{own} - 2e-3) << x << " " << y;
+      }
+  }
+  // A half of the way round shows nothing twice.
+  made.window[0] = -0.5f * static_cast<float>(kPiD);
+  made.window[1] = 0.5f * static_cast<float>(kPiD);
+  const CameraSetup front(made, kAcross, kDown, table);
+  const SplatFilter half = splat_filter_of(front, table, all);
+  const auto behind = connect_to_camera<float>(front, front.to_world.t + Vec3<float>{0.1f, 0, 1},
+                                               0.f, 0.f, 0.f, true);
+  EXPECT_FALSE(half.reaches<float>(behind.x, behind.y));
 }
 
 }  // namespace

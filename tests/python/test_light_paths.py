@@ -39,9 +39,11 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
-@pytest.mark.parametrize("name", ["caustics", "mixed"])
-def test_one_picture_whatever_the_schedule(stages: Any, name: str) -> None:
-    stage = wavecomb.load(stages(name))
+@pytest.mark.parametrize(
+    ("name", "projection"), [("caustics", None), ("mixed", None), ("pool", "latlong")]
+)
+def test_one_picture_whatever_the_schedule(stages: Any, name: str, projection: Any) -> None:
+    stage = wavecomb.load(stages(name), projection=projection)
     plain = render(stage)
     assert not np.array_equal(plain.beauty, render(stage, transport="path").beauty)
     ways: list[dict[str, Any]] = [{"lanes": lanes} for lanes in _core.lane_widths()]
@@ -70,10 +72,12 @@ def test_settings_of_paths_change_the_picture_alike(stages: Any) -> None:
         ), way
 
 
-def test_parts_are_those_of_the_whole(stages: Any) -> None:
-    stage = wavecomb.load(stages("caustics"))
+@pytest.mark.parametrize("projection", [None, "latlong"])
+def test_parts_are_those_of_the_whole(stages: Any, projection: Any) -> None:
+    stage = wavecomb.load(stages("caustics"), projection=projection)
     whole = render(stage).beauty
-    x0, y0, x1, y1 = region = (9, 5, 27, 22)
+    # A latlong picture's seam and its pole beneath belong to the part.
+    x0, y0, x1, y1 = region = (9, 5, 27, 22) if projection is None else (9, 5, 32, 32)
     part = render(stage, region=region).beauty
     assert np.array_equal(part[y0:y1, x0:x1], whole[y0:y1, x0:x1])
     assert not part[:y0].any()

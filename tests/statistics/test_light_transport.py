@@ -177,17 +177,24 @@ LENSES = {
         "float focalLength", 'token projection = "orthographic"\nfloat focalLength'
     ),
     "clipped": camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.42, clip=(2.9, 4.3)),
+    # From within, with the corner behind it: what is there lies on both sides of the seam.
+    "all round": camera((0.3, 0.7, 0.9), (0.5, 0.7, 3.0), half=0.42),
 }
 
 
 @pytest.mark.parametrize("lens", list(LENSES))
 def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
     prims = [p if "Camera" not in p else LENSES[lens] for p in corner(*lights(tmp_path)["rect"])]
-    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
-    # Not at the clip's edge: filters have tails there that camera paths do not come to.
-    wide = {} if lens == "clipped" else {"filter": "blackman-harris", "filter_width": 3.0}
+    shown = {"projection": "latlong"} if lens == "all round" else {}
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims), **shown)
+    # Not at an edge: filters have tails there that camera paths do not come to.
+    wide: dict[str, Any] = {"filter": "blackman-harris", "filter_width": 3.0}
+    if lens == "clipped":
+        wide = {}
+    elif lens == "all round":
+        wide = {"filter": "box", "filter_width": 2.0}
     compare(f"light paths {lens}", stage, beauty, **wide)
-    if lens == "lens":
+    if lens in ("lens", "all round"):
         compare(f"connections {lens}", stage, beauty, transport="bdpt", **wide)
 
 

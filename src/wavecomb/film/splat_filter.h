@@ -5,10 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/core/lane_arithmetic.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/film/filter.h"
 
 namespace wavecomb {
+
+/// Where a picture of all directions shows a point again: once more after each turn, and beyond a
+/// pole upside down, half a turn on. In pixels; no turn: it is no such picture.
+struct PictureTurn {
+  float pixels = 0;            ///< of a turn
+  float north = 0, south = 0;  ///< y of the poles
+};
 
 /// Light that arrives at (x, y), in pixels from the picture's upper left corner, counts for each
 /// pixel by the filter's density at the way from its centre: as often as samples of that pixel,
@@ -16,22 +24,62 @@ namespace wavecomb {
 class SplatFilter {
  public:
   /// `rendered`: pixels that get any.
-  SplatFilter(const FilterTable& filter, const Region& rendered)
-      : filter_(filter), rendered_(rendered) {}
+  SplatFilter(const FilterTable& filter, const Region& rendered, const PictureTurn& turn = {})
+      : filter_(filter), rendered_(rendered), turn_(turn) {}
 
   /// Whether any pixel gets light of (x, y).
   template <typename F>
   Mask<F> reaches(const F& x, const F& y) const {
-    const float r = filter_.radius();
-    const auto low = [&](uint32_t edge) { return F(static_cast<float>(edge) + 0.5f - r); };
-    const auto high = [&](uint32_t edge) { return F(static_cast<float>(edge) - 0.5f + r); };
-    return (x >= low(rendered_.x0)) & (x < high(rendered_.x1)) & (y >= low(rendered_.y0)) &
-           (y < high(rendered_.y1));
+    if (turn_.pixels == 0) [[likely]]
+      return (x >= left()) & (x < right()) & holds_row<F>(y);
+    const F half = x + 0.5f * turn_.pixels;
+    return (holds_row<F>(y) & comes_round<F>(x)) |
+           ((holds_row<F>(F(2 * turn_.north - y)) | holds_row<F>(F(2 * turn_.south - y))) &
+            comes_round<F>(half));
   }
 
   /// Runs add(pixel, weight) for each pixel (Film::index) that light at (x, y) counts for.
   template <typename Add>
   void spread(const Film& film, float x, float y, const Add& add) const {
+    if (turn_.pixels == 0) [[likely]] {
+      spread_at(film, x, y, add);
+      return;
+    }
+    const float half = x + 0.5f * turn_.pixels;
+    spread_around(film, x, y, add);
+    spread_around(film, half, 2 * turn_.north - y, add);
+    spread_around(film, half, 2 * turn_.south - y, add);
+  }
+
+ private:
+  // Whose filter reaches a pixel.
+  float left() const { return low(rendered_.x0); }
+  float right() const { return high(rendered_.x1); }
+  float low(uint32_t edge) const { return static_cast<float>(edge) + 0.5f - filter_.radius(); }
+  float high(uint32_t edge) const { return static_cast<float>(edge) - 0.5f + filter_.radius(); }
+  template <typename F>
+  Mask<F> holds_row(const F& y) const {
+    return (y >= low(rendered_.y0)) & (y < high(rendered_.y1));
+  }
+  /// x less whole turns, so that it is less than one right of left().
+  template <typename F>
+  F after_left(const F& x) const {
+    return x - floor(F(F(x - left()) * (1.f / turn_.pixels))) * turn_.pixels;
+  }
+  template <typename F>
+  Mask<F> comes_round(const F& x) const {
+    return after_left<F>(x) < right();
+  }
+
+  template <typename Add>
+  void spread_around(const Film& film, float x, float y, const Add& add) const {
+    if (!holds_row<float>(y)) return;
+    for (float at = after_left<float>(x); at < right(); at += turn_.pixels)
+      spread_at(film, at, y, add);
+  }
+
+  template <typename Add>
+  void spread_at(const Film& film, float x, float y, const Add& add) const {
     const float r = filter_.radius();
     // Pixels i with |x - (i + 1/2)| < r.
     const auto first = [&](float at, uint32_t edge) {
@@ -51,9 +99,9 @@ class SplatFilter {
     }
   }
 
- private:
   const FilterTable& filter_;
   Region rendered_;
+  PictureTurn turn_;
 };
 
 }  // namespace wavecomb

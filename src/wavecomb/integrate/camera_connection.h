@@ -8,7 +8,9 @@
 /// directions from o have the density |M d'|^3 / (|det M| A) over solid angle, and a surface at p
 /// which is seen under cos has G cos over its area, with
 ///   G = |M d'| / (|det M| A s^2);   orthographic:   |M d'| / (|det M| A).
-/// The lens is sampled evenly from both ends, and its density cancels.
+/// The lens is sampled evenly from both ends, and its density cancels. A latlong camera's d' are
+/// unit vectors, of which a step of longitude and latitude holds cos(latitude) A, so
+///   G = |M d'| / (|det M| A s^2 cos(latitude)).
 #pragma once
 
 #include "wavecomb/integrate/camera_ray.h"
@@ -31,14 +33,28 @@ struct CameraSpace {
     z = cross(a, b);
     det = dot(c, z);
   }
+  /// A point in the camera's space, of its way from the camera.
+  Vec3<F> local(const Vec3<F>& from) const {
+    const F inverse_det = 1.f / det;
+    return {F(dot(x, from) * inverse_det), F(dot(y, from) * inverse_det),
+            F(dot(z, from) * inverse_det)};
+  }
 };
 
-/// G of a point at depth s whose distance from the lens is `stretch` s.
+/// Distance of a point of the camera's space from the poles' axis.
 template <typename F>
-inline F camera_density(const CameraSetup& camera, const F& det, const F& stretch, const F& s) {
+inline F from_axis(const Vec3<F>& q) {
+  return sqrt(fma(q.x, q.x, F(q.z * q.z)));
+}
+
+/// G of a point at depth s whose distance from the lens is `stretch` s. `spread`: s, of a latlong
+/// camera its distance from the poles' axis.
+template <typename F>
+inline F camera_density(const CameraSetup& camera, const F& det, const F& stretch, const F& s,
+                        const F& spread) {
   const F pixel = abs(det) * (camera.step_x * camera.step_y);
   const F density = stretch / pixel;
-  return camera.projection == Projection::kOrthographic ? density : F(density / F(s * s));
+  return camera.projection == Projection::kOrthographic ? density : F(density / F(s * spread));
 }
 
 /// 1 / G of the point p that the camera has met along the unit direction d; 0 where it is out of
@@ -47,9 +63,16 @@ template <typename F>
 inline F inverse_camera_density(const CameraSetup& camera, const F& time, const Vec3<F>& p,
                                 const Vec3<F>& d, const Mask<F>& active) {
   const CameraSpace<F> space(camera, time, active);
-  const F s = -dot(space.z, Vec3<F>(p - space.m.t)) / space.det;
-  const F stretch = F(-space.det) / dot(space.z, d);
-  const F inverse = 1.f / camera_density<F>(camera, space.det, stretch, s);
+  const Vec3<F> from = p - space.m.t;
+  F s = -dot(space.z, from) / space.det;
+  F stretch = F(-space.det) / dot(space.z, d), spread = s;
+  if (camera.projection == Projection::kLatlong) [[unlikely]] {
+    const Vec3<F> q = space.local(from);
+    s = length(q);
+    stretch = length(from) / s;
+    spread = from_axis<F>(q);
+  }
+  const F inverse = 1.f / camera_density<F>(camera, space.det, stretch, s, spread);
   return select(is_finite(inverse) & (s > 0.f) & (stretch > 0.f), inverse, F(0.f));
 }
 
@@ -69,17 +92,17 @@ struct CameraConnection {
   Mask<F> valid;
 };
 
-/// `u`, `v` choose the point of the lens. Not of latlong cameras.
+/// `u`, `v` choose the point of the lens. Where a latlong picture shows a point more than once,
+/// this is one of the places (SplatFilter has the others).
 template <typename F>
 inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
                                              const F& u, const F& v, const F& time,
                                              const Mask<F>& active) {
   const CameraSpace<F> space(camera, time, active);
   const Vec3<F> from = p - space.m.t;
-  const F inverse_det = 1.f / space.det;
-  const Vec3<F> q(dot(space.x, from) * inverse_det, dot(space.y, from) * inverse_det,
-                  dot(space.z, from) * inverse_det);
-  const F s = -q.z;
+  const Vec3<F> q = space.local(from);
+  const bool is_all_round = camera.projection == Projection::kLatlong;
+  const F s = is_all_round ? length(q) : F(-q.z);
   const Mask<F> ahead = active & (s > 0.f);
   const F inverse_s = 1.f / select(ahead, s, F(1.f));
   const bool is_parallel = camera.projection == Projection::kOrthographic;
@@ -91,8 +114,14 @@ inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Ve
   }
   // d' and o; what the window shows is d' + lens / focus_distance, or of o less the lens's share.
   detail::LocalRay<F> ray;
-  F wx, wy;
-  if (is_parallel) {
+  F wx, wy, spread = s;
+  if (is_all_round) [[unlikely]] {
+    spread = from_axis<F>(q);
+    ray.d = q * inverse_s;
+    ray.o = Vec3<F>(F(0.f));
+    wx = atan2(q.x, F(-q.z));
+    wy = atan2(q.y, spread);
+  } else if (is_parallel) {
     ray.d = {F(-lens.x * focus), F(-lens.y * focus), F(-1.f)};
     ray.o = {fma(F(-s), ray.d.x, q.x), fma(F(-s), ray.d.y, q.y), F(0.f)};
     wx = ray.o.x - lens.x;
@@ -113,7 +142,7 @@ inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Ve
   c.to = world(start) + space.m.t;
   c.x = F(wx - camera.x0) * (1.f / camera.step_x);
   c.y = F(camera.y1 - wy) * (1.f / camera.step_y);
-  c.density = camera_density<F>(camera, space.det, length(world(ray.d)), s);
+  c.density = camera_density<F>(camera, space.det, length(world(ray.d)), s, spread);
   c.valid = ahead & (s > near) & (s < far) & (c.density > 0.f) & is_finite(c.density);
   return c;
 }

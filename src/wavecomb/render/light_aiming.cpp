@@ -8,6 +8,7 @@
 #include "wavecomb/film/filter.h"
 #include "wavecomb/integrate/aim_lessons.h"
 #include "wavecomb/render/lane_kernels.h"
+#include "wavecomb/render/light_paths.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/pick.h"
 
@@ -59,7 +60,7 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Tr
   // A survivor of roulette brings many times what it stands for.
   settings.roulette = RouletteKind::kOff;
   const FilterTable filter(settings.filter, settings.used_filter_width());
-  const SplatFilter splat_filter(filter, settings.rendered());
+  const SplatFilter splat_filter = splat_filter_of(*render.camera, filter, settings.rendered());
   WaveContext context = render;
   context.settings = &settings;
   context.splat_filter = &splat_filter;

@@ -38,10 +38,9 @@ float farthest(const Bounds& box, const Vec3<float>& from) {
 }  // namespace
 
 LightPathRefusal light_path_refusal(const Scene& scene) {
-  if (scene.camera().projection == Projection::kLatlong)
-    return {"latlong cameras", "another camera"};
   const Camera& camera = scene.camera();
-  if (distorts(camera)) return {"lenses that distort", "a camera without lens distortion"};
+  if (distorts(camera) && camera.projection != Projection::kLatlong)
+    return {"lenses that distort", "a camera without lens distortion"};
   if (camera.rolling_shutter != RollingShutter::kOff)
     return {"rolling shutters", "a camera without one"};
   if (scene.view().visibility)
@@ -53,6 +52,13 @@ LightPathRefusal light_path_refusal(const Scene& scene) {
   if (!scene.volumes().empty())
     return {"volumes, such as '" + scene.volumes()[0].name + "'", "a stage without them"};
   return {};
+}
+
+SplatFilter splat_filter_of(const CameraSetup& camera, const FilterTable& filter,
+                            const Region& rendered) {
+  if (camera.projection != Projection::kLatlong) return {filter, rendered};
+  const auto row = [&](float latitude) { return (camera.y1 - latitude) / camera.step_y; };
+  return {filter, rendered, {2 * kPi / camera.step_x, row(0.5f * kPi), row(-0.5f * kPi)}};
 }
 
 void check_light_paths(const Scene& scene, const Settings& settings) {

@@ -38,6 +38,10 @@ float scene_brightness(const Scene& scene);
 /// and reach 2^17 of it.
 FixedPoint splat_unit(const Scene& scene);
 
+/// How light that paths show to the camera counts for the pixels of a render.
+SplatFilter splat_filter_of(const CameraSetup& camera, const FilterTable& filter,
+                            const Region& rendered);
+
 /// Lets the lights of `view` send paths: towards all surfaces, from before all shapes of lights.
 void send_paths(const Scene& scene, LightView& view);
 

@@ -241,7 +241,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   const AovTables aovs(scene, settings);
   const Region window = settings.film();
   Film film(window, aovs.layout, settings.keeps_error());
-  const SplatFilter splat_filter(filter, settings.rendered());
+  const SplatFilter splat_filter = splat_filter_of(camera, filter, settings.rendered());
   if (settings.joins_light()) {
     check_light_paths(scene, settings);
     film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
