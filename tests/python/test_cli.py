@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from fake_core import Error, Fake, install
+from parts import needs
 
 from wavecomb.cli import main
 from wavecomb.picture.image import read_layers, read_metadata, write_exr
@@ -154,7 +155,9 @@ def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Pat
         (["--size", 0, 10], "size 0 x 10"),
         (["--size", -5, 10], "size -5 x 10"),
         (["--size", 65537, 10], "from 1 to 65536"),
-        (["--size", 65536, 65536, "--denoise"], "GiB of memory"),
+        pytest.param(
+            ["--size", 65536, 65536, "--denoise"], "GiB of memory", marks=needs("pyoidn")
+        ),
         (["--size", "x", 10], "'x' is not a valid integer"),
         (["--spp", 0], "0 samples per pixel"),
         (["--camera", "/Nowhere"], "no camera /Nowhere there are: /Camera"),
