@@ -155,9 +155,7 @@ def test_interrupt_before_the_first_sample(fake: Fake, stage: str, tmp_path: Pat
         (["--size", 0, 10], "size 0 x 10"),
         (["--size", -5, 10], "size -5 x 10"),
         (["--size", 65537, 10], "from 1 to 65536"),
-        pytest.param(
-            ["--size", 65536, 65536, "--denoise"], "GiB of memory", marks=needs("pyoidn")
-        ),
+        pytest.param(["--size", 65536, 65536, "--denoise"], "GiB of memory", marks=needs("pyoidn")),
         (["--size", "x", 10], "'x' is not a valid integer"),
         (["--spp", 0], "0 samples per pixel"),
         (["--camera", "/Nowhere"], "no camera /Nowhere there are: /Camera"),
