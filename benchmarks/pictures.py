@@ -58,9 +58,11 @@ def write_row(
     pixels = np.ascontiguousarray(255 * values + 0.5, np.uint8)
     out = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8"))
     out.set_pixels(oiio.ROI(), pixels)
-    out.specmod()["compression"] = "jpeg:88"
+    kind = "jpeg" if file.suffix == ".jpg" else "png"
+    if kind == "jpeg":
+        out.specmod()["compression"] = "jpeg:88"
     with replacing(file) as part:
-        out.write(str(part), "uint8", "jpeg" if file.suffix == ".jpg" else "png")
+        out.write(str(part), "uint8", kind)
 
 
 def white_of(reference: Pixels) -> float:

@@ -121,7 +121,7 @@ def main() -> None:
         begin = time.perf_counter()
         picture, spp, rays = render(job["spp"], job["seed"])
         seconds = time.perf_counter() - begin
-        # Mitsuba's ptracer is black where all is seen through glass or water, whatever the seed.
+        # Black for any seed is what Mitsuba's ptracer gives where its light paths miss the stage.
         if last and last[0] != job["seed"] and picture.any() and np.array_equal(last[1], picture):
             raise RuntimeError(f"{args.kind}: another seed gave the same picture")
         last = job["seed"], picture
