@@ -3,14 +3,17 @@
 
     .venv/bin/python benchmarks/guiding.py room cornell --spp 64 --seeds 5
     .venv/bin/python benchmarks/guiding.py mixed-lamps kitchen lights --ways power off auto light
+    .venv/bin/python benchmarks/guiding.py room --seconds 20 --ways power lights lights+pixels
 
 Renders each stage in each way, several seeds in turns; the first way is what others are compared
 with. ``power`` is without anything learned, ``off`` the defaults, of which shares of lights are
-learned. Stages are generated ones, written as exporters do (``--plain``), with ``-lamps`` behind
-their names lit by a key, a fill and a dim dome; or files. relMSE is that of
-one picture: the variance over the seeds at each pixel over the square of the mean of all pictures,
+learned; parts, and parts joined by ``+``, are over ``power``. Stages are generated ones, written
+as exporters do (``--plain``), with ``-lamps`` behind their names lit by a key, a fill and a dim
+dome; or files. The filter is a box of one pixel. relMSE is that of one picture: the variance over
+the seeds at each pixel over the square of the mean of all pictures,
 plus 0.01; every combination has the same mean. Efficiency is 1 / (relMSE x seconds); seconds are of
-the processor and have the training in them, so that other work on the machine counts little.
+the processor and have the training in them, so that other work on the machine counts little. With
+``--seconds`` each render ends after so many, training included, and they are those of the clock.
 """
 
 from __future__ import annotations
@@ -33,8 +36,39 @@ WAYS: dict[str, dict[str, str]] = {
     "both": {"guiding": "on"},
     "auto": {"guiding": "auto"},
     "light": {"transport": "auto"},
-    "pixels": {"allocate": "error"},
 }
+PARTS: dict[str, dict[str, str]] = {
+    "lights": {"light_weights": "calibrated", "light_selection": "auto"},
+    "pixels": {"allocate": "error"},
+    "paths": {"roulette": "efficient"},
+    "directions": {"guiding": "on"},
+}
+"""Of what is learned, each over everything off."""
+
+
+def way(name: str) -> dict[str, str]:
+    """Settings of a way: one of WAYS, or some of PARTS joined by ``+``.
+
+    Raises:
+        argparse.ArgumentTypeError: Is neither.
+    """
+    if name in WAYS:
+        return WAYS[name]
+    parts = name.split("+")
+    unknown = [part for part in parts if part not in PARTS]
+    if unknown:
+        known = ", ".join([*WAYS, *PARTS])
+        raise argparse.ArgumentTypeError(f"{unknown[0]!r} is none of {known}")
+    settings = {**WAYS["power"], "roulette": "throughput"}
+    for part in parts:
+        settings |= PARTS[part]
+    return settings
+
+
+def known(name: str) -> str:
+    """A way's name, once it is known to be one."""
+    way(name)
+    return name
 
 
 def load(name: str, folder: Path) -> Any:
@@ -46,37 +80,42 @@ def load(name: str, folder: Path) -> Any:
     return wavecomb.load(path).scene
 
 
-def measure(scene: Any, options: argparse.Namespace, spp: int) -> list[dict[str, Any]]:
-    """A row for each way."""
-    pictures: dict[str, list[Any]] = {way: [] for way in options.ways}
-    seconds: dict[str, list[float]] = {way: [] for way in options.ways}
+def measure(
+    scene: Any, options: argparse.Namespace, spp: int, limit: float = 0.0
+) -> list[dict[str, Any]]:
+    """A row for each way, of renders of so many samples or, with a limit, of so many seconds."""
+    clock = time.perf_counter if limit else time.process_time
+    budget = {"spp": 1 << 20, "time_limit": limit} if limit else {"spp": spp}
+    pictures: dict[str, list[Any]] = {name: [] for name in options.ways}
+    seconds: dict[str, list[float]] = {name: [] for name in options.ways}
     learned: dict[str, Any] = {}
     for seed in range(options.seeds):
         turn = seed % len(options.ways)
-        for way in options.ways[turn:] + options.ways[:turn]:
-            begin = time.process_time()
+        for name in options.ways[turn:] + options.ways[:turn]:
+            begin = clock()
             picture = wavecomb.render(
-                scene, spp=spp, seed=seed, size=tuple(options.size), threads=options.threads,
-                max_depth=7, filter="box", **WAYS[way],
+                scene, **budget, seed=seed, size=tuple(options.size), threads=options.threads,
+                max_depth=7, filter="box", filter_width=1.0, **way(name),
             )  # fmt: skip
-            seconds[way].append(time.process_time() - begin)
-            pictures[way].append(np.asarray(picture.beauty, np.float64))
-            learned[way] = picture.stats["guiding"]
+            seconds[name].append(clock() - begin)
+            pictures[name].append(np.asarray(picture.beauty, np.float64))
+            learned[name] = picture.stats["guiding"]
     mean = np.mean([np.mean(p, axis=0) for p in pictures.values()], axis=0)
     rows = []
-    for way in options.ways:
-        stack = np.array(pictures[way])
+    for name in options.ways:
+        stack = np.array(pictures[name])
         pixels = np.sort((stack.var(axis=0, ddof=1) / (mean**2 + 0.01)).mean(axis=-1).ravel())
         # Each round's own error, for the spread of the ratios.
         rounds = [
             float(((one - mean) ** 2 / (mean**2 + 0.01)).mean()) * took
-            for one, took in zip(stack, seconds[way], strict=True)
+            for one, took in zip(stack, seconds[name], strict=True)
         ]
         rows.append(
-            {"spp": spp, "way": way, "rel_mse": float(pixels.mean()),
+            {**({"limit": limit} if limit else {"spp": spp}), "way": name,
+             "rel_mse": float(pixels.mean()),
              "trimmed": float(pixels[: int(0.999 * len(pixels))].mean()),
-             "seconds": float(np.mean(seconds[way])), "rounds": rounds,
-             "mean": float(stack.mean()), "learned": learned[way]}
+             "seconds": float(np.mean(seconds[name])), "rounds": rounds,
+             "mean": float(stack.mean()), "learned": learned[name]}
         )  # fmt: skip
     base = rows[0]
     for row in rows:
@@ -93,8 +132,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+")
     usual = ["off", "roulette", "guiding", "both", "auto"]
-    parser.add_argument("--ways", nargs="+", default=usual, choices=list(WAYS))
+    parser.add_argument("--ways", nargs="+", default=usual, type=known)
     parser.add_argument("--spp", type=int, nargs="+", default=[64])
+    parser.add_argument("--seconds", type=float, nargs="+", help="of each render, in place of spp")
     parser.add_argument("--size", type=int, nargs=2, default=[240, 160])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
@@ -105,11 +145,12 @@ def main() -> None:
     for name in options.stages:
         scene = load(name, options.folder)
         results[Path(name).stem] = rows = []
-        for spp in options.spp:
-            for row in measure(scene, options, spp):
+        budgets = [(0, s) for s in options.seconds] if options.seconds else []
+        for spp, limit in budgets or [(s, 0.0) for s in options.spp]:
+            for row in measure(scene, options, spp, limit):
                 rows.append(row)
                 print(
-                    f"{Path(name).stem:10} {row['spp']:4} {row['way']:9} "
+                    f"{Path(name).stem:10} {limit or spp:4} {row['way']:9} "
                     f"relMSE {row['rel_mse']:.5f} {row['seconds']:6.2f} s  efficiency "
                     f"{row['efficiency_by_rel_mse']:.2f} ({row['spread']['min']:.2f} to "
                     f"{row['spread']['max']:.2f}), trimmed {row['efficiency_by_trimmed']:.2f}",
