@@ -10,10 +10,10 @@ with. ``power`` is without anything learned, ``off`` the defaults, of which shar
 learned; parts, and parts joined by ``+``, are over ``power``. Stages are generated ones, written
 as exporters do (``--plain``), with ``-lamps`` behind their names lit by a key, a fill and a dim
 dome; or files. The filter is a box of one pixel. relMSE is that of one picture: the variance over
-the seeds at each pixel over the square of the mean of all pictures,
-plus 0.01; every combination has the same mean. Efficiency is 1 / (relMSE x seconds); seconds are of
-the processor and have the training in them, so that other work on the machine counts little. With
-``--seconds`` each render ends after so many, training included, and they are those of the clock.
+the seeds at each pixel over the square of the mean of all pictures, plus 0.01; every combination
+has the same mean. Efficiency is 1 / (relMSE x seconds); seconds are of the processor and have the
+training in them, so that other work on the machine counts little. With ``--seconds`` each render
+ends after so many, training included, and they are those of the clock.
 """
 
 from __future__ import annotations
@@ -81,11 +81,12 @@ def load(name: str, folder: Path) -> Any:
 
 
 def measure(
-    scene: Any, options: argparse.Namespace, spp: int, limit: float = 0.0
+    scene: Any, options: argparse.Namespace, budget: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    """A row for each way, of renders of so many samples or, with a limit, of so many seconds."""
-    clock = time.perf_counter if limit else time.process_time
-    budget = {"spp": 1 << 20, "time_limit": limit} if limit else {"spp": spp}
+    """A row for each way. `budget`: ``spp`` or ``limit``, seconds, of a render."""
+    clock, ends = time.process_time, budget
+    if "limit" in budget:
+        clock, ends = time.perf_counter, {"spp": 1 << 20, "time_limit": budget["limit"]}
     pictures: dict[str, list[Any]] = {name: [] for name in options.ways}
     seconds: dict[str, list[float]] = {name: [] for name in options.ways}
     learned: dict[str, Any] = {}
@@ -94,7 +95,7 @@ def measure(
         for name in options.ways[turn:] + options.ways[:turn]:
             begin = clock()
             picture = wavecomb.render(
-                scene, **budget, seed=seed, size=tuple(options.size), threads=options.threads,
+                scene, **ends, seed=seed, size=tuple(options.size), threads=options.threads,
                 max_depth=7, filter="box", filter_width=1.0, **way(name),
             )  # fmt: skip
             seconds[name].append(clock() - begin)
@@ -111,8 +112,7 @@ def measure(
             for one, took in zip(stack, seconds[name], strict=True)
         ]
         rows.append(
-            {**({"limit": limit} if limit else {"spp": spp}), "way": name,
-             "rel_mse": float(pixels.mean()),
+            {**budget, "way": name, "rel_mse": float(pixels.mean()),
              "trimmed": float(pixels[: int(0.999 * len(pixels))].mean()),
              "seconds": float(np.mean(seconds[name])), "rounds": rounds,
              "mean": float(stack.mean()), "learned": learned[name]}
@@ -141,16 +141,17 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path("out/guiding"))
     parser.add_argument("--output", type=Path, default=RESULTS / "guiding.json")
     options = parser.parse_args()
+    limits = [{"limit": seconds} for seconds in options.seconds or ()]
+    budgets: list[dict[str, Any]] = limits or [{"spp": spp} for spp in options.spp]
     results: dict[str, Any] = {}
     for name in options.stages:
         scene = load(name, options.folder)
         results[Path(name).stem] = rows = []
-        budgets = [(0, s) for s in options.seconds] if options.seconds else []
-        for spp, limit in budgets or [(s, 0.0) for s in options.spp]:
-            for row in measure(scene, options, spp, limit):
+        for budget in budgets:
+            for row in measure(scene, options, budget):
                 rows.append(row)
                 print(
-                    f"{Path(name).stem:10} {limit or spp:4} {row['way']:9} "
+                    f"{Path(name).stem:10} {next(iter(budget.values())):4} {row['way']:9} "
                     f"relMSE {row['rel_mse']:.5f} {row['seconds']:6.2f} s  efficiency "
                     f"{row['efficiency_by_rel_mse']:.2f} ({row['spread']['min']:.2f} to "
                     f"{row['spread']['max']:.2f}), trimmed {row['efficiency_by_trimmed']:.2f}",
