@@ -21,10 +21,12 @@ constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrain
 constexpr uint64_t kAutoShare = 100, kLeastAutoPaths = 200'000;
 /// Paths without which that is not worth it, where their cost leaves fewer.
 constexpr uint64_t kFewestAutoPaths = 120'000;
-/// Paths that a thread teaches in a second, and the shares of a time limit that may go to them.
+/// Paths that a thread teaches in a second, until the first round tells, and the shares of a time
+/// limit that may go to them.
 constexpr double kTaughtInSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 25;
-/// Of Guiding::kAuto: the share of a time limit after which it gives up.
-constexpr double kMostTimeShare = 20;
+/// Of Guiding::kAuto: the share of a time limit after which it gives up, and that where it is
+/// known to pay.
+constexpr double kMostTimeShare = 20, kMostPaidTimeShare = 4;
 /// Of Guiding::kAuto: what training may cost, as a share of the picture, where it is counted; and
 /// what a path that teaches costs beside its rays and vertices, which are kept, read and sorted.
 constexpr double kAutoCostShare = 0.05, kTeachingCost = 1.5;
@@ -41,16 +43,26 @@ constexpr uint32_t kTrainingRounds = 3;
 /// The round after which half of the training has been.
 constexpr uint32_t kHalfway = 1;
 
+/// A number of paths, at most as many as are ever taken.
+uint64_t as_count(double paths) {
+  return static_cast<uint64_t>(std::min(paths, static_cast<double>(kMostTrainingPaths)));
+}
+
+/// Paths that are a share of a render's samples.
+uint64_t share_of_samples(const Settings& settings, uint64_t share) {
+  const uint64_t samples = uint64_t{settings.width} * settings.height * settings.spp;
+  return std::min(samples / share, kMostTrainingPaths);
+}
+
 /// Paths that training may take; 0: too few to learn from.
 uint64_t training_paths(const Settings& settings, uint32_t threads) {
   const bool is_auto = settings.guiding == Guiding::kAuto;
-  const uint64_t samples = uint64_t{settings.width} * settings.height * settings.spp;
-  uint64_t paths = std::min(samples / (is_auto ? kAutoShare : kTrainingShare), kMostTrainingPaths);
+  uint64_t paths = share_of_samples(settings, is_auto ? kAutoShare : kTrainingShare);
   // A limit of time is a render's only measure where it has more samples than it can take.
   if (settings.time_limit > 0) {
     const double taught = double{settings.time_limit} * threads * kTaughtInSecond /
                           (is_auto ? kAutoTimeShare : kTimeShare);
-    paths = std::min(paths, static_cast<uint64_t>(std::min(taught, 1e9)));
+    paths = std::min(paths, as_count(taught));
   }
   return paths >= (is_auto ? kLeastAutoPaths : kLeastTrainingPaths) ? paths : 0;
 }
@@ -102,8 +114,7 @@ class Trainer {
     // A survivor of roulette brings many times what it stands for: noise that hides what aiming
     // wins.
     settings_.roulette = RouletteKind::kOff;
-    if (is_auto() && settings_.time_limit > 0)
-      most_s_ = double{settings_.time_limit} / kMostTimeShare;
+    if (is_auto() && is_timed()) most_s_ = double{settings_.time_limit} / kMostTimeShare;
     context_.settings = &settings_;
     context_.film = &film_;
     context_.aovs = nullptr;
@@ -117,10 +128,8 @@ class Trainer {
     for (uint32_t round = 0; round < kTrainingRounds && !ended(); ++round) {
       const double cost = run(round);
       if (ended()) break;
-      if (!is_auto()) continue;
-      const bool goes_on = round == 0 ? can_afford(cost, without)
-                                      : round != kHalfway || tell_gain(without) >= kPromisingGain;
-      if (!goes_on) return result(false);
+      if (!is_auto() && is_timed()) budget_ = most_paths();
+      if (is_auto() && !goes_on(round, cost, without)) return result(false);
     }
     if (ended()) return result(false);
     bool pays = field_->facts().regions > 0;
@@ -137,6 +146,7 @@ class Trainer {
     return settings;
   }
   bool is_auto() const { return trial_settings_.guiding == Guiding::kAuto; }
+  bool is_timed() const { return settings_.time_limit > 0; }
   bool guides() const { return trial_settings_.guiding != Guiding::kOff; }
   /// Whether the render was stopped, or training takes too much of its time.
   bool ended() const { return stopped_() || seconds_since(start_) > most_s_; }
@@ -177,16 +187,39 @@ class Trainer {
     return statistics_.gain;
   }
 
+  /// Of Guiding::kAuto: whether the rounds after `round`, which has cost `cost`, are worth it. Sets
+  /// what they may take.
+  bool goes_on(uint32_t round, double cost, const Trial& without) {
+    if (round == 0) return can_afford(cost, without);
+    if (round != kHalfway) return true;
+    const double gain = tell_gain(without);
+    if (gain >= kWorthwhileGain) {
+      // It is guided then: what more paths cost, a better field brings back.
+      budget_ = std::max(budget_, most_paths());
+      if (is_timed()) most_s_ = double{settings_.time_limit} / kMostPaidTimeShare;
+    }
+    return gain >= kPromisingGain;
+  }
+
   /// Lowers the budget to what the picture's cost allows. `cost`: of the first round's paths.
   bool can_afford(double cost, const Trial& without) {
-    if (settings_.time_limit > 0) return true;
+    if (is_timed()) return true;
     const auto samples = static_cast<double>(settings_.spp * uint64_t{order_.size()});
     const double picture = samples * without.cost_of_sample();
     const double path = kTeachingCost * cost / static_cast<double>(statistics_.paths);
     if (!(path > 0)) return true;
-    budget_ = static_cast<uint64_t>(
-        std::min(static_cast<double>(budget_), kAutoCostShare * picture / path));
+    picture_paths_ = picture / path;
+    budget_ = std::min(budget_, as_count(kAutoCostShare * picture_paths_));
     return budget_ >= kFewestAutoPaths;
+  }
+
+  /// Paths that training may take altogether where it pays, by what they have taken so far.
+  uint64_t most_paths() const {
+    const uint64_t most = share_of_samples(settings_, kTrainingShare);
+    if (!is_timed()) return std::min(most, as_count(picture_paths_ / kTrainingShare));
+    const auto taught = static_cast<double>(statistics_.paths);
+    const double left = double{settings_.time_limit} / kTimeShare - seconds_since(start_);
+    return std::min(most, as_count(taught * (1 + std::max(0.0, left) / taught_s_)));
   }
 
   /// Teaches by the paths of a round, and makes the field of what was taught so far. Gives what
@@ -196,6 +229,7 @@ class Trainer {
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order_.size()));
     const std::vector<uint32_t> pixels = some_pixels(order_, wanted);
     const GuideView guide = view();
+    const Clock::time_point begin = Clock::now();
     context_.guide = &guide;
     const LessonPlan plan{first_sample_,
                           samples,
@@ -223,6 +257,7 @@ class Trainer {
     if (mean.vertices > 0) statistics_.survival = mean.survivors / mean.vertices;
     next->weigh_bounces(lessons_.bounces, mean);
     field_ = std::move(next);
+    taught_s_ += seconds_since(begin);
     return cost;
   }
 
@@ -251,6 +286,9 @@ class Trainer {
   const GuideGrid grid_;
   const std::vector<uint32_t> order_, trial_pixels_;
   double most_s_ = std::numeric_limits<double>::infinity();
+  double taught_s_ = 0;  ///< of the rounds, trials aside
+  /// Paths that would cost what the picture does, where that is counted.
+  double picture_paths_ = std::numeric_limits<double>::infinity();
   Lessons lessons_;
   uint32_t first_sample_ = 0;
   std::optional<PictureTiles> tiles_;
