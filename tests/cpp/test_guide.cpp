@@ -5,6 +5,7 @@
 #include "bsdf_testing.h"
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/learn/guide_directions.h"
 #include "wavecomb/learn/guide_field.h"
 #include "wavecomb/learn/guide_shares.h"
 #include "wavecomb/learn/guide_table.h"
@@ -24,10 +25,7 @@ const GuideGrid kUnitGrid({0.f, 0.f, 0.f}, {1.f, 1.f, 1.f});
 /// A bounce at (x, y, z) of a surface that faces `axis`, along w.
 TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>& w,
                       float value = 1) {
-  const Vec2<float> at = octahedral_point<float>(w);
-  const auto bin = [](float u) { return std::min(static_cast<uint32_t>(u * 16), 15u); };
-  return {{x, y, z}, 0,   axis, static_cast<uint8_t>(bin(at.y) * 16 + bin(at.x)), value, 1.f,
-          1.f,       0.f, 1.f};
+  return {{x, y, z}, {w.x, w.y, w.z}, 0.f, 0, axis, value, 1.f, 1.f, 0.f, 1.f};
 }
 
 /// Bounces all over the unit cube: those that face axis k go near the direction of axis k, more so
@@ -69,6 +67,111 @@ TEST(Guide, OctahedralMapKeepsAreas) {
   for (const float u : {0.f, 0.5f, kOneMinusEpsilon})
     for (const float v : {0.f, 0.5f, kOneMinusEpsilon})
       EXPECT_NEAR(length(octahedral_direction(u, v)), 1, 1e-5);
+}
+
+/// From the middle and back, and the factor as the map's own Jacobian, by chi-square: even over
+/// directions from the middle has the factor as its density from the place.
+TEST(Guide, SphereMovesDirections) {
+  Random random(12);
+  chi_square::Battery battery("sphere");
+  for (int round = 0; round < 8; ++round) {
+    const float far = round == 0 ? 0.f : 2 * random();
+    const Vec3<float> middle{random(), random(), random()},
+        p = middle + octahedral_direction<float>(random(), random()) * far;
+    const Vec3<float> offset = sphere_offset<float>(p, middle, 0.5f);
+    EXPECT_NEAR(length(offset), std::min(0.5f * far, kMostOffset), 1e-6);
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3<float> w = octahedral_direction<float>(random(), random());
+      const FromMiddle<float> seen = seen_from_middle<float>(offset, w);
+      ASSERT_NEAR(length(seen.w), 1, 1e-5);
+      // Along w from the place, on the sphere.
+      ASSERT_NEAR(length(cross(seen.w - offset, w)), 0, 1e-5);
+      ASSERT_GT(dot(seen.w - offset, w), 0);
+      ASSERT_NEAR(length(seen_from_place<float>(offset, seen.w) - w), 0, 1e-5);
+    }
+    chi_square::Case c{"offset " + std::to_string(length(offset)),
+                       bsdf_testing::direction_charts(),
+                       [=](const Place& at) {
+                         const auto w = bsdf_testing::direction_at(at);
+                         return double{seen_from_middle<float>(offset, w).factor} / (4 * kPiD);
+                       },
+                       {}};
+    c.draw = [=](Random& source, bool) {
+      const float u = source(), v = source();
+      return Draw::at(bsdf_testing::place_of(
+          seen_from_place<float>(offset, octahedral_direction<float>(u, v))));
+    };
+    battery.run(c);
+  }
+  battery.judge();
+  // What is no number, or too far away to be one.
+  for (const float x : {kNan, kInf, 3e38f}) {
+    const Vec3<float> o = sphere_offset<float>({x, 0.f, 0.f}, {0.f, 0.f, 0.f}, 3e38f);
+    EXPECT_TRUE(length(o) < 0.71f || std::isnan(x)) << x;
+  }
+}
+
+/// A lamp of a hand's width, a few metres from a wall of which a region knows two metres: places
+/// see it in directions that are 50 degrees apart.
+TEST(Guide, SpheresKnowHowFarLightIs) {
+  Random random(13);
+  const Vec3<float> lamp{0.5f, 0.5f, 0.5f};
+  std::vector<TrainingRecord> records;
+  const auto place = [&] { return Vec3<float>{0.25f + 0.5f * random(), 0.f, 0.5f}; };
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3<float> p = place(), d = lamp - p;
+    records.push_back(bounce(p.x, p.y, p.z, 2, normalize(d)));
+    // Half as near: it shines through a hole at the lamp's place on what is behind.
+    records.back().nearness = 0.5f / length(d);
+  }
+  const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  ASSERT_EQ(field.facts().regions, 1u);
+  const GuideSphere& sphere = field.parts().spheres[0];
+  EXPECT_NEAR(sphere.middle[0], 0.5f, 0.02f);
+  EXPECT_NEAR(1 / sphere.nearness, 0.5f, 0.2f);
+  for (TrainingRecord& r : records) r.nearness = 0;
+  const GuideField blind(kUnitGrid, records, 1, true, true, size_t{64} << 20);
+  EXPECT_EQ(blind.parts().spheres[0].nearness, 0);
+  double known = 0, taken_for_far = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Vec3<float> p = place(), w = normalize(lamp - p);
+    const auto log_pdf = [&](const GuideField& f) {
+      const GuideView view = f.view();
+      const auto found = find_guide<float>(view, p, 2u, 0u, true);
+      return std::log(double{guide_pdf<float>(view, found, w, true)}) / 200;
+    };
+    known += log_pdf(field);
+    taken_for_far += log_pdf(blind);
+  }
+  EXPECT_GT(known, taken_for_far + std::log(2.0));
+}
+
+/// Blurred bins have the same sum, no holes beside what was seen, and nothing far from it.
+TEST(Guide, DirectionsAreBlurred) {
+  Random random(14);
+  for (int round = 0; round < 50; ++round) {
+    DirectionBins bins{};
+    const auto seen = static_cast<uint32_t>(random() * kGuideBins);
+    bins[seen] = 3;
+    const DirectionBins blurred = smoothed(bins);
+    const auto direction = [](uint32_t b) {
+      return octahedral_direction<float>((static_cast<float>(b % kGuideSide) + 0.5f) / kGuideSide,
+                                         (static_cast<float>(b / kGuideSide) + 0.5f) / kGuideSide);
+    };
+    double sum = 0;
+    for (uint32_t b = 0; b < kGuideBins; ++b) {
+      sum += blurred[b];
+      const float cosine = dot(direction(b), direction(seen));
+      if (cosine > std::cos(0.15f)) {
+        EXPECT_GT(blurred[b], 0.02) << b;
+      }
+      if (cosine < std::cos(0.3f)) {
+        EXPECT_EQ(blurred[b], 0) << b;
+      }
+    }
+    EXPECT_NEAR(sum, 3, 1e-12);
+    EXPECT_GT(blurred[seen], 0.2);
+  }
 }
 
 TEST(Guide, TablesHoldWhatTheyAreGiven) {
@@ -264,6 +367,9 @@ TEST(Guide, IsMadeOfItsPartsAgain) {
   expect_refused("numbers", [](GuideParts& bad) { bad.tables[5] ^= 1u; });
   expect_refused("a share", [](GuideParts& bad) { bad.bsdf_share[0] = 0; });
   expect_refused("no number", [](GuideParts& bad) { bad.material_share[0] = NAN; });
+  expect_refused("spheres", [](GuideParts& bad) { bad.spheres.pop_back(); });
+  expect_refused("a place", [](GuideParts& bad) { bad.spheres[0].middle[1] = NAN; });
+  expect_refused("a radius", [](GuideParts& bad) { bad.spheres[0].nearness = -1; });
   expect_refused("survival", [](GuideParts& bad) { bad.survival.pop_back(); });
 }
 
@@ -277,7 +383,8 @@ TEST(Guide, FacesTheirLargestComponent) {
 }
 
 TEST(Guide, Lanes) {
-  const auto records = many_bounces(60000, 6);
+  auto records = many_bounces(60000, 6);
+  for (TrainingRecord& r : records) r.nearness = 3.f * r.value;
   const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const GuideView view = field.view();
   const auto u = padded({0.f, 0.5f, kOneMinusEpsilon, 0x1p-24f}, 2000, 0.f, kOneMinusEpsilon, 1);

@@ -27,7 +27,9 @@ class AbsurdField {
       r.p[1] = between(b.lo.y, b.hi.y);
       r.p[2] = between(b.lo.z, b.hi.z);
       r.axis = static_cast<uint8_t>(random_.bits() % kGuideAxes);
-      r.bin = static_cast<uint8_t>(random_.bits() % 7);
+      const Vec3<float> w = octahedral_direction<float>(0.2f * random_(), 0.1f);
+      r.wi[0] = w.x, r.wi[1] = w.y, r.wi[2] = w.z;
+      r.nearness = random_();
       r.value = random_() * random_() * random_();
       r.pdf = r.bsdf_pdf = 1;
       records.push_back(r);

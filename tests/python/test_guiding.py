@@ -300,7 +300,7 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     assert render(cornell, spp=4800, **part).stats["guiding"] is None
     learned = render(cornell, spp=4900, **part).stats["guiding"]
     assert learned["paths"] <= 64 * 64 * 4900 / 100
-    assert 0.5 < learned["gain"] < 1.2 and not learned["used"]
+    assert 0.5 < learned["gain"] < 1.5 and not learned["used"]
     limited = {**part, "spp": 2**20, "threads": 2}
     assert render(cornell, time_limit=5.0, **limited).stats["guiding"] is None
     learned = render(cornell, time_limit=60.0, **limited).stats["guiding"]
@@ -362,8 +362,9 @@ def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
     renderer.render(_core.Settings(width=SIZE, height=SIZE, spp=SPP, guiding="on"))
     learned = renderer.learned(*place)
     density = learned["density"]
-    assert density.shape == (16, 16) and density.min() > 0
-    assert density.mean() * 4 * np.pi == pytest.approx(1, rel=2e-3)
+    assert density.shape == (32, 32) and density.min() > 0
+    # Middles of bins as they are from here: some of the region's bins have two, others none.
+    assert density.mean() * 4 * np.pi == pytest.approx(1, rel=5e-2)
     assert 0 <= learned["guided_share"] <= 0.75
     # Light comes from the side that the surface faces.
     up, ahead = np.eye(3)[1], np.eye(3)[2]

@@ -5,7 +5,8 @@
 /// gave a direction, its density is that of the mixture:
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi)
 /// (one-sample model with the balance heuristic, Veach 1997, 9.2.4; path guiding: Vorba et al.
-/// 2014, Mueller et al. 2017). p_guide is constant in each of 256 bins of equal solid angle.
+/// 2014, Mueller et al. 2017). p_guide is constant in each of 1,024 bins of equal solid angle, of
+/// directions from the middle of a region (guide_sphere.h).
 #pragma once
 
 #include "wavecomb/core/lanes.h"
@@ -19,10 +20,11 @@ template <typename F>
 struct GuidePlace {
   UInt<F> axis{0u};  ///< which way its surface faces: of kGuideAxes
   UInt<F> region{kNoGuideRegion};
-  F bsdf_share{1.f};      ///< a; 1: not guided
-  F survival{0.f};        ///< GuideView::survival
-  Mask<F> known{false};   ///< lanes with a region
-  Mask<F> guided{false};  ///< lanes with a < 1
+  Vec3<F> offset{F(0.f), F(0.f), F(0.f)};  ///< in the region's sphere
+  F bsdf_share{1.f};                       ///< a; 1: not guided
+  F survival{0.f};                         ///< GuideView::survival
+  Mask<F> known{false};                    ///< lanes with a region
+  Mask<F> guided{false};                   ///< lanes with a < 1
 };
 
 /// Which way `n` faces most: 2 i, or 2 i + 1 where component i is below 0.
@@ -116,6 +118,12 @@ template <typename F>
   const F least = gather<F>(guide.material_share, material, known);
   const F share = max(gather<F>(guide.bsdf_share, place.region, known), least);
   place.bsdf_share = select(known, share, F(1.f));
+  static_assert(sizeof(GuideSphere) == 4 * sizeof(float));
+  const auto of_sphere = [&, at = place.region * 4u](uint32_t i) {
+    return gather<F>(guide.spheres->middle, at + i, known);
+  };
+  const F nearness = select(known, of_sphere(3), F(0.f));
+  place.offset = sphere_offset<F>(p, {of_sphere(0), of_sphere(1), of_sphere(2)}, nearness);
   place.survival = gather<F>(guide.survival, place.region, known);
   place.guided = known & (place.bsdf_share < 1.f);
   return place;
@@ -136,7 +144,8 @@ template <typename F>
 [[gnu::noinline]] F guide_pdf(const GuideView& guide, const GuidePlace<F>& place, const Vec3<F>& w,
                               const Mask<F>& active) {
   using U = UInt<F>;
-  const Vec2<F> at = octahedral_point<F>(w);
+  const FromMiddle<F> seen = seen_from_middle<F>(place.offset, w);
+  const Vec2<F> at = octahedral_point<F>(seen.w);
   const auto bin = [](const F& x) {
     constexpr auto side = static_cast<float>(kGuideSide);
     return U(to_int<F>(clamp(F(x * side), F(0.f), F(side - 0.5f))));
@@ -146,7 +155,8 @@ template <typename F>
   const U marginal = gather<U>(guide.tables, first + row, on);
   const U within = gather<U>(guide.tables, first + kGuideSide + row * kGuideSide + column, on);
   constexpr float density = kInv4Pi * static_cast<float>(kGuideBins) * 0x1p-32f;
-  return select(active, F(F(Int<F>(marginal >> 16)) * F(Int<F>(within >> 16)) * density), F(0.f));
+  const F numbers = F(Int<F>(marginal >> 16)) * F(Int<F>(within >> 16));
+  return select(active, F(numbers * density * seen.factor), F(0.f));
 }
 
 /// A direction by the field, in world space, for two numbers in [0, 1).
@@ -162,7 +172,7 @@ template <typename F>
   constexpr float width = 1.f / static_cast<float>(kGuideSide);
   const F y = (F(Int<F>(row.bin)) + detail::place_in_bin<F>(row_number, row.word)) * width;
   const F x = (F(Int<F>(column.bin)) + detail::place_in_bin<F>(column_number, column.word)) * width;
-  return octahedral_direction<F>(x, y);
+  return seen_from_place<F>(place.offset, octahedral_direction<F>(x, y));
 }
 
 }  // namespace wavecomb

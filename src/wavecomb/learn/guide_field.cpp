@@ -8,6 +8,7 @@
 
 #include "wavecomb/core/morton.h"
 #include "wavecomb/learn/guide.h"
+#include "wavecomb/learn/guide_directions.h"
 #include "wavecomb/learn/guide_shares.h"
 #include "wavecomb/learn/guide_table.h"
 
@@ -18,6 +19,8 @@ namespace {
 constexpr size_t kCellRecords = 2048;
 /// Records with which a region has a distribution of its own.
 constexpr double kOwnRecords = 64;
+/// Records that tell directions, of more in a cell that is divided.
+constexpr size_t kDirections = 8192;
 /// How many records the distribution of the cell above counts for, in directions and in shares.
 constexpr double kPrior = 64;
 /// Records of a material that restrict how much it is guided.
@@ -76,6 +79,7 @@ class GuideFieldBuilder {
     parts_.entries.assign(kGuideTopCells, kGuideCell);
     parts_.cells.clear();
     parts_.tables.clear();
+    parts_.spheres.clear();
     parts_.bsdf_share.clear();
     field_.facts_ = {records_.size(), 0, 0, 0, 0, 1};
     bring_ = off_ = on_ = 0;
@@ -93,8 +97,9 @@ class GuideFieldBuilder {
  private:
   /// What the records of a cell that face one way say.
   struct RegionPart {
-    std::array<double, kGuideBins> density{};  ///< its sum is 1, or 0 where nothing is known
+    DirectionBins density{};  ///< its sum is 1, or 0 where nothing is known
     double count = 0;
+    GuideSphere sphere;  ///< that the directions of `density` are of
     ShareMoments moments;
     uint32_t region = kNoGuideRegion;  ///< once it is made
   };
@@ -126,16 +131,17 @@ class GuideFieldBuilder {
     const std::span here = std::span(records_).subspan(begin, end - begin);
     for (RegionPart& part : cell) part = {};
     const double cut = largest(here);
+    for (std::vector<const TrainingRecord*>& bounces : by_axis_) bounces.clear();
     for (size_t i = begin; i < end; ++i) {
       const TrainingRecord& r = records_[i];
-      RegionPart& part = cell[r.axis];
-      const double value = std::min(double{r.value}, cut);
-      part.density[r.bin] += value;
-      part.count += 1;
-      if (!first_) part.moments.add(ratios_[i], value);
+      by_axis_[r.axis].push_back(&r);
+      if (!first_) cell[r.axis].moments.add(ratios_[i], std::min(double{r.value}, cut));
     }
     for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
       RegionPart& part = cell[axis];
+      part.count = static_cast<double>(by_axis_[axis].size());
+      part.sphere = fit_sphere(by_axis_[axis], cut);
+      part.density = direction_bins(some_bounces(by_axis_[axis], kDirections), part.sphere, cut);
       const RegionPart* above = depth > 0 ? &levels_[depth - 1][axis] : nullptr;
       const double sum = std::accumulate(part.density.begin(), part.density.end(), 0.0);
       const double prior = above && above->count > 0 ? kPrior : 0;
@@ -158,7 +164,9 @@ class GuideFieldBuilder {
     part.region = static_cast<uint32_t>(parts_.bsdf_share.size());
     const size_t at = parts_.tables.size();
     parts_.tables.resize(at + kGuideWords);
-    write_guide_table(part.density, std::span(parts_.tables).subspan(at).first<kGuideWords>());
+    write_guide_table(smoothed(part.density),
+                      std::span(parts_.tables).subspan(at).first<kGuideWords>());
+    parts_.spheres.push_back(part.sphere);
     parts_.bsdf_share.push_back(!guides_ ? 1.f
                                 : first_ ? kFirstShare
                                          : kBsdfShares[part.moments.best()]);
@@ -249,6 +257,7 @@ class GuideFieldBuilder {
   std::vector<ShareRatios> ratios_;      ///< of the same; none in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
+  std::array<std::vector<const TrainingRecord*>, kGuideAxes> by_axis_;  ///< of read()
   std::array<Cell, kGuideBits + 1> levels_;  ///< from the whole down to where divide() is
   double bring_ = 0, guided_ = 0, off_ = 0, on_ = 0;
 };
@@ -320,6 +329,7 @@ GuideView GuideField::view() const {
   view.grid = parts_.entries.data();
   view.cells = parts_.cells.data();
   view.tables = parts_.tables.data();
+  view.spheres = parts_.spheres.data();
   view.bsdf_share = parts_.bsdf_share.data();
   view.survival = parts_.survival.data();
   view.material_share = parts_.material_share.data();

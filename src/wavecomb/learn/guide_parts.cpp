@@ -2,6 +2,7 @@
 #include "wavecomb/learn/guide_parts.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "wavecomb/core/error.h"
@@ -54,6 +55,13 @@ bool are_rows(std::span<const uint32_t> tables) {
   return true;
 }
 
+bool are_spheres(std::span<const GuideSphere> spheres) {
+  return std::all_of(spheres.begin(), spheres.end(), [](const GuideSphere& s) {
+    return std::isfinite(s.middle[0]) && std::isfinite(s.middle[1]) && std::isfinite(s.middle[2]) &&
+           std::isfinite(s.nearness) && s.nearness >= 0;
+  });
+}
+
 bool are_between(std::span<const float> values, float least, float most) {
   return std::all_of(values.begin(), values.end(),
                      [=](float v) { return least <= v && v <= most; });
@@ -66,8 +74,8 @@ void check_guide_parts(const GuideParts& parts, size_t materials) {
   const size_t regions = parts.bsdf_share.size();
   const bool is_field =
       regions > 0 && parts.tables.size() == regions * kGuideWords &&
-      parts.survival.size() == regions &&
-      parts.material_share.size() == std::max<size_t>(materials, 1) &&
+      parts.survival.size() == regions && parts.spheres.size() == regions &&
+      are_spheres(parts.spheres) && parts.material_share.size() == std::max<size_t>(materials, 1) &&
       parts.cells.size() % kGuideAxes == 0 &&
       std::all_of(parts.cells.begin(), parts.cells.end(),
                   [=](uint32_t r) { return r < regions || r == kNoGuideRegion; }) &&

@@ -6,15 +6,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "wavecomb/learn/guide_sphere.h"
+
 namespace wavecomb {
 
 /// The arrays of GuideView, by its names.
 struct GuideParts {
   std::vector<uint32_t> entries, cells, tables;
+  std::vector<GuideSphere> spheres;
   std::vector<float> bsdf_share, material_share, survival;
 
   size_t bytes() const {
     return (entries.size() + cells.size() + tables.size()) * sizeof(uint32_t) +
+           spheres.size() * sizeof(GuideSphere) +
            (bsdf_share.size() + material_share.size() + survival.size()) * sizeof(float);
   }
 };

@@ -3,15 +3,17 @@
 ///
 /// Space is divided into cells, each cell by which way a surface faces into six regions, and a
 /// region has the distribution of the directions where light comes from, as its surfaces reflect
-/// it. Nothing of it changes while waves run.
+/// it and as they are from its middle. Nothing of it changes while waves run.
 #pragma once
 
 #include <cstdint>
 
+#include "wavecomb/learn/guide_sphere.h"
+
 namespace wavecomb {
 
-/// Bins of directions each way: 16 x 16 of equal solid angle, some 14 degrees wide.
-inline constexpr uint32_t kGuideSide = 16;
+/// Bins of directions each way: 32 x 32 of equal solid angle, some 7 degrees wide.
+inline constexpr uint32_t kGuideSide = 32;
 inline constexpr uint32_t kGuideBins = kGuideSide * kGuideSide;
 /// Words of a region's table: a row of marginals, then a row for each of them. A word is the
 /// start of a bin's share of 65536 numbers in its low half, and how many it has in its high half.
@@ -32,10 +34,11 @@ inline constexpr uint32_t kNoGuideRegion = 0xffffffffu;
 
 /// What kernels need of the field. Without a grid nothing is guided.
 struct GuideView {
-  const uint32_t* grid = nullptr;     ///< kGuideTopCells entries, then bricks
-  const uint32_t* cells = nullptr;    ///< region, or kNoGuideRegion, of (kGuideAxes * cell + axis)
-  const uint32_t* tables = nullptr;   ///< kGuideWords of each region
-  const float* bsdf_share = nullptr;  ///< of each region: of bounces that the BSDF alone samples
+  const uint32_t* grid = nullptr;    ///< kGuideTopCells entries, then bricks
+  const uint32_t* cells = nullptr;   ///< region, or kNoGuideRegion, of (kGuideAxes * cell + axis)
+  const uint32_t* tables = nullptr;  ///< kGuideWords of each region
+  const GuideSphere* spheres = nullptr;  ///< of each region: where its light lies
+  const float* bsdf_share = nullptr;     ///< of each region: of bounces that the BSDF alone samples
   /// Of each region: the probability of going on of a path whose throughput over the brightness of
   /// the picture is 1, where that is a probability (learn/worth.h).
   const float* survival = nullptr;

@@ -8,10 +8,11 @@ namespace wavecomb {
 
 /// A bounce that brought light.
 struct TrainingRecord {
-  float p[3];  ///< the vertex
+  float p[3];      ///< the vertex
+  float wi[3];     ///< the direction
+  float nearness;  ///< one over the distance of what it met; 0: nothing; below 0: not known
   uint32_t material;
   uint8_t axis;  ///< which way its surface faces: guide_axis
-  uint8_t bin;   ///< of the direction: kGuideSide * row + column
   /// What came back along it over the throughput that the path arrived with: an estimate of the
   /// integral of f Le |cos| over directions, by one of them.
   float value;

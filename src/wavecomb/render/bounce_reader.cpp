@@ -11,6 +11,19 @@
 #include "wavecomb/learn/worth.h"
 
 namespace wavecomb {
+namespace {
+
+/// One over how far the bounce from vertex `i` of a path went; 0: it met nothing; below 0: not
+/// known, for no more vertices are kept.
+float bounce_nearness(const PathHistory& history, uint32_t slot, uint32_t i) {
+  if (i + 1 == BounceReader::kVertices) return -1;
+  if (i + 1 >= history.count(slot)) return 0;
+  const float distance = length(history.vertex(slot, i + 1).p - history.vertex(slot, i).p);
+  return distance > 0 && std::isfinite(1 / distance) ? 1 / distance : -1;
+}
+
+}  // namespace
+
 BounceReader::BounceReader(std::span<const uint32_t> pixels, const LessonPlan& plan)
     : pixels_(pixels), plan_(plan) {
   const size_t paths = pixels.size() * plan.samples;
@@ -52,7 +65,8 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
     const bool is_dead = is_black(v.throughput), is_bright = value > 0 && std::isfinite(value);
     throughput = v.throughput;
     if (!is_dead && v.pdf > 0 && is_bright)
-      add_record(path, v, place, value, arrived * inverse_scale);
+      add_record(path, v, place, bounce_nearness(history, slot, count), value,
+                 arrived * inverse_scale);
     PathStep& step = steps[count];
     step = {double{arrived}, double{luminance(throughput)},
             is_bright && !is_dead ? double{brought} : 0.0, 1, plan_.costs.vertex(v.material)};
@@ -99,16 +113,14 @@ void BounceReader::append_to(Lessons& lessons) const {
 }
 
 void BounceReader::add_record(size_t path, const HistoryRow<float>& v,
-                              const GuidePlace<float>& place, float value, float weight) {
+                              const GuidePlace<float>& place, float nearness, float value,
+                              float weight) {
   TrainingRecord& r = records_[path * kVertices + record_counts_[path]++];
-  const Vec2<float> at = octahedral_point<float>(v.wi);
-  const auto bin = [](float x) {
-    return std::min(static_cast<uint32_t>(x * kGuideSide), kGuideSide - 1);
-  };
   r = {{v.p.x, v.p.y, v.p.z},
+       {v.wi.x, v.wi.y, v.wi.z},
+       nearness,
        v.material,
        static_cast<uint8_t>(v.axis),
-       static_cast<uint8_t>(bin(at.y) * kGuideSide + bin(at.x)),
        value,
        v.pdf,
        v.bsdf_pdf,

@@ -65,7 +65,7 @@ class BounceReader final : public HistoryReader {
   void read(const PathHistory& history, uint32_t slot, const Color<float>& end, size_t path,
             float inverse_scale);
   void add_record(size_t path, const HistoryRow<float>& v, const GuidePlace<float>& place,
-                  float value, float weight);
+                  float nearness, float value, float weight);
 
   std::span<const uint32_t> pixels_;
   const LessonPlan& plan_;

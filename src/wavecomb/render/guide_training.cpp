@@ -30,15 +30,20 @@ constexpr double kMostTimeShare = 20, kMostPaidTimeShare = 4;
 /// Of Guiding::kAuto: what training may cost, as a share of the picture, where it is counted; and
 /// what a path that teaches costs beside its rays and vertices, which are kept, read and sorted.
 constexpr double kAutoCostShare = 0.05, kTeachingCost = 1.5;
-/// Pixels of a trial.
-constexpr uint64_t kTrialPixels = 4096;
+/// Samples of a trial, twice, and those of a pixel: as many as the picture has, of some. (Sobol's
+/// points gain by their number, and by what a pixel is smooth, which guiding makes less of.)
+constexpr uint64_t kTrialPaths = 65'536;
+constexpr uint32_t kLeastTrialSamples = 16, kMostTrialSamples = 32;
+/// Samples of a pixel that tell how they spread, for a roulette.
+constexpr uint32_t kSpreadSamples = 16;
 /// Share of the paths that teach, of more that tell how samples spread.
 constexpr uint64_t kSpreadShare = 8;
 /// Share of the paths that differ most and do not count for the picture's variance.
 constexpr double kUncountedPaths = 0.001;
-/// Efficiency to the same without the field that is worth it; and that which half of the training
+/// Efficiency to the same without the field that is worth it, for a trial promises more than longer
+/// renders keep; and that which half of the training
 /// has to promise, so that the other half follows.
-constexpr double kWorthwhileGain = 1.2, kPromisingGain = 1.1;
+constexpr double kWorthwhileGain = 1.5, kPromisingGain = 1.2;
 constexpr uint32_t kTrainingRounds = 3;
 /// The round after which half of the training has been.
 constexpr uint32_t kHalfway = 1;
@@ -108,7 +113,8 @@ class Trainer {
         costs_{context_.accel->has_list() ? kListRay : 1.0, guides() ? kGuidedRays : 0, &shading_},
         grid_(grid_of(scene)),
         order_(morton_pixel_order({0, 0, settings_.width, settings_.height})),
-        trial_pixels_(some_pixels(order_, kTrialPixels)),
+        trial_samples_(std::clamp(settings_.spp, kLeastTrialSamples, kMostTrialSamples)),
+        trial_pixels_(some_pixels(order_, kTrialPaths / trial_samples_)),
         field_(std::make_shared<const GuideField>(grid_)) {
     settings_.seed = 0x2545f491u;
     // A survivor of roulette brings many times what it stands for: noise that hides what aiming
@@ -166,7 +172,7 @@ class Trainer {
   }
 
   Trial trial(const GuideView* guide) const {
-    return try_out(context_, trial_settings_, guide, means_, trial_pixels_, grid_,
+    return try_out(context_, trial_settings_, guide, means_, trial_pixels_, trial_samples_, grid_,
                    [this] { return ended(); });
   }
 
@@ -265,10 +271,10 @@ class Trainer {
   double spread_with(const GuideField& field) const {
     GuideView taught = field.view();
     tiles_->apply(taught);
-    const auto few = some_pixels(order_, budget_ / kSpreadShare / (2 * kTrialSamples));
-    const Trial trial =
-        try_out(context_, settings_, &taught, means_, few, grid_, [this] { return ended(); });
-    return 0.5 * kTrialSamples * error_of(trial, few, *tiles_);
+    const auto few = some_pixels(order_, budget_ / kSpreadShare / (2 * kSpreadSamples));
+    const Trial trial = try_out(context_, settings_, &taught, means_, few, kSpreadSamples, grid_,
+                                [this] { return ended(); });
+    return 0.5 * kSpreadSamples * error_of(trial, few, *tiles_);
   }
 
   const Clock::time_point start_ = Clock::now();
@@ -284,7 +290,9 @@ class Trainer {
   const CostSnapshot shading_;
   const PathCosts costs_;
   const GuideGrid grid_;
-  const std::vector<uint32_t> order_, trial_pixels_;
+  const std::vector<uint32_t> order_;
+  const uint32_t trial_samples_;
+  const std::vector<uint32_t> trial_pixels_;
   double most_s_ = std::numeric_limits<double>::infinity();
   double taught_s_ = 0;  ///< of the rounds, trials aside
   /// Paths that would cost what the picture does, where that is counted.

@@ -74,22 +74,23 @@ double teach(WaveContext context, const TrainingMeans& means, std::span<const ui
 }
 
 Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const TrainingMeans& means, std::span<const uint32_t> pixels, const GuideGrid& grid,
-              const std::function<bool()>& stopped) {
+              const TrainingMeans& means, std::span<const uint32_t> pixels, uint32_t samples,
+              const GuideGrid& grid, const std::function<bool()>& stopped) {
   Trial trial;
+  trial.samples = samples;
   trial.differences.resize(pixels.size());
   context.settings = &settings;
   context.guide = guide;
   for (const uint32_t seed : kTrialSeeds) {
     settings.seed = seed;
     Lessons lessons;
-    const LessonPlan plan{0, kTrialSamples, 0, grid, {}, nullptr, {}, 1};
+    const LessonPlan plan{0, samples, 0, grid, {}, nullptr, {}, 1};
     trial.cost += teach(context, means, pixels, plan, lessons, stopped);
     if (stopped()) return trial;
-    const double sign = (seed == kTrialSeeds[0] ? 1.0 : -1.0) / kTrialSamples;
+    const double sign = (seed == kTrialSeeds[0] ? 1.0 : -1.0) / samples;
     for (size_t i = 0; i < pixels.size(); ++i)
-      for (uint32_t s = 0; s < kTrialSamples; ++s)
-        trial.differences[i] += sign * double{lessons.luminances[i * kTrialSamples + s]};
+      for (uint32_t s = 0; s < samples; ++s)
+        trial.differences[i] += sign * double{lessons.luminances[i * samples + s]};
   }
   return trial;
 }

@@ -13,8 +13,6 @@
 
 namespace wavecomb {
 
-/// Samples of each pixel of a trial, twice: Sobol's points are in it as they are in the picture.
-inline constexpr uint32_t kTrialSamples = 16;
 /// What a ray costs where it is tested against a list, as a share of one in a hierarchy.
 inline constexpr double kListRay = 0.3;
 /// Of the cost of a vertex, in rays: shading it, and looking up the field there. (Trials; what
@@ -32,20 +30,23 @@ double mean_without_largest(std::vector<double>& values, double share);
 double teach(WaveContext context, const TrainingMeans& means, std::span<const uint32_t> pixels,
              const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped);
 
-/// Two pictures of some pixels, of kTrialSamples each and with other seeds.
+/// Two pictures of some pixels, with other seeds: Sobol's points are in them as they are in the
+/// picture.
 struct Trial {
+  uint32_t samples = 0;             ///< of each pixel, in each of the two
   std::vector<double> differences;  ///< of the pixels' means
   double cost = 0;                  ///< of both, in rays of a hierarchy
 
   double cost_of_sample() const {
-    return cost / (2.0 * kTrialSamples * static_cast<double>(differences.size()));
+    return cost / (2.0 * samples * static_cast<double>(differences.size()));
   }
 };
 
-/// Renders them as `settings` say but for the seed. `guide`: null: without a field.
+/// Renders `samples` of each pixel, as `settings` say but for the seed. `guide`: null: without a
+/// field.
 Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const TrainingMeans& means, std::span<const uint32_t> pixels, const GuideGrid& grid,
-              const std::function<bool()>& stopped);
+              const TrainingMeans& means, std::span<const uint32_t> pixels, uint32_t samples,
+              const GuideGrid& grid, const std::function<bool()>& stopped);
 
 /// The mean squared difference, relative to the picture there. The pixels that differ most do not
 /// count: fireflies tell too little of the others. Contract: `tiles` are lit.

@@ -12,7 +12,7 @@ namespace wavecomb {
 namespace {
 
 /// Changes with what follows it.
-constexpr uint32_t kKeptFormat = 1;
+constexpr uint32_t kKeptFormat = 2;
 
 class ByteWriter {
  public:
@@ -91,6 +91,7 @@ void pass_parts(Archive& archive, Parts& parts) {
   archive.row(parts.entries);
   archive.row(parts.cells);
   archive.row(parts.tables);
+  archive.row(parts.spheres);
   archive.row(parts.bsdf_share);
   archive.row(parts.material_share);
   archive.row(parts.survival);
