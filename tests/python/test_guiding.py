@@ -268,6 +268,8 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
     }
     first = wavecomb.render(scene, **part)
     assert first.stats["guiding"]["used"]
+    # A hundredth of the samples finds that out; then as many teach as without asking.
+    assert first.stats["guiding"]["paths"] > 1.5 * 480 * 320 * 132 / 100
     for way in (
         {"threads": 1, "lanes": 4, "wave_size": 64, "policy": "none"},
         {"integrator": "reference"},
@@ -306,6 +308,16 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     learned = render(cornell, time_limit=60.0, **limited).stats["guiding"]
     # A machine that has other things to do gives up.
     assert 30_000 < learned["paths"] <= 240_000 and learned["seconds"] < 4
+
+
+def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> None:
+    """The first round is sized by a guess of how fast paths teach, the others by what it took."""
+    way: dict[str, Any] = {"spp": 2**20, "threads": 2, "guiding": "on", "region": (0, 0, 1, 1)}
+    learned = render(cornell, time_limit=3.0, **way).stats["guiding"]
+    assert learned["rounds"] == 3
+    # The guess is several times too low here; a machine that has other things to do teaches less.
+    assert learned["paths"] > 3 * 2 * 50_000 / 8 or learned["seconds"] > 0.2
+    assert learned["seconds"] < 1.5
 
 
 LEARNED_AOVS = ("guided_share", "survival")
