@@ -30,6 +30,7 @@ import argparse
 import hashlib
 import json
 import os
+import shlex
 import sys
 import time
 from pathlib import Path
@@ -182,7 +183,7 @@ def main() -> None:
         "schema": "wavecomb-peers/2",
         "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         **commit(),
-        "command": " ".join(["benchmarks/peers/compare.py", *told()]),
+        "command": shlex.join(["benchmarks/peers/compare.py", *told()]),
         "rounds": args.rounds,
         "machine": machine(),
         "settings": {**plain, "filter": "box"},
