@@ -154,14 +154,10 @@ TEST(Guide, DirectionsAreBlurred) {
     const auto seen = static_cast<uint32_t>(random() * kGuideBins);
     bins[seen] = 3;
     const DirectionBins blurred = smoothed(bins);
-    const auto direction = [](uint32_t b) {
-      return octahedral_direction<float>((static_cast<float>(b % kGuideSide) + 0.5f) / kGuideSide,
-                                         (static_cast<float>(b / kGuideSide) + 0.5f) / kGuideSide);
-    };
     double sum = 0;
     for (uint32_t b = 0; b < kGuideBins; ++b) {
       sum += blurred[b];
-      const float cosine = dot(direction(b), direction(seen));
+      const float cosine = dot(bin_direction(b), bin_direction(seen));
       if (cosine > std::cos(0.15f)) {
         EXPECT_GT(blurred[b], 0.02) << b;
       }

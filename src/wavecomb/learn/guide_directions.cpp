@@ -70,11 +70,7 @@ using Blur = std::array<std::vector<std::pair<uint32_t, double>>, kGuideBins>;
 
 Blur make_blur() {
   std::array<Vec3<float>, kGuideBins> directions;
-  constexpr float width = 1.f / static_cast<float>(kGuideSide);
-  for (uint32_t b = 0; b < kGuideBins; ++b)
-    directions[b] =
-        octahedral_direction<float>((static_cast<float>(b % kGuideSide) + 0.5f) * width,
-                                    (static_cast<float>(b / kGuideSide) + 0.5f) * width);
+  for (uint32_t b = 0; b < kGuideBins; ++b) directions[b] = bin_direction(b);
   Blur blur;
   const double least = std::cos(kBlurReach * kBlur);
   for (uint32_t b = 0; b < kGuideBins; ++b) {
@@ -90,6 +86,12 @@ Blur make_blur() {
 }
 
 }  // namespace
+
+Vec3<float> bin_direction(uint32_t bin) {
+  constexpr float width = 1.f / static_cast<float>(kGuideSide);
+  return octahedral_direction<float>((static_cast<float>(bin % kGuideSide) + 0.5f) * width,
+                                     (static_cast<float>(bin / kGuideSide) + 0.5f) * width);
+}
 
 DirectionBins direction_bins(Bounces bounces, const GuideSphere& sphere, double cut) {
   DirectionBins bins{};

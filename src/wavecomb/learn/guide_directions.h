@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,9 @@ namespace wavecomb {
 
 /// Weights of bins, row by row of the square of directions from the middle.
 using DirectionBins = std::array<double, kGuideBins>;
+/// The middle of a bin.
+Vec3<float> bin_direction(uint32_t bin);
+
 using Bounces = std::span<const TrainingRecord* const>;
 
 /// The sphere by which bounces of a region agree best on where light comes from: about the mean of

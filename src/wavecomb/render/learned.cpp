@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "wavecomb/learn/guide.h"
+#include "wavecomb/learn/guide_directions.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/render/light_parts.h"
 #include "wavecomb/scene/light_tree.h"
@@ -20,13 +21,8 @@ void look_up_field(const GuideTraining& training, const SeenPlace& place, Learne
   out.guided_share = 1.f - found.bsdf_share;
   out.survival = found.survival;
   out.density.resize(kGuideBins);
-  constexpr float width = 1.f / static_cast<float>(kGuideSide);
-  for (uint32_t i = 0; i < kGuideBins; ++i) {
-    const Vec3<float> w =
-        octahedral_direction<float>((static_cast<float>(i % kGuideSide) + 0.5f) * width,
-                                    (static_cast<float>(i / kGuideSide) + 0.5f) * width);
-    out.density[i] = guide_pdf<float>(view, found, w, true);
-  }
+  for (uint32_t i = 0; i < kGuideBins; ++i)
+    out.density[i] = guide_pdf<float>(view, found, bin_direction(i), true);
 }
 
 /// Counts what evenly spaced numbers choose, as vertices at the place do.
