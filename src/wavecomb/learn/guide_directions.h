@@ -22,8 +22,8 @@ using Bounces = std::span<const TrainingRecord* const>;
 
 /// The sphere by which bounces of a region agree best on where light comes from: about the mean of
 /// their places, and of the radius, of a few, by which the sum of squares of what the bins have is
-/// greatest. Openings are nearer than what is seen through them, so how far bounces went only says
-/// what to try. No bounce counts for more than `cut`.
+/// greatest. How far bounces went says what to try: openings are nearer than what is seen
+/// through them. No bounce counts for more than `cut`.
 GuideSphere fit_sphere(Bounces bounces, double cut);
 
 /// `count` of the bounces, evenly spread.

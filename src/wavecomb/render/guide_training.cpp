@@ -40,9 +40,9 @@ constexpr uint32_t kSpreadSamples = 16;
 constexpr uint64_t kSpreadShare = 8;
 /// Share of the paths that differ most and do not count for the picture's variance.
 constexpr double kUncountedPaths = 0.001;
-/// Efficiency to the same without the field that is worth it, for a trial promises more than longer
-/// renders keep; and that which half of the training
-/// has to promise, so that the other half follows.
+/// Efficiency to the same without the field that is worth it, for trials scatter, and promise more
+/// than longer renders keep; and that which half of the training has to promise, so that the other
+/// half follows.
 constexpr double kWorthwhileGain = 1.5, kPromisingGain = 1.2;
 constexpr uint32_t kTrainingRounds = 3;
 /// The round after which half of the training has been.
