@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import re
 import subprocess
 import sys
@@ -63,7 +62,6 @@ def count(tree: Path, stage: Path, spp: int) -> tuple[int, dict[str, int]]:
                 *(str(stage.resolve()), str(spp)),
             ],
             capture_output=True, text=True, check=False, cwd=tree,
-            env={**os.environ, "WAVECOMB_ISOLATE": "0"},
         )  # fmt: skip
         if done.returncode != 0:
             said = [line for line in done.stderr.splitlines() if not line.startswith("==")]

@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What isolation costs (docs/decisions/isolation.md, docs/decisions/reading-in-a-box.md).
+"""Measures the cost of the child process (docs/decisions/isolation.md).
 
     .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
 
 For each stage, in turns, so that a busy machine hits all alike: ``wavecomb info`` with --isolate
-off and on (with the sandbox, where the system has it), with --sandbox off and on, and
-``wavecomb.load`` without and with isolate=True. Medians; CPU seconds are of the process with its
-children, and memory is that of the largest of them. Of ``load`` there is a second table: the call
-alone, which is what a program waits for the first time and later, and the peaks of the program and
-of the process that reads for it.
+off and on (with the sandbox, where the system has it), and with --sandbox off and on. Medians; CPU
+seconds are of the process with its children, and memory is that of the largest of them.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import multiprocessing
 import os
 import statistics
@@ -24,20 +20,6 @@ import tempfile
 import time
 from pathlib import Path
 
-LOAD = """
-import json, resource, sys, time, wavecomb
-started, times = time.perf_counter(), []
-for _ in range(2):
-    loaded = wavecomb.load(sys.argv[1], isolate=sys.argv[2] == "on")
-    times.append(time.perf_counter() - started)
-    started = time.perf_counter()
-    peaks = [resource.getrusage(who).ru_maxrss / 1024
-             for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    if len(times) == 1:
-        first = peaks
-    del loaded
-print(json.dumps([*times, *first]))
-"""
 NOTHING = "import sys; from wavecomb.run.isolate import supervisor; "
 WAYS = {
     "nothing": lambda stage, how: [
@@ -46,7 +28,6 @@ WAYS = {
     ],
     "info": lambda stage, how: ["-m", "wavecomb", "info", stage, "--isolate", how],
     "sandbox": lambda stage, how: ["-m", "wavecomb", "info", stage, "--sandbox", how],
-    "load": lambda stage, how: ["-c", LOAD, stage, how],
 }
 
 
@@ -72,17 +53,10 @@ def many_prims(path: Path, count: int) -> None:
     layer.Save()
 
 
-def seconds(arguments: list[str], said: list[str] | None = None) -> tuple[float, float, float]:
-    """(wall, CPU, peak memory in MB of the largest process) of Python with these arguments.
-
-    ``said``: is given what it printed.
-    """
+def seconds(arguments: list[str]) -> tuple[float, float, float]:
+    """(wall, CPU, peak memory in MB of the largest process) of Python with these arguments."""
     start = time.perf_counter()
-    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    text = process.stdout.read()
-    if said is not None:
-        said.append(text)
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     if status:
         raise SystemExit(f"{arguments} failed")
@@ -109,19 +83,15 @@ def main() -> None:
             writer.start()
             writer.join()
             stages.append(str(path))
-        jobs = [("nothing", "")] + [
-            (way, stage) for stage in stages for way in ("info", "sandbox", "load")
-        ]
+        jobs = [("nothing", "")] + [(way, stage) for stage in stages for way in ("info", "sandbox")]
         print("| what | off: s | CPU s | MB | on: s | CPU s | MB | more CPU s (pairs) |")
         print("| --- | --- | --- | --- | --- | --- | --- | --- |")
         found: dict[tuple[str, str], list[list[tuple[float, float, float]]]] = {}
-        said: dict[tuple[str, str], list[str]] = {}
         for _ in range(options.turns):
             for way, stage in jobs:
                 pair = []
                 for how in ("off", "on"):
-                    words = said.setdefault((stage, how), []) if way == "load" else None
-                    pair.append(seconds(WAYS[way](stage, how), words))
+                    pair.append(seconds(WAYS[way](stage, how)))
                 found.setdefault((way, stage), []).append(pair)
         for way, stage in jobs:
             pairs = found[way, stage]
@@ -133,14 +103,6 @@ def main() -> None:
             more = statistics.median(pair[1][1] - pair[0][1] for pair in pairs)
             name = f"{way} {Path(stage).name}".strip()
             print(f"| {name} | {' | '.join(cells)} | {more:.3f} |", flush=True)
-        print()
-        print("| wavecomb.load | first: s | again: s | peak MB: program | its process |")
-        print("| --- | --- | --- | --- | --- |")
-        for (stage, how), texts in said.items():
-            figures = zip(*map(json.loads, texts), strict=True)
-            medians = [statistics.median(column) for column in figures]
-            cells = [f"{value:.3f}" for value in medians[:2]] + [f"{v:.0f}" for v in medians[2:]]
-            print(f"| {Path(stage).name}, isolate={how == 'on'} | {' | '.join(cells)} |")
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ from wavecomb.run.stats import make_stats
 imports, imports_bytes = time.monotonic(), resident("VmRSS")
 stage, output, size, threads = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
 settings = make_settings((size, size), 1, threads=threads)
-loaded = api.load(stage, threads=threads, isolate=False)  # as commands do
+loaded = api.load(stage, threads=threads)  # as commands do
 load = time.monotonic()
 result = _core.render(loaded.scene, settings, None, None, None)
 render = time.monotonic()

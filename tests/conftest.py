@@ -14,10 +14,6 @@ from typing import Any
 import parts
 import pytest
 
-# Tests look into the loader, which has to be in their process for that; and each of the hundreds of
-# stages that they load would wait for a Python. What is read in a sandbox says so (isolate=True).
-os.environ.setdefault("WAVECOMB_ISOLATE", "0")
-
 # Hundreds of processes: none of them has to compile the package. What is in a sandbox could not
 # keep what it compiled.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):

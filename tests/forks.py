@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 HARMLESS = frozenset((
-    "WAVECOMB_ISOLATE", "WAVECOMB_DEBUG", "HOME", "TMPDIR", "PYTEST_CURRENT_TEST", "COLUMNS",
+    "WAVECOMB_DEBUG", "HOME", "TMPDIR", "PYTEST_CURRENT_TEST", "COLUMNS",
     "OPENBLAS_NUM_THREADS",
 ))  # fmt: skip
 """Variables that are read when a command runs, or that a command sets itself before it imports

@@ -178,7 +178,7 @@ def reference(job: Job, args: argparse.Namespace) -> tuple[Image, NDArray[np.boo
     from wavecomb.picture.compare import luminance
 
     made = wavecomb.render(
-        wavecomb.load(job.stage, isolate=False).scene, size=(args.size, args.size),
+        wavecomb.load(job.stage).scene, size=(args.size, args.size),
         spp=args.reference, seed=REFERENCE_SEED, transport="light", merge_radius=0.5,
         aovs=("techniques",),
         filter="box", filter_width=1.0, max_depth=args.max_depth, threads=args.threads,

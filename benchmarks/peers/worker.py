@@ -41,7 +41,7 @@ def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
     from wavecomb import _core
 
     # A scene keeps nothing from render to render: each weighs its lights anew.
-    stage = wavecomb.load(args.stage, isolate=False).scene
+    stage = wavecomb.load(args.stage).scene
     settings = {
         "filter": "box",
         "filter_width": 1.0,

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +20,6 @@ from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
 if TYPE_CHECKING:
     from wavecomb._core import Result, Scene, Settings
-    from wavecomb.run.boxed.reader import Reader
     from wavecomb.run.live import Shown
     from wavecomb.scheduling import SchedulingPolicy
     from wavecomb.usd import LoadedStage
@@ -45,15 +43,9 @@ def load(
         path: .usd, .usda, .usdc or .usdz.
         options: How it is read.
         progress: Called now and then as progress(prims read, prims found so far).
-        isolate: Whether a process of its own reads the stage, in a sandbox, and this one builds the
-            scene of what comes out of it. Where USD or an image library crashes on a broken file,
-            that process dies, and this one gets the exception. By default it does, on Linux,
-            unless WAVECOMB_ISOLATE=0. What this process alone has is not there: layers that were
-            changed and not saved, plugins and resolvers that were registered from Python. For
-            these: False. (docs/decisions/reading-in-a-box.md)
-        load_limit: Of that process: seconds that USD may compose the stage, 0: any; None: 6, and 1
-            for each MB of layers.
-        memory_limit: Of that process, and of what comes out of it: MB; None: what the machine has.
+        isolate: Deprecated and without effect: a stage is read in the calling process.
+        load_limit: Deprecated and without effect.
+        memory_limit: Deprecated and without effect.
         **changes: Fields of ``LoadOptions`` (camera, frame, purposes, variants, subdivision ...),
             in place of those of ``options``.
 
@@ -69,17 +61,24 @@ def load(
     """
     chosen = LoadOptions.of(options, changes)
     chosen.check()
-    from wavecomb.run.boxed.wanted import is_wanted
-
-    if is_wanted(isolate):
-        from wavecomb.run.boxed.reader import Reader
-
-        with Reader(path, load_limit=load_limit, memory_limit=memory_limit) as reader:
-            return reader.load(chosen.as_dict(), progress=progress)
+    warn_deprecated(isolate=isolate, load_limit=load_limit, memory_limit=memory_limit)
     import_usd()
     from wavecomb.usd import load_stage
 
     return load_stage(Path(path), chosen, progress=progress)
+
+
+def warn_deprecated(**given: object) -> None:
+    """Warns about arguments that belonged to the process which read stages for its caller."""
+    import warnings
+
+    for name in (name for name, value in given.items() if value is not None):
+        warnings.warn(
+            f"{name} has no effect any more: stages are read in the calling process "
+            "(docs/decisions/sandbox.md)",
+            DeprecationWarning,
+            stacklevel=3,
+        )
 
 
 def import_usd() -> None:
@@ -134,7 +133,7 @@ def render(
             is, bit for bit, that of a render that nothing stopped.
         learn_from: With ``guiding``: a picture, or what its ``save_learned`` wrote, whose field
             guides this render, too. Nothing is learned anew then.
-        isolate: As in ``load``; for a path only.
+        isolate: Deprecated and without effect, as in ``load``.
         **options: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed, adaptive,
             noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera,
             frame, subdivision ...
@@ -157,21 +156,12 @@ def render(
     """
     from wavecomb.run.stats import make_stats
 
+    warn_deprecated(isolate=isolate)
     loading, settings = split(options, without=("size", "threads"))
-    with contextlib.ExitStack() as while_reading:
-        reader: Reader | None = None
-        if isinstance(source, (str, os.PathLike)):
-            from wavecomb.run.boxed.wanted import is_wanted
-
-            if is_wanted(isolate):
-                from wavecomb.run.boxed.reader import Reader
-
-                reader = while_reading.enter_context(Reader(source))
-            size, aovs = _asked_for(source, size, aovs, settings, loading, reader)
-        own, profile, names, chosen = prepare(
-            size or DEFAULT_SIZE, spp, policy, costs, aovs, settings
-        )
-        scene, loaded, stage = _resolve(source, loading, isolate, chosen, reader)
+    if isinstance(source, (str, os.PathLike)):
+        size, aovs = _asked_for(source, size, aovs, settings, loading)
+    own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)
+    scene, loaded, stage = _resolve(source, loading, chosen)
     if "light_groups" in names:
         check_memory(chosen, names, len(scene.light_groups))
     if has_catchers := loaded is not None and bool(loaded.catchers):
@@ -202,7 +192,7 @@ def render(
     def of_catchers(how: Mapping[str, str]) -> Result:
         size = chosen.width, chosen.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": chosen.threads, **how})
-        scene = load(str(stage), options, isolate=isolate).scene
+        scene = load(str(stage), options).scene
         return _render(
             scene, None, catchers.of_catchers(chosen), None, own, None, None, None, learned
         )[0]
@@ -216,18 +206,14 @@ def _asked_for(
     aovs: Iterable[str] | None,
     settings: dict[str, Any],
     loading: Mapping[str, Any],
-    reader: Reader | None,
 ) -> tuple[tuple[int, int], Iterable[str] | None]:
     """Size and AOVs, and the region in ``settings``: as the first render product says, if none."""
     names = ("render_settings", "product", "session_layer")
     asked = {name: loading[name] for name in names if loading.get(name) is not None}
-    if reader is None:
-        import_usd()
-        from wavecomb.usd import peek_products
+    import_usd()
+    from wavecomb.usd import peek_products
 
-        choice = peek_products(os.fspath(path), **asked)[0][0]
-    else:
-        choice = reader.peek(**asked)[0]
+    choice = peek_products(os.fspath(path), **asked)[0][0]
     chosen = size or choice.resolution or DEFAULT_SIZE
     region = choice.region(*chosen)
     if region is not None:
@@ -272,24 +258,15 @@ def _warn(line: str) -> None:
 def _resolve(
     source: str | os.PathLike[str] | LoadedStage | Scene,
     loading: Mapping[str, Any],
-    isolate: bool | None,
     settings: Settings,
-    reader: Reader | None,
 ) -> tuple[Scene, LoadedStage | None, str | None]:
     if isinstance(source, (str, os.PathLike)):
         size = settings.width, settings.height
         options = LoadOptions.of(None, {**loading, "size": size, "threads": settings.threads})
-        if reader is None:
-            loaded = load(source, options, isolate=False)
-        else:
-            options.check()
-            loaded = reader.load(options.as_dict())
+        loaded = load(source, options)
         return loaded.scene, loaded, os.fspath(source)
-    if isolate or loading:
-        raise TypeError(
-            f"{', '.join(loading) or 'isolate'}: how a stage is read is chosen when it is loaded: "
-            "give it to load()"
-        )
+    if loading:
+        raise TypeError(f"{', '.join(loading)}: give this to load(): the stage is loaded already")
     loaded_scene: Any = getattr(source, "scene", None)
     if loaded_scene is not None:
         stage: Any = source

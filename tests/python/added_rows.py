@@ -17,7 +17,7 @@ def add_rows(
     monkeypatch: pytest.MonkeyPatch,
     table: Callable[[], Mapping[str, Any]],
     added: Iterable[Any],
-    follow: Iterable[str],
+    follow: Iterable[str] = (),
 ) -> None:
     """Makes the table have those rows, too, as if the core had them.
 

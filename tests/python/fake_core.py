@@ -187,7 +187,6 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
     """Puts the stand-in where the native module and the loader are imported from."""
     settings()  # of the core that there is, as what these make of its tables
     core_aovs()
-    importlib.import_module("wavecomb.run.boxed.calls")
     importlib.import_module("wavecomb.usd.lights.light")
     fake = Fake()
     core = ModuleType("wavecomb._core")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from added_rows import add_rows, made_again
+from added_rows import add_rows
 
 from wavecomb import _core as core
 from wavecomb import camera_table
@@ -30,14 +30,10 @@ ADDED = (
 )
 
 
-FOLLOW = ("wavecomb.run.boxed.calls",)
-"""Modules that make something of the table when they are imported."""
-
-
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The table with a few rows more, as if the core had them."""
-    add_rows(monkeypatch, camera_parameters, ADDED, FOLLOW)
+    add_rows(monkeypatch, camera_parameters, ADDED)
 
 
 def _scene(**values: Any) -> core.Scene:
@@ -148,17 +144,6 @@ def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
     assert "        # How far it is shut.\n        squint: float = 0.25,\n" in text
     assert '        mood: Literal["calm", "shaky"] = "calm",\n' in text
     assert "        frame_of: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),\n" in text
-
-
-def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:
-    from wavecomb.run.boxed.wire import Refused
-
-    call = made_again("wavecomb.run.boxed.calls").CALLS["set_camera"]
-    body = {"transform": {"array": 0}, "window": list(WINDOW), "squint": 0.5, "mood": "shaky"}
-    got = call.read({**body, "mirrors": [[1, 2, 3, 4]]}, [np.eye(4)])
-    assert (got["squint"], got["mood"], got["mirrors"]) == (0.5, "shaky", [(1, 2, 3, 4)])
-    with pytest.raises(Refused, match="something for a number"):
-        call.read({**body, "squint": "much"}, [np.eye(4)])
 
 
 def test_an_added_row_is_kept_by_poses_of_the_window(with_rows: None) -> None:

@@ -193,25 +193,6 @@ def test_limit_follows_the_layers() -> None:
     assert patience.allowed_s(10 * patience.BYTES_PER_S) == patience.BASE_S + 10
 
 
-@pytest.mark.slow
-def test_load_in_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("wavecomb._core")
-    import wavecomb
-    from wavecomb.errors import WavecombError
-
-    good = tmp_path / "good.usda"
-    good.write_text(GOOD)
-    assert wavecomb.load(good, isolate=True).scene.mesh_count == 1
-    with pytest.raises(WavecombError, match="no camera /Nope"):
-        wavecomb.load(good, isolate=True, camera="/Nope")
-    with pytest.raises(WavecombError, match="has composed"):
-        wavecomb.load(doubling(tmp_path / "many.usda"), isolate=True, load_limit=0.4)
-    (tmp_path / "sitecustomize.py").write_text("import os; os.abort()")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    with pytest.raises(WavecombError, match=r"good\.usda: a library crashed \(SIGABRT\)"):
-        wavecomb.load(good, isolate=True)
-
-
 def test_notes_cost_nothing_without_a_parent(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not trail.is_expendable()
     trail.note("reading", "/A")

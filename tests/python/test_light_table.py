@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from added_rows import add_rows, made_again
+from added_rows import add_rows
 from pxr import Sdf, Usd, UsdLux
 
 from wavecomb import _core as core
@@ -30,7 +30,7 @@ ADDED = (
                    None, 1.0, (), ("disk",)),
 )  # fmt: skip
 
-FOLLOW = ("wavecomb.gui.scene.light_inputs", "wavecomb.run.boxed.calls")
+FOLLOW = ("wavecomb.gui.scene.light_inputs",)
 """Modules that make something of the table."""
 
 
@@ -192,18 +192,6 @@ def test_prims_are_drawn_as_kinds() -> None:
     assert PRIMS["SphereLight"] == "sphere"
     assert PRIMS["DomeLight_1"] == "dome"
     assert set(PRIMS.values()) == set(KINDS)
-
-
-def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:
-    calls = made_again("wavecomb.run.boxed.calls")
-    one, of_meshes = (calls.CALLS[name].more for name in ("add_light", "add_mesh_light"))
-    assert {row.name for row in ADDED} <= one.keys()
-    assert set(of_meshes) & {row.name for row in ADDED} == {"blades"}
-    assert one["blades"](5, []) == 5.0
-    assert one["rim"]([1, 2, 3], []) == (1.0, 2.0, 3.0)
-    assert one["halo"](None, []) is None
-    with pytest.raises(Exception, match="switch"):
-        one["flicker"](3, [])
 
 
 def test_an_added_row_is_in_the_stub(with_rows: None) -> None:

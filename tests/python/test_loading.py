@@ -135,9 +135,9 @@ def calls_to_read(path: Path, count: int, kind: str) -> int:
         prim.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
     stage.Save()
     profile = cProfile.Profile()
-    wavecomb.load(path, isolate=False)  # what is imported or made once is no cost of a prim
+    wavecomb.load(path)  # what is imported or made once is no cost of a prim
     with profile:
-        wavecomb.load(path, isolate=False)
+        wavecomb.load(path)
     return sum(entry.callcount for entry in profile.getstats())
 
 
@@ -213,7 +213,7 @@ def cpu():
     return tasks
 
 imports = memory("VmRSS")
-loaded = wavecomb.load(sys.argv[1], isolate=False)
+loaded = wavecomb.load(sys.argv[1])
 after = memory("VmRSS")
 shares = {}
 for threads in (1, 2):

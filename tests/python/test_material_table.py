@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from added_rows import add_rows, made_again
+from added_rows import add_rows
 from pxr import Usd, UsdShade
 
 from wavecomb import _core as core
@@ -36,7 +36,7 @@ ADDED = (
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The table with a few rows more, as if the core had them."""
-    add_rows(monkeypatch, material_parameters, ADDED, ("wavecomb.run.boxed.calls",))
+    add_rows(monkeypatch, material_parameters, ADDED)
 
 
 def build(program: str = "principled", **values: Any) -> Any:
@@ -127,16 +127,6 @@ def test_what_is_wrong_is_said_with_the_materials_name(values: dict[str, Any], l
         build(**values)
     assert str(caught.value).startswith(line)
     assert "\n" not in str(caught.value)
-
-
-def test_an_added_row_may_come_from_a_sandbox(with_rows: None) -> None:
-    more = made_again("wavecomb.run.boxed.calls").CALLS["add_material"].more
-    assert {row.name for row in ADDED} <= more.keys()
-    assert more["graininess"](1, []) == 1.0
-    assert more["sheen_tint"]([1, 2, 3], []) == (1.0, 2.0, 3.0)
-    with pytest.raises(Exception, match="switch"):
-        more["one_sided"](3, [])
-    assert more["dustiness"](0.5, []) == 0.5
 
 
 def test_an_added_row_is_in_the_stub(with_rows: None) -> None:

@@ -110,13 +110,6 @@ def test_bombs_are_one_line(tmp_path: Path, bomb: Callable[[Path], list[object]]
 
 
 @pytest.mark.slow
-def test_from_python(tmp_path: Path) -> None:
-    packed_indices(tmp_path)
-    with pytest.raises(WavecombError, match=f"out of memory .* the limit is {LIMIT_MB} MB"):
-        wavecomb.load(tmp_path / "bomb.usdc", isolate=True, memory_limit=LIMIT_MB)
-
-
-@pytest.mark.slow
 def test_a_sound_stage_fits(tmp_path: Path) -> None:
     (tmp_path / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
     done = run("info", tmp_path / "s.usda")
@@ -170,7 +163,7 @@ def test_meshes_that_cannot_fit_are_told_before_they_are_read(
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.arange(3, dtype=np.int32)))
     stage.Save()
     file = tmp_path / "large.usdc"
-    wavecomb.load(file, isolate=False)
+    wavecomb.load(file)
     monkeypatch.setattr(memory, "room", lambda: 1_000_000)
     with pytest.raises(WavecombError, match=r"large.usdc: .*100,000 points .* 2 MB where 1 MB"):
-        wavecomb.load(file, isolate=False)
+        wavecomb.load(file)

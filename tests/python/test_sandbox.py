@@ -330,38 +330,3 @@ def hook(event, what):
         ]).encode())
 sys.addaudithook(hook)
 """
-
-
-@pytest.mark.slow
-@with_landlock
-@with_seccomp
-@pytest.mark.parametrize("how", ["load", "render", "default", "frames", "window"])
-def test_python_reads_it_in_such_a_process(
-    place: Path, monkeypatch: pytest.MonkeyPatch, how: str
-) -> None:
-    import wavecomb
-
-    code = SPY.format(said=str(place / "said"), secret=str(place / "secret/new"))
-    (place / "sitecustomize.py").write_text(code)
-    monkeypatch.setenv("PYTHONPATH", str(place))
-    monkeypatch.setenv("TMPDIR", str(place / "tmp"))
-    stage = place / "shot/s.usda"
-    if how == "load":
-        wavecomb.load(stage, isolate=True)
-    elif how == "render":
-        wavecomb.render(stage, size=(4, 4), spp=1, isolate=True)
-    elif how == "default":
-        monkeypatch.delenv("WAVECOMB_ISOLATE")
-        wavecomb.load(stage)
-    elif how == "frames":
-        next(wavecomb.render_frames(stage, "1", size=(4, 4), spp=1, isolate=True))
-    else:
-        loader = pytest.importorskip("wavecomb.gui.loader")
-        monkeypatch.delenv("WAVECOMB_ISOLATE")
-        monkeypatch.setattr(loader._spare, "prepare", lambda: None)
-        loader.read(loader.Request(loader.Source(stage)))
-    assert (place / "said").read_text() == "PermissionError PermissionError done"
-    assert os.listdir(place / "secret") == ["key"] and not os.listdir(place / "tmp")
-    (place / "said").unlink()
-    wavecomb.load(stage, isolate=False)
-    assert not (place / "said").exists()

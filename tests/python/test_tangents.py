@@ -87,7 +87,7 @@ def test_a_coarse_cone_shines_as_a_fine_one(tmp_path: Path) -> None:
     brushed_cone(tmp_path / "fine.usda", 120, 20)
     coarse, fine = (
         wavecomb.render(
-            wavecomb.load(tmp_path / f"{name}.usda", isolate=False),
+            wavecomb.load(tmp_path / f"{name}.usda"),
             size=(48, 48),
             spp=256,
             max_depth=1,
@@ -145,9 +145,7 @@ def test_a_mirrored_normal_map_is_lit_as_in_a_mirror(tmp_path: Path, transform: 
     mapped(tmp_path / "a.usda", mirrored=False)
     mapped(tmp_path / "b.usda", mirrored=True, transform=transform)
     a, b = (
-        wavecomb.render(
-            wavecomb.load(tmp_path / f"{name}.usda", isolate=False), size=(16, 16), spp=4
-        ).beauty
+        wavecomb.render(wavecomb.load(tmp_path / f"{name}.usda"), size=(16, 16), spp=4).beauty
         for name in ("a", "b")
     )
     assert a[8, 8, 0] > 0.05

@@ -211,14 +211,12 @@ def test_what_does_not_move_is_said(tmp_path: Path) -> None:
 
 
 @with_vdb
-def test_through_the_sandbox(tmp_path: Path) -> None:
-    """The same picture from a process of its own, blurred as the shutter says."""
+def test_motion_blur_changes_the_image(tmp_path: Path) -> None:
     vdb.write(tmp_path / "a.vdb", [grid(3.0), grid(20.0, 3, name="v")])
     path = tmp_path / "s.usda"
     path.write_text(stage(field() + field("v")))
     pictures = []
-    for isolate, blur in ((False, True), (True, True), (False, False)):
-        loaded = wavecomb.load(path, isolate=isolate, frame=1, shutter=(-1, 1), motion_blur=blur)
+    for blur in (True, False):
+        loaded = wavecomb.load(path, frame=1, shutter=(-1, 1), motion_blur=blur)
         pictures.append(wavecomb.render(loaded, size=(16, 16), spp=16).beauty)
-    assert np.array_equal(pictures[0], pictures[1])
-    assert not np.array_equal(pictures[0], pictures[2])
+    assert not np.array_equal(*pictures)

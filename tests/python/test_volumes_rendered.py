@@ -59,13 +59,10 @@ def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
     vdb.write(tmp_path / "a.vdb", [{"name": "density", **bricks, "index_to_object": matrix}])
     path = tmp_path / "s.usda"
     path.write_text(SLAB)
-    pictures = []
-    for isolate in (False, True):
-        loaded = wavecomb.load(path, isolate=isolate)
-        pictures.append(wavecomb.render(loaded, size=(16, 16), spp=256).beauty)
-        assert loaded.volumes[0].grids[0].value == "half"
-    assert np.array_equal(*pictures)
-    found = pictures[0].reshape(-1, pictures[0].shape[-1])[:, :3].mean(axis=0)
+    loaded = wavecomb.load(path)
+    assert loaded.volumes[0].grids[0].value == "half"
+    image = wavecomb.render(loaded, size=(16, 16), spp=256).beauty
+    found = image.reshape(-1, image.shape[-1])[:, :3].mean(axis=0)
     # Seven steps between eight voxels, and at either end one that goes down to 0 evenly.
     depth = 0.5 * 1.5 * 0.25 * (7 + 2 * 0.5)
     wanted = np.exp(-depth * -np.log([0.5, 0.25, 0.125]) / 2)

@@ -138,7 +138,7 @@ def submit_command(
 
         if isa not in ISAS:
             raise WavecombError(f"--isa {isa}: there are {', '.join(ISAS)}")
-    prepared = prepare(asked, _peek)
+    prepared = prepare(asked)
     spec = _spec(
         prepared, asked, every=every or 120.0, tries=tries, lease_s=lease, hang_s=hang,
         slow=slow, strict=strict, assets=assets, maps=parse_maps(maps), isa=isa,
@@ -179,20 +179,6 @@ def _check_options(asked: Asked) -> None:
     ):
         if given is not None:
             raise WavecombError(f"{option}: is not for a farm: {instead}")
-
-
-def _peek(source: StageOptions, stage: str) -> tuple[list[Any], Any]:
-    """What the stage asks for, read in a sandbox where there is one."""
-    from wavecomb.run.boxed.wanted import is_wanted
-
-    if not is_wanted():
-        return source.peek(stage)
-    from wavecomb.run.boxed.reader import Reader
-
-    names = ("render_settings", "product", "session_layer")
-    asked = {name: source[name] for name in names if source[name] is not None}
-    with Reader(stage) as reader:
-        return reader.peek(**asked), None
 
 
 def _stage_words(source: StageOptions) -> list[str]:

@@ -140,4 +140,4 @@ def open_frames(job: Job, source: StageOptions) -> Frames:
     from wavecomb.run.sequence import Frames
 
     options = source.for_load((job.settings.width, job.settings.height))
-    return Frames(job.stage, threads=job.settings.threads, isolate=False, **options)
+    return Frames(job.stage, threads=job.settings.threads, **options)

@@ -189,9 +189,7 @@ class StageOptions:
 
         options = {**self.for_load(size), **changes}
         # The whole command is in a child, or is not to be (--isolate).
-        return load(
-            stage, frame=self.frame, threads=threads, progress=progress, isolate=False, **options
-        )
+        return load(stage, frame=self.frame, threads=threads, progress=progress, **options)
 
     def for_load(self, size: tuple[int, int] | None) -> dict[str, Any]:
         """Arguments of ``wavecomb.load``, but for the frame. Raises WavecombError."""

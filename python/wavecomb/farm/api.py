@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -71,8 +70,6 @@ def submit(
     from wavecomb.api import _asked_for
     from wavecomb.farm.assets import ask_assets
     from wavecomb.run import aovs as aov_names
-    from wavecomb.run.boxed.reader import Reader
-    from wavecomb.run.boxed.wanted import is_wanted
     from wavecomb.run.frame_names import has_place, parse_frames
     from wavecomb.run.settings import DEFAULT_SIZE, prepare
 
@@ -85,9 +82,7 @@ def submit(
     frame = loading.pop("frame", None)
     if frame is not None and frames is not None:
         raise WavecombError("frame is one frame and frames are several; give one of them")
-    with contextlib.ExitStack() as reading:
-        reader = reading.enter_context(Reader(stage)) if is_wanted() else None
-        size, aovs = _asked_for(stage, size, aovs, settings, loading, reader)
+    size, aovs = _asked_for(stage, size, aovs, settings, loading)
     policy, costs = settings.pop("policy", None), settings.pop("costs", None)
     guides = aov_names.GUIDES if denoise else ()
     own, profile, names, chosen = prepare(

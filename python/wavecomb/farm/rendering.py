@@ -117,8 +117,6 @@ class Renderer:
 
     def close(self) -> None:
         """Lets the stage go."""
-        if self._open is not None:
-            self._open[1].close()
         self._open = self._loaded = None
 
     def do(self, task: Task, *, copy: bool = False) -> dict[str, Any]:

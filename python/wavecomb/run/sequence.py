@@ -14,8 +14,6 @@ from wavecomb import _core
 from wavecomb.load_options import LoadOptions, split
 from wavecomb.picture.rendered import picture_of
 from wavecomb.run.aovs import DEEP, with_others
-from wavecomb.run.boxed.reader import Reader
-from wavecomb.run.boxed.wanted import is_wanted
 from wavecomb.run.catchers import LAYER, caught, of_catchers, with_alpha
 from wavecomb.run.catchers import check as check_catchers
 from wavecomb.run.frame_names import parse_frames
@@ -25,7 +23,6 @@ from wavecomb.run.stats import make_stats
 if TYPE_CHECKING:
     from wavecomb._core import Result, Settings
     from wavecomb.picture.rendered import Picture
-    from wavecomb.run.frame_reader import FrameReader
     from wavecomb.usd import LoadedStage
 
 
@@ -42,8 +39,6 @@ class Frames:
         self,
         path: str | os.PathLike[str],
         options: LoadOptions | None = None,
-        *,
-        isolate: bool | None = None,
         **changes: Any,
     ) -> None:
         """Opens the stage.
@@ -51,7 +46,6 @@ class Frames:
         Args:
             path: .usd, .usda, .usdc or .usdz.
             options: How it is read.
-            isolate: As of ``wavecomb.load``.
             **changes: Fields of ``LoadOptions``, in place of those of ``options``.
 
         Raises:
@@ -64,31 +58,10 @@ class Frames:
         self._is_built = False
         self._caught = self._options.catch
         started = time.perf_counter()
-        self._boxed: Reader | None = None
-        self._here: FrameReader | None = None
-        if is_wanted(isolate):
-            self._boxed = Reader(self._path)
-            try:
-                self._boxed.open(self._options.as_dict())
-            except BaseException:
-                self._boxed.close()
-                raise
-        else:
-            from wavecomb.run.frame_reader import FrameReader
+        from wavecomb.run.frame_reader import FrameReader
 
-            self._here = FrameReader(self._path, self._options)
+        self._reader = FrameReader(self._path, self._options)
         self._opening_s = time.perf_counter() - started
-
-    def close(self) -> None:
-        """Ends the process that reads the stage, if there is one; what was loaded stays."""
-        if self._boxed is not None:
-            self._boxed.close()
-
-    def __enter__(self) -> Frames:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def load(self, frame: float | None, *, progress: Any = None, **changes: Any) -> LoadedStage:
         """The stage at a frame; None: its start, else default values.
@@ -110,11 +83,7 @@ class Frames:
         if loaded is None:
             # Let go of first: two hierarchies at a time would be twice the memory.
             self._renderer, self._loaded = None, None
-            if self._here is None:
-                assert self._boxed is not None
-                loaded = self._boxed.frame(options.as_dict(), progress)
-            else:
-                loaded = self._here.read(options, progress=progress)
+            loaded = self._reader.read(options, progress=progress)
         seconds = time.perf_counter() - started + self._opening_s
         self._opening_s = 0.0
         self._loaded = replace(loaded, seconds=seconds, stage_path=self._path)
@@ -124,14 +93,10 @@ class Frames:
         """The scene that is there with its camera at a frame; None where more may be other."""
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None
-        if self._here is None:
-            assert self._boxed is not None
-            found = self._boxed.look(options.as_dict())
-        else:
-            seen = self._here.look(options)
-            found = None if seen is None else seen.as_dict()
-        if found is None:
+        seen = self._reader.look(options)
+        if seen is None:
             return None
+        found = seen.as_dict()
         camera = found.pop("camera")
         if camera is not None:
             renderer.edit(camera=camera)
@@ -189,7 +154,7 @@ def render_frames(
         policy: Likewise.
         costs: Likewise; every frame starts from the same.
         aovs: Likewise.
-        isolate: As in ``load``; one process reads all frames, and ends after the last.
+        isolate: Deprecated and without effect, as in ``load``.
         **options: Fields of ``LoadOptions`` but the frame, and of ``wavecomb.Settings``.
 
     Returns:
@@ -201,16 +166,14 @@ def render_frames(
     Raises:
         WavecombError: Frames, options or the stage are no good.
     """
+    from wavecomb.api import warn_deprecated
+
+    warn_deprecated(isolate=isolate)
     numbers = parse_frames(frames)
     loading, settings = split(options, without=("size", "threads", "frame"))
     own, profile, names, chosen = prepare(size, spp, policy, costs, aovs, settings)
-    shots = Frames(
-        path,
-        isolate=isolate,
-        size=(chosen.width, chosen.height),
-        threads=chosen.threads,
-        **loading,
-    )
+    size = chosen.width, chosen.height
+    shots = Frames(path, size=size, threads=chosen.threads, **loading)
     return _pictures(shots, numbers, chosen, names, progress, own, profile)
 
 
@@ -223,20 +186,19 @@ def _pictures(
     policy: Any,
     profile: Any,
 ) -> Iterator[tuple[float, Picture]]:
-    with shots:
-        for frame in frames:
-            loaded = shots.load(frame)
-            scene = loaded.scene
-            if "light_groups" in names:
-                check_memory(settings, names, len(scene.light_groups))
-            if loaded.catchers:
-                check_catchers(settings, {"deep": DEEP in names})
-                settings, names = with_alpha(settings), with_others(names, [LAYER])
-            result = shots.render(settings, progress, policy, profile)
-            picture = picture_of(result, shots.stats(result), scene=scene, aovs=names)
-            if loaded.catchers and not picture.cancelled:
-                picture = _caught(shots, frame, settings, picture)
-            yield frame, picture
+    for frame in frames:
+        loaded = shots.load(frame)
+        scene = loaded.scene
+        if "light_groups" in names:
+            check_memory(settings, names, len(scene.light_groups))
+        if loaded.catchers:
+            check_catchers(settings, {"deep": DEEP in names})
+            settings, names = with_alpha(settings), with_others(names, [LAYER])
+        result = shots.render(settings, progress, policy, profile)
+        picture = picture_of(result, shots.stats(result), scene=scene, aovs=names)
+        if loaded.catchers and not picture.cancelled:
+            picture = _caught(shots, frame, settings, picture)
+        yield frame, picture
 
 
 def _caught(shots: Frames, frame: float, settings: Settings, picture: Picture) -> Picture:

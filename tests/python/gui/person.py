@@ -48,7 +48,6 @@ class Person:
         self.home = Path(home)
         read, write = os.pipe()
         self.env = os.environ | {
-            "WAVECOMB_ISOLATE": "1",  # as where nothing is set
             "DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "HOME": str(home),
             "XDG_CONFIG_HOME": str(self.home / "config"), "XDG_DATA_HOME": str(self.home / "data"),
             "XDG_RUNTIME_DIR": str(self.home), "PYTHONUNBUFFERED": "1",

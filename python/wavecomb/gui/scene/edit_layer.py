@@ -10,8 +10,11 @@ from pxr import Sdf, Usd
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture.files import replacing
-from wavecomb.usd.stage.outline import OWN_FACTS
-from wavecomb.usd.stage.outline_layer import file_of, other_files
+
+_NOT_REPEATED = frozenset(
+    {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
+)
+"""Metadata of the root layer that a layer over it does not repeat."""
 
 
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
@@ -24,7 +27,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     root = stage.GetRootLayer()
     layer = Sdf.Layer.CreateAnonymous("edits.usda")
     layer.TransferContent(stage.GetSessionLayer())
-    base = Path(file_of(root))
+    base = Path(root.realPath)
     try:
         name = os.path.relpath(base, folder)
     except ValueError:  # another drive
@@ -33,7 +36,7 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]
     # Up axis, units, default prim, times: USD takes them from the strongest layer only.
     for key in root.pseudoRoot.ListInfoKeys():
-        if key not in OWN_FACTS and not layer.pseudoRoot.HasInfo(key):
+        if key not in _NOT_REPEATED and not layer.pseudoRoot.HasInfo(key):
             layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))
     return layer
 
@@ -48,10 +51,9 @@ def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
     if target.suffix.lower() not in (".usda", ".usd"):
         raise WavecombError(f"{target}: edits are saved as text: give a name that ends in .usda")
     root = stage.GetRootLayer()
-    if not file_of(root):
+    if not root.realPath:
         raise WavecombError("the stage is no file, so no layer can be put over it")
-    used = {layer.realPath for layer in stage.GetUsedLayers()} | {file_of(root)}
-    used |= set(other_files(root))
+    used = {layer.realPath for layer in stage.GetUsedLayers()} | {root.realPath}
     if target.resolve() in {Path(one).resolve() for one in used if one}:
         raise WavecombError(f"{target}: is a file of the stage; give another name")
     text = edit_layer(stage, target.resolve().parent).ExportToString()

@@ -18,7 +18,6 @@ from wavecomb.gui.scene.render_sync import RenderSync
 from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
 from wavecomb.usd.looks.parameters import Parameter, as_stored
-from wavecomb.usd.stage.outline_layer import content_of
 from wavecomb.usd.stage.times import code_of
 
 if TYPE_CHECKING:
@@ -56,7 +55,6 @@ class SceneEdits(QObject):
         self._sync: RenderSync | None = None
         self._solo = Solo()
         self._touched: set[Sdf.Path] = set()
-        self._content = ""
         self.history.step.connect(self._perform)
         session.opened.connect(self._on_opened)
         session.closing.connect(self._on_closing)
@@ -292,14 +290,11 @@ class SceneEdits(QObject):
         usd = self.session.usd
         if usd is None or loaded is None:
             return
-        before, self._content = self._content, content_of(usd.GetRootLayer())
         if self._sync is None or self._sync.edits.stage != usd:
             self._forget(RenderSync(self.session, StageEdits(usd, code_of(loaded.frame))))
             self.changed.emit()
             return
         self.scene_changed.emit()
-        if self._content != before:
-            self.structure_changed.emit()
         # What was edited, or taken back, while the stage was read is not in the scene yet.
         for prim in {path for path, _ in self._sync.edits.edited()} | self._touched:
             self._sync.show(Step("", {}, {(prim, ""): None}))

@@ -12,7 +12,6 @@ from PySide6.QtGui import QFont
 
 from wavecomb.gui.headed_model import ToneRole
 from wavecomb.gui.scene.visibility import HIDDEN_ABOVE, NOT_DRAWN, VISIBLE, state, uneditable
-from wavecomb.usd.stage.outline_layer import instances_of, points_of
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
@@ -209,10 +208,8 @@ class SceneModel(QAbstractItemModel):
             if prim.IsInstance():
                 return f"{name} (instance)".strip()
             if prim.IsA(UsdGeom.PointInstancer):
-                count = points_of(prim)
-                if count is None:
-                    instancer = UsdGeom.PointInstancer(prim)
-                    count = len(instancer.GetProtoIndicesAttr().Get(self._edits.time) or ())
+                instancer = UsdGeom.PointInstancer(prim)
+                count = len(instancer.GetProtoIndicesAttr().Get(self._edits.time) or ())
                 return f"{name} ({count})"
             return name
         if column == VARIANTS and self._edits.edits is not None:
@@ -223,7 +220,8 @@ class SceneModel(QAbstractItemModel):
     def _tip(self, prim: Usd.Prim, column: int) -> str:
         lines = [str(prim.GetPath())]
         if prim.IsInstance():
-            lines.append(f"one of {instances_of(prim)} instances that share what is in them")
+            count = len(prim.GetPrototype().GetInstances())
+            lines.append(f"one of {count} instances that share their contents")
         if prim.IsInstanceProxy():
             lines.append("inside an instance: shown, and not to be edited here")
         if column == VISIBILITY:

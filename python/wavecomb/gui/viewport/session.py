@@ -213,7 +213,6 @@ class Session(QObject):
         request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
             return  # a newer one is under way
-        found.settle()
         again = request.usd is not None
         if not again or request.fresh:
             self.material_edits.clear()
