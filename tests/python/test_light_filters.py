@@ -294,11 +294,14 @@ def test_what_is_not_done_is_listed(tmp_path):
         def PxrRodLightFilter "Rod" {}
         def PxrBarnLightFilter "Barn" { token inputs:barnMode = "analytic"
             float inputs:radius = 0.2
+            uniform bool collection:filterLink:includeRoot = 0
+            pathExpression collection:filterLink:membershipExpression = "//hero"
         }""",
     )
     listed = [finding.what for finding in loaded.report.unsupported]
     assert listed == [
         "light filter PxrRodLightFilter",
+        "filterLink (light is filtered everywhere)",
         "analytic light barns (as physical ones)",
         "round corners of light barns (square)",
         "light filters of dome lights",

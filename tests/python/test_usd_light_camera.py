@@ -4,6 +4,7 @@
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from pxr import Sdf, Usd
 from usd_recorder import QUAD, Recorder, load, said
 
 from wavecomb.usd import load_stage
@@ -239,6 +240,123 @@ def test_linking(tmp_path):
     assert b["shadow_link"] == a["shadow_link"] and "light_link" not in b
     assert "light_link" not in c  # includeRoot is true: all is in it anyway
     assert not loaded.report.unsupported
+
+
+_EXPRESSIONS = """def DistantLight "A" {
+    uniform bool collection:lightLink:includeRoot = 0
+    pathExpression collection:lightLink:membershipExpression = "//hero* - //*Rim"
+    uniform bool collection:shadowLink:includeRoot = 0
+    pathExpression collection:shadowLink:membershipExpression = "//"
+}
+def DistantLight "B" {
+    uniform bool collection:lightLink:includeRoot = 0
+    pathExpression collection:lightLink:membershipExpression = "%/A:lightLink + //Ball"
+}
+def Xform "Set" {
+    def Cube "heroBox" { def Cube "Inner" { }
+        def Cube "BoxRim" { }
+    }
+    def Sphere "Ball" { }
+    def Xform "One" ( instanceable = true
+        references = </Model> ) { }
+}
+class Xform "Model" { def Cube "heroPart" { } }
+def PointInstancer "heroes" {
+    rel prototypes = </heroes/Leaf>
+    int[] protoIndices = [0]
+    point3f[] positions = [(0, 0, 0)]
+    def Cube "Leaf" { }
+}
+"""
+
+
+def test_links_by_membership_expression(tmp_path):
+    scene, loaded = load(tmp_path, _EXPRESSIONS)
+    a, b = scene.lights
+    hero = {
+        "/Set/heroBox": "expand",
+        "/Set/heroBox/Inner": "exclude",
+        "/Set/heroBox/BoxRim": "exclude",
+        "/Set/One/heroPart": "expand",
+        "/heroes": "expand",
+    }
+    assert scene.sets[a["light_link"]] == hero
+    assert "shadow_link" not in a  # it has all prims
+    assert scene.sets[b["light_link"]] == {**hero, "/Set/Ball": "expand"}
+    assert not loaded.report.warnings
+
+
+def test_expressions_without_effect_are_told(tmp_path):
+    found, loaded = light(
+        tmp_path,
+        """def SphereLight "L" {
+            pathExpression collection:lightLink:membershipExpression = "/Box"
+        }""",
+    )
+    assert "lightLink: its membershipExpression has no effect beside" in said(loaded)
+    assert "/L" in said(loaded) and "light_link" not in found  # includeRoot is true
+
+
+@pytest.mark.parametrize(
+    ("predicate", "rules", "words"),
+    [
+        ("isa:Sphere", {"/Ball": "expand"}, ""),
+        ("nothing:like", {}, "warning: lightLink: its membershipExpression cannot be evaluated"),
+    ],
+)
+def test_predicates_of_expressions(tmp_path, predicate, rules, words):
+    stage = Usd.Stage.CreateInMemory()
+    stage.DefinePrim("/Ball", "Sphere")
+    stage.DefinePrim("/Box", "Cube")
+    prim = stage.DefinePrim("/L", "SphereLight")
+    links = Usd.CollectionAPI(prim, "lightLink")
+    links.CreateIncludeRootAttr(False)
+    links.CreateMembershipExpressionAttr(Sdf.PathExpression(f"//{{{predicate}}}"))
+    loaded = load_stage(stage, builder_factory=Recorder)
+    scene = loaded.scene
+    assert scene.sets[scene.lights[0]["light_link"]] == rules
+    assert words in said(loaded) and ("warning" in said(loaded)) == bool(words)
+
+
+def test_expressions_behind_includes_are_told(tmp_path):
+    found, loaded = light(
+        tmp_path,
+        """def Scope "S" (prepend apiSchemas = ["CollectionAPI:e"]) {
+            pathExpression collection:e:membershipExpression = "/Box"
+        }
+        def SphereLight "L" {
+            uniform bool collection:lightLink:includeRoot = 0
+            rel collection:lightLink:includes = </S.collection:e>
+        }""",
+    )
+    assert "lightLink includes /S.collection:e, which has a membershipExpression" in said(loaded)
+    assert found["light_link"] == 0
+
+
+def test_materials_by_membership_expression(tmp_path):
+    scene, _ = load(
+        tmp_path,
+        """def Xform "Set" (prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:red"]) {
+            uniform bool collection:red:includeRoot = 0
+            pathExpression collection:red:membershipExpression = ".//hero*"
+            rel material:binding:collection:red = [</Set.collection:red>, </Red>]
+            def Cube "hero" { }
+            def Cube "other" { }
+            def Xform "One" ( instanceable = true
+                references = </Model> ) { }
+        }
+        class Xform "Model" { def Cube "heroPart" { } }
+        def Material "Red" {
+            token outputs:surface.connect = </Red/S.outputs:surface>
+            def Shader "S" { uniform token info:id = "UsdPreviewSurface"
+                color3f inputs:diffuseColor = (1, 0, 0)
+                token outputs:surface
+            }
+        }""",
+    )
+    assert scene.material_of("/Set/hero")["base_color"] == (1, 0, 0)
+    assert scene.material_of("/Set/other")["base_color"] != (1, 0, 0)
+    assert scene.material_of("heroPart")["base_color"] == (1, 0, 0)
 
 
 def test_cylinder_lights(tmp_path):

@@ -29,6 +29,7 @@ from wavecomb.usd.lights.gels import GELS
 from wavecomb.usd.looks.colour_space import space_of
 from wavecomb.usd.looks.network import number
 from wavecomb.usd.looks.texture import TextureTable, asset_file
+from wavecomb.usd.stage.collections import Collections
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ class FilterReader:
         self._time = time
         self._textures = textures
         self._report = report
+        self._collections = Collections(report)
         self._readers: dict[str, Callable[[FilterInputs, Usd.Prim], Filter | None]] = {
             "pxrbarnlightfilter": self._barn, "pxrbarn": self._barn,
             "pxrcookielightfilter": self._cookie, "pxrcookie": self._cookie,
@@ -121,6 +123,8 @@ class FilterReader:
                 name = kind_of(prim) or prim.GetTypeName()
                 self._report.missing(f"light filter {name}", prim.GetPath())
                 continue
+            if self._collections.rules(prim, "filterLink") is not None:
+                self._report.missing("filterLink (light is filtered everywhere)", prim.GetPath())
             inputs = FilterInputs(prim, self._time)
             one = reader(inputs, light)
             if one is not None:

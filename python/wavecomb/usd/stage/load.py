@@ -299,7 +299,7 @@ def _read(
     view_prim = seen.camera
     groups = LightGroups(report)
     profiles, hidden = IesTable(builder, report), choice.options.lights == "hidden"
-    links = LinkTable(builder)
+    links = LinkTable(builder, report)
     lights = LightReader(time, up_axis, textures, groups, report, profiles, hidden, links)
     motion = find_motion(view_prim, time, seen.blur, report)
     rays = RayVisibility(builder, report, IGNORED[choice.options.catch])

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Membership of USD collections, whether by relationships or by a ``membershipExpression``."""
+
+from __future__ import annotations
+
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from wavecomb.usd.stage.diagnostics import commentary
+from wavecomb.usd.stage.report import LoadReport
+
+Rules = dict[str, str]
+"""A rule for each path: exclude, explicit (that path alone) or expand (and all below it)."""
+
+_RULES = {
+    Usd.Tokens.exclude: "exclude",
+    Usd.Tokens.explicitOnly: "explicit",
+    Usd.Tokens.expandPrims: "expand",
+    Usd.Tokens.expandPrimsAndProperties: "expand",
+}
+
+
+class Collections:
+    """Reads collections of a stage as rules for paths."""
+
+    def __init__(self, report: LoadReport) -> None:
+        self._report = report
+        self._by_expression: dict[str, Rules | None] = {}
+
+    def rules(self, prim: Usd.Prim, name: str) -> Rules | None:
+        """The rules of a collection; None means that it has all prims.
+
+        Args:
+            prim: The prim that has the collection.
+            name: Its instance name, such as lightLink. Where it is not authored, it has all prims.
+        """
+        if not _is_authored(prim, name):
+            return None
+        collection = Usd.CollectionAPI(prim, name)
+        try:
+            query = collection.ComputeMembershipQuery()
+            # Of an expression the map is empty, and of relationships it holds all there is.
+            if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
+                return self._of_expression(collection, query)
+        except Tf.ErrorException as error:
+            what = f"{name}: its membershipExpression cannot be evaluated ({commentary(error)})"
+            self._report.warn(f"{what}: it has no members", prim.GetPath())
+            return {}
+        self._warn_of_ignored(collection, query, name)
+        found = {
+            str(path): _RULES[rule]
+            for path, rule in query.GetAsPathExpansionRuleMap().items()
+            if rule in _RULES
+        }
+        root = prim.GetAttribute(f"collection:{name}:includeRoot")
+        # Without the API applied there is no fallback: it is true for lights.
+        if not root or not root.HasAuthoredValue() or root.Get():
+            found.setdefault("/", "expand")
+        if all(rule != "exclude" for rule in found.values()) and found.get("/") == "expand":
+            return None
+        return found
+
+    def _of_expression(
+        self, collection: Usd.CollectionAPI, query: Usd.UsdCollectionMembershipQuery
+    ) -> Rules | None:
+        expression = collection.ResolveCompleteMembershipExpression().GetText()
+        if expression not in self._by_expression:
+            self._by_expression[expression] = _evaluated(collection.GetPrim().GetStage(), query)
+        return self._by_expression[expression]
+
+    def _warn_of_ignored(
+        self, collection: Usd.CollectionAPI, query: Usd.UsdCollectionMembershipQuery, name: str
+    ) -> None:
+        """Warns of expressions that OpenUSD leaves out of a collection."""
+        prim = collection.GetPrim()
+        if _has_expression(collection):
+            what = f"{name}: its membershipExpression has no effect beside includes, excludes or "
+            self._report.warn(f"{what}includeRoot (set includeRoot to 0)", prim.GetPath())
+        for path in query.GetIncludedCollections():
+            other = Usd.CollectionAPI.GetCollection(prim.GetStage(), path)
+            if other and other.IsInExpressionMode() and _has_expression(other):
+                what = f"{name} includes {path}, which has a membershipExpression: left out, as in "
+                self._report.warn(f"{what}OpenUSD (name it in an expression)", prim.GetPath())
+
+
+def _has_expression(collection: Usd.CollectionAPI) -> bool:
+    attribute = collection.GetMembershipExpressionAttr()
+    return bool(attribute and attribute.HasAuthoredValue())
+
+
+def _is_authored(prim: Usd.Prim, name: str) -> bool:
+    for side in ("includes", "excludes"):
+        relation = prim.GetRelationship(f"collection:{name}:{side}")
+        if relation and relation.HasAuthoredTargets():
+            return True
+    names = (f"collection:{name}:includeRoot", f"collection:{name}:membershipExpression")
+    return any((one := prim.GetAttribute(n)) and one.HasAuthoredValue() for n in names)
+
+
+def _evaluated(stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery) -> Rules | None:
+    """The members of a query by evaluation at each prim: a rule wherever membership changes.
+
+    A point instancer counts with all that it draws: its prototypes are not asked.
+    """
+    rules: Rules = {}
+    member: dict[Sdf.Path, bool] = {}
+    prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    walk = iter(prims)
+    for prim in walk:
+        path = prim.GetPath()
+        inside = bool(query.IsPathIncluded(path))
+        if inside != member.get(path.GetParentPath(), False):
+            rules[str(path)] = "expand" if inside else "exclude"
+        if prim.IsA(UsdGeom.PointInstancer):
+            walk.PruneChildren()
+        else:
+            member[path] = inside
+    return None if member and all(member.values()) else rules
