@@ -224,6 +224,27 @@ def test_udim_tiles_are_one_texture(tmp_path):
     assert all(scene.textures[i]["wrap"] == ("clamp", "clamp") for i in tiled["tiles"].values())
 
 
+def test_udim_names_start_at_the_layer_that_has_the_value(tmp_path):
+    """A stronger layer may say something else of the attribute."""
+    folder = tmp_path / "asset"
+    folder.mkdir()
+    write_image(folder / "a.1001.png", np.full((2, 2, 3), 255, np.uint8), "uint8")
+    text = surface(
+        "color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
+        texture("asset inputs:file = @./a.<UDIM>.png@"),
+    )
+    write(folder, text)
+    scene, loaded = load(
+        tmp_path,
+        """#usda 1.0
+        ( subLayers = [@./asset/stage.usda@] )
+        over "Mat" { over "T" { asset inputs:file ( colorSpace = "raw" )
+        } }""",
+    )
+    (tiled,) = [one for one in scene.textures if "tiles" in one]
+    assert tiled["name"] == str(folder / "a.<UDIM>.png") and not loaded.report.warnings
+
+
 def test_udim_tiles_lie_side_by_side_in_the_picture(tmp_path):
     colours = {1001: (255, 0, 0), 1002: (0, 255, 0), 1011: (0, 0, 255)}
     for number, colour in colours.items():

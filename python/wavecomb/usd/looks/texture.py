@@ -46,9 +46,20 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
         return path
     if UDIM in value.resolvedPath:
         return value.resolvedPath
-    layers = attribute.GetPropertyStack() if attribute else []
-    layer = layers[0].layer if layers else None
+    layer = _layer_of_value(attribute)
     return UsdShade.UdimUtils.ResolveUdimPath(value.path, layer) or value.path
+
+
+def _layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
+    """The layer of the strongest opinion that has a value: relative paths start there.
+
+    Stronger opinions may hold metadata or a connection alone.
+    """
+    for spec in attribute.GetPropertyStack() if attribute else []:
+        has_default = spec.HasDefaultValue() and not isinstance(spec.default, Sdf.ValueBlock)
+        if has_default or spec.layer.GetNumTimeSamplesForPath(spec.path):
+            return spec.layer
+    return None
 
 
 def tile_files(pattern: str) -> list[tuple[int, str]]:
