@@ -42,13 +42,11 @@ class Panel:
 
 def make_panels(session: Session) -> list[Panel]:
     """All of them."""
-    compare, bench = CompareWindow(session), BenchPanel(session)
-    bench.compare.connect(compare.compare)
     return [
         Panel("scene", "Scene", ScenePanel(session), _LEFT),
         Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),
         Panel("learned", "Learned", LearnedPanel(session), _RIGHT),
         Panel("plots", "Plots", PlotsPanel(session), _BOTTOM, hidden=True),
-        Panel("bench", "Bench", bench, _BOTTOM, hidden=True),
-        Panel("compare", "Compare", compare, _BOTTOM, hidden=True),
+        Panel("bench", "Bench", BenchPanel(session), _BOTTOM, hidden=True),
+        Panel("compare", "Compare", CompareWindow(session), _BOTTOM, hidden=True),
     ]

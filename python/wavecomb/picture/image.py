@@ -23,7 +23,6 @@ __all__ = [
     "channel_names",
     "display",
     "linear_from_srgb",
-    "read_codes",
     "read_image",
     "read_layers",
     "read_metadata",
@@ -164,34 +163,6 @@ def read_image(path: str | os.PathLike[str]) -> Array:
     Files of whole numbers (PNG, JPEG ...) are taken to be sRGB and are made linear, alpha not.
     """
     return _read(path)[0]
-
-
-def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """Reads a picture of whole numbers as a screen shows it: (height, width, 3), on white.
-
-    Raises:
-        OSError: It cannot be read; one line that names the file.
-    """
-    import OpenImageIO as oiio
-
-    name = os.fspath(path)
-    source = _open(name)
-    try:
-        spec = source.spec()
-        _check_size(name, spec)
-        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.UINT8)
-        if pixels is None:
-            raise OSError(f"{name}: is damaged: {one_line(problem_of(source), name)}")
-        alpha = spec.alpha_channel
-    finally:
-        source.close()
-    codes = np.asarray(pixels, np.uint8).reshape(spec.height, spec.width, spec.nchannels)
-    colours = codes[:, :, :3] if codes.shape[2] >= 3 else np.repeat(codes[:, :, :1], 3, axis=2)
-    if alpha < 0:
-        return np.ascontiguousarray(colours)
-    share = codes[:, :, alpha : alpha + 1].astype(np.float32) / np.float32(255.0)
-    mixed: NDArray[np.uint8] = (share * colours + (1.0 - share) * 255.0 + 0.5).astype(np.uint8)
-    return mixed
 
 
 def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:

@@ -1,30 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Benchmarks in the window: folders browsed, a suite run, stopped and gone on with."""
+"""The benchmark panel runs, stops and resumes a suite, and opens its report in the browser."""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-from PySide6.QtCore import QSettings, Qt
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QDropEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QListWidget, QPushButton
+from PySide6.QtWidgets import QPushButton
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench_results import policy_rows, write_folder
 
-from wavecomb.bench.columns import Column
-from wavecomb.bench.report_parts import Figure, Markup, Report, Section
-from wavecomb.gui.bench import tables as bench_tables
+from wavecomb.errors import WavecombError
 from wavecomb.gui.bench.panel import BenchPanel
-from wavecomb.gui.bench.recent_folders import recent_folders
-from wavecomb.picture.image import write_png
+from wavecomb.gui.bench.suites import Choice, suite_info, suite_infos
 
 LEFT = Qt.MouseButton.LeftButton
-FIGURES = {"first": 0.25, "second": 1.0}
 TINY = """
 name = "tiny"
 title = "a box"
@@ -40,29 +37,14 @@ settings = { size = [16, 12], spp = 4 }
 """
 
 
-@pytest.fixture(autouse=True)
-def own_settings(tmp_path):
-    QSettings.setPath(
-        QSettings.Format.NativeFormat, QSettings.Scope.UserScope, str(tmp_path / "config")
+@pytest.fixture
+def pages(monkeypatch):
+    """Pages that the window has opened in the browser."""
+    found = []
+    monkeypatch.setattr(
+        QDesktopServices, "openUrl", lambda url: found.append(Path(url.toLocalFile()))
     )
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = write_folder(
-        tmp_path_factory.mktemp("made") / "results", policy_rows(repetitions=3), pictures=True
-    )
-    (made / "figures").mkdir()
-    for name, value in FIGURES.items():
-        write_png(made / "figures" / f"{name}.png", np.full((20, 40, 3), value, np.float32))
-    figures = [Figure(name, f"The {name}", f"Caption of the {name}") for name in FIGURES]
-    sections = [
-        Section("findings", "Findings", [Markup("<p>none is faster</p>")]),
-        Section("figures", "Experiment a", [*figures]),
-    ]
-    Report("Made up", "<p>One machine</p>", [], sections).write(made)
-    (made / "notes.md").write_text("# Notes\n\nof the sitting")
-    return made
+    return found
 
 
 @pytest.fixture
@@ -75,111 +57,75 @@ def panel(qtbot, new_session):
     made.shutdown()
 
 
-@pytest.fixture
-def opened(qtbot, panel, folder):
-    with qtbot.waitSignal(panel.browser.opened, timeout=60000):
-        panel.open(folder)
-    return panel
-
-
-def test_a_folder_is_shown(qtbot, opened, folder):
-    browser = opened.browser
-    assert "made-up - Times that were made up" in browser.findChild(QLabel, "benchTitle").text()
-    assert "vary by 12%" in browser.findChild(QLabel, "benchWarnings").text()
-    figures = browser.findChild(QListWidget, "figureList")
-    titles = [figures.item(k).text() for k in range(figures.count())]
-    assert titles == ["Experiment a", "The first", "The second"]
-    assert figures.currentRow() == 1, "a heading cannot be chosen"
-    qtbot.waitUntil(lambda: browser.figures.view.image is not None)
-    figures.setFocus()
-    QTest.keyClick(figures, Qt.Key.Key_Down)
-    qtbot.waitUntil(lambda: browser.figures.view.image.pixelColor(5, 5).lightness() == 255)
-    target = browser.figures.view.target()
-    assert target.width() / target.height() == pytest.approx(2.0)
-    assert browser.figures.caption.text() == "Caption of the second"
-    report = browser.report_view
-    browser.tabs.setCurrentWidget(report)
-    assert "none is faster" in report.text.toPlainText() and "One machine" in report.lead.text()
-    report.list.setFocus()
-    QTest.keyClick(report.list, Qt.Key.Key_Down)
-    assert "Caption of the first" in report.text.toPlainText()
-    browser.tabs.setCurrentWidget(browser.pages)
-    qtbot.waitUntil(lambda: "of the sitting" in browser.pages.text.toPlainText())
-    assert "Made-up CPU <4 GHz> & friends" in browser.machine.toPlainText()
-    assert recent_folders() == [folder.resolve()]
-
-
-def test_runs_are_sorted_by_number_and_filtered(qtbot, opened):
-    runs = opened.browser.runs
-    opened.browser.tabs.setCurrentWidget(runs)
-    names = [
-        runs.model.headerData(k, Qt.Orientation.Horizontal) for k in range(runs.model.columnCount())
-    ]
-    column = names.index("render_s")
-    for order, reverse in (
-        (Qt.SortOrder.AscendingOrder, False),
-        (Qt.SortOrder.DescendingOrder, True),
-    ):
-        runs.view.sortByColumn(column, order)
-        rows = [
-            runs.proxy.mapToSource(runs.proxy.index(r, 0)).row()
-            for r in range(runs.proxy.rowCount())
-        ]
-        values = [runs.model.value(row, column) for row in rows]
-        assert values == sorted(values, reverse=reverse) and len(values) == 108
-    QTest.keyClicks(runs.filter, "Dragon -policy-none")
-    shown = [runs.proxy.index(r, 0).data() for r in range(runs.proxy.rowCount())]
-    assert len(shown) == 2 * 8 * 3 and all("dragon" in s and "policy-none" not in s for s in shown)
-    assert runs.count.text() == "48 of 108 rows"
-
-
-def test_pictures_go_to_compare(qtbot, opened):
-    shots = opened.browser.shots
-    opened.browser.tabs.setCurrentWidget(shots)
-    with qtbot.waitSignal(opened.compare) as sent:
-        rect = shots.visualItemRect(shots.item(0))
-        QTest.mouseClick(shots.viewport(), LEFT, pos=rect.center())
-        QTest.mouseDClick(shots.viewport(), LEFT, pos=rect.center())
-    assert sent.args[0].parent.name == "images" and sent.args[1].parent.name == "golden"
-
-
-def test_what_is_no_folder_is_said(qtbot, opened, tmp_path):
-    with qtbot.waitSignal(opened.failed) as failed:
-        opened.open(tmp_path)
-    assert "no runs.csv" in failed.args[0]
-    assert opened.browser.findChild(QLabel, "benchError").text() == failed.args[0]
-    assert opened.browser.folder is not None  # what was there stays
-
-
-@pytest.mark.slow
-def test_two_folders(qtbot, opened, folder, tmp_path):
-    two = opened.browser.two
-    two.set_before(write_folder(tmp_path / "before", policy_rows(repetitions=3, seed=4)))
-    qtbot.waitUntil(lambda: two.found is not None, timeout=120000)
-    assert two.table.model.rowCount() == 36 and "after over before" in two.words.text()
-
-
 def button(panel, name):
     return panel.findChild(QPushButton, name)
 
 
+@pytest.mark.slow
+def test_the_report_opens_in_the_browser_and_is_made_if_it_is_old(qtbot, panel, pages, tmp_path):
+    folder = write_folder(tmp_path / "results", policy_rows(repetitions=2))
+    panel.choice.set_choice("quick", folder)
+    with qtbot.waitSignal(panel.done, timeout=120000):
+        QTest.mouseClick(button(panel, "benchReport"), LEFT)
+    page = folder / "report.html"
+    assert pages == [page] and "Experiment policies" in page.read_text()
+    page.write_text("kept")
+    with qtbot.waitSignal(panel.done):
+        QTest.mouseClick(button(panel, "benchReport"), LEFT)
+    assert page.read_text() == "kept", "a report that is newer than its results is opened as it is"
+    os.utime(folder / "runs.csv", (time.time() + 60, time.time() + 60))
+    with qtbot.waitSignal(panel.done, timeout=120000):
+        QTest.mouseClick(button(panel, "benchReport"), LEFT)
+    assert pages == [page] * 3 and page.read_text() != "kept"
+
+
+def test_a_dropped_folder_opens_its_report(qtbot, panel, pages, tmp_path):
+    folder = write_folder(tmp_path / "results", policy_rows(repetitions=1))
+    (folder / "report.html").write_text("made before")
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(folder))])
+    with qtbot.waitSignal(panel.done):
+        panel.dropEvent(
+            QDropEvent(
+                QPointF(5, 5), Qt.DropAction.CopyAction, data, LEFT,
+                Qt.KeyboardModifier.NoModifier,
+            )
+        )  # fmt: skip
+    assert pages == [folder / "report.html"]
+
+
+def test_a_folder_without_results_is_named(qtbot, panel, pages, tmp_path):
+    panel.choice.set_choice("quick", tmp_path)
+    with qtbot.waitSignal(panel.failed) as failed:
+        QTest.mouseClick(button(panel, "benchReport"), LEFT)
+    assert f"{tmp_path}: holds no results (no runs.csv)" in failed.args[0]
+    assert panel.state.text() == failed.args[0] and not pages
+
+
+@pytest.mark.slow
+def test_a_damaged_folder_is_a_message(qtbot, panel, pages, tmp_path):
+    panel.choice.set_choice("quick", tmp_path)
+    (tmp_path / "runs.csv").write_text("run_id,spp\na,many\n")
+    with qtbot.waitSignal(panel.failed, timeout=60000) as failed:
+        QTest.mouseClick(button(panel, "benchReport"), LEFT)
+    assert "runs.csv: cannot be read" in failed.args[0] and not pages
+
+
 def choose(qtbot, panel, tmp_path):
-    """The tiny suite, stage "box" only, twice."""
+    """The tiny suite, stage "box" only."""
     suite = tmp_path / "tiny.toml"
     suite.write_text(TINY)
-    panel.tabs.setCurrentWidget(panel.runner)
-    choice = panel.runner.choice
-    panel.runner.open_choice(str(suite), tmp_path / "out")
+    choice = panel.choice
+    choice.set_choice(str(suite), tmp_path / "out")
     qtbot.waitUntil(lambda: choice.suite.currentData() == str(suite), timeout=60000)
     choice.stages.item(1).setCheckState(Qt.CheckState.Unchecked)
-    panel.runner.report.setChecked(False)
     return tmp_path / "out"
 
 
 @pytest.mark.slow
-def test_a_suite_is_stopped_gone_on_with_and_shown(qtbot, panel, tmp_path, cornell):
-    """The viewport renders before and after, and stands still between; the window never waits."""
-    session, runner = panel.runner._session, panel.runner
+def test_a_suite_is_stopped_resumed_and_its_report_opened(qtbot, panel, pages, tmp_path, cornell):
+    """The viewport renders before and after, and pauses in between; the window never waits."""
+    session = panel._session
     with qtbot.waitSignal(session.opened, timeout=120000):
         session.open(cornell)
     out = choose(qtbot, panel, tmp_path)
@@ -187,20 +133,20 @@ def test_a_suite_is_stopped_gone_on_with_and_shown(qtbot, panel, tmp_path, corne
     assert session.state == "paused" and not button(panel, "benchStart").isEnabled()
     session.restart()  # as an edit would
     assert session.state == "paused"
-    qtbot.waitUntil(lambda: runner.bar.maximum() == 3 and runner.bar.value() >= 1, timeout=120000)
+    qtbot.waitUntil(lambda: panel.bar.maximum() == 3 and panel.bar.value() >= 1, timeout=120000)
     begun = time.monotonic()
     QTest.mouseClick(button(panel, "benchCancel"), LEFT)
     assert time.monotonic() - begun < 0.1
-    qtbot.waitUntil(lambda: not runner.running, timeout=120000)
-    assert "Stopped" in runner.state.text() and session.state == "rendering"
-    assert button(panel, "benchStart").text() == "Go on"
-    with qtbot.waitSignal(panel.browser.opened, timeout=120000):
+    qtbot.waitUntil(lambda: not panel.busy, timeout=120000)
+    assert "Stopped" in panel.state.text() and session.state == "rendering" and not pages
+    assert button(panel, "benchStart").text() == "Resume"
+    with qtbot.waitSignal(panel.done, timeout=120000):
         QTest.mouseClick(button(panel, "benchStart"), LEFT)
-    runs = panel.browser.folder.runs
-    assert len(runs) == 3 and {row["stage"] for row in runs} == {"box"}
-    assert panel.tabs.currentWidget() is panel.browser and panel.browser.folder.path == out
-    assert "tried" not in runner.state.text() and "Done" in runner.state.text()
-    assert "order.box" in runner.log.toPlainText()
+    assert pages == [out / "report.html"]
+    runs = (out / "runs.csv").read_text().splitlines()[1:]
+    assert len(runs) == 3 and all("order.box" in row for row in runs)
+    assert "failed" not in panel.state.text() and "Opened" in panel.state.text()
+    assert "order.box" in panel.log.toPlainText()
 
 
 @pytest.mark.slow
@@ -212,25 +158,25 @@ def test_errors_of_a_run_are_messages(qtbot, panel, tmp_path):
     with qtbot.waitSignal(panel.failed, timeout=120000) as failed:
         QTest.mouseClick(button(panel, "benchStart"), LEFT)
     assert "was made with another suite" in failed.args[0] and "choose another" in failed.args[0]
-    panel.runner.choice.stages.item(0).setCheckState(Qt.CheckState.Unchecked)
+    panel.choice.stages.item(0).setCheckState(Qt.CheckState.Unchecked)
     with qtbot.waitSignal(panel.failed) as failed:
         QTest.mouseClick(button(panel, "benchStart"), LEFT)
-    assert "tick one" in failed.args[0] and not panel.runner.running
+    assert "tick one" in failed.args[0] and not panel.busy
 
 
-def test_a_table_asks_for_no_cell_that_is_not_seen(qtbot, monkeypatch):
-    """Qt's way to size columns asked for each cell several times: seconds for a large sitting."""
-    asked = []
-    data = bench_tables.RunsModel.data
-
-    def counted(self, index, role=Qt.ItemDataRole.DisplayRole):
-        asked.append(role)
-        return data(self, index, role)
-
-    monkeypatch.setattr(bench_tables.RunsModel, "data", counted)
-    columns = [Column(f"c{k}", "integer", "", "") for k in range(40)]
-    table = bench_tables.RunsTable("rows")
-    qtbot.addWidget(table)
-    table.set_rows(columns, [{c.name: k for c in columns} for k in range(500)])
-    assert len(asked) < 500 * 40
-    assert table.view.columnWidth(0) > 0
+def test_suites_and_the_command(tmp_path):
+    infos = suite_infos()
+    by_name = {info.name: info for info in infos}
+    assert infos[0].name == "quick" and by_name["paper"].repetitions == 3
+    quick = by_name["quick"]
+    assert quick.stages == ("mixed", "dragon") and sum(n for _, n in quick.experiments) == 32
+    one = suite_info("quick", ("dragon",))
+    assert 0 < one.configurations < 32 and one.seconds < quick.seconds
+    with pytest.raises(WavecombError, match="no such stage"):
+        suite_info("quick", ("x",))
+    choice = Choice("quick", tmp_path, ("dragon",), 3)
+    words = choice.arguments()
+    assert words[:7] == ["bench", "run", "quick", "-o", str(tmp_path), "--stage", "dragon"]
+    assert "--resume" not in words and words[-2:] == ["--progress", "json"]
+    (tmp_path / "runs.csv").touch()
+    assert "--resume" in choice.arguments(dry=True)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results of benchmark suites."""
+"""The panel that runs benchmark suites."""

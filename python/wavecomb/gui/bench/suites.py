@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The suites that a benchmark can be chosen from, and the command that runs one. No Qt."""
+"""Suites to choose from, and the command that runs one. No Qt."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from wavecomb.errors import WavecombError
 
 @dataclass(frozen=True)
 class SuiteInfo:
-    """A suite.
+    """Facts about a suite.
 
     Attributes:
-        name: Of one of ours, or the path of a TOML file.
+        name: A name of `wavecomb bench list`, or the path of a TOML file.
         title: One line.
-        stages: Their names.
-        repetitions: Its own.
-        configurations: On this machine.
-        seconds: Of one repetition of all, rough: a thread is taken to make 0.4 million samples a
-            second, and stages and golden pictures are left out.
-        experiments: Name and number of configurations of each.
+        stages: Names of its stages.
+        repetitions: Default number of repetitions.
+        configurations: Number of configurations on this machine.
+        seconds: Rough time of one repetition of all configurations, at 0.4 million samples per
+            second and thread; without making stages and golden pictures.
+        experiments: Name and number of configurations of each experiment.
     """
 
     name: str
@@ -34,7 +34,7 @@ class SuiteInfo:
 
 
 def suite_infos() -> list[SuiteInfo]:
-    """Those that come with Wavecomb, the quickest first."""
+    """Returns the suites that come with Wavecomb, the fastest first."""
     from wavecomb.bench.suite import suite_names
 
     found = []
@@ -42,15 +42,15 @@ def suite_infos() -> list[SuiteInfo]:
         try:
             found.append(suite_info(name))
         except WavecombError:
-            continue  # one that asks for what this machine does not say
+            continue  # the suite needs a property of the machine that is unknown here
     return sorted(found, key=lambda info: info.seconds * info.repetitions)
 
 
 def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
-    """One of them, or a TOML file; of these stages only.
+    """Reads a suite by name or TOML file, restricted to some stages.
 
     Raises:
-        WavecombError: It is no good; one line.
+        WavecombError: The suite is invalid; one line.
     """
     from wavecomb.bench.estimate import Estimator
     from wavecomb.bench.machine import limits
@@ -75,34 +75,30 @@ def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
 
 @dataclass(frozen=True)
 class Choice:
-    """What a benchmark is started with.
+    """Arguments of a benchmark.
 
     Attributes:
         suite: Name or TOML file.
-        folder: For results.
-        stages: Only these; all of them where it is empty.
-        more_stages: A folder of further stages, or None.
-        repetitions: In place of the suite's; None: its own.
+        folder: Results folder.
+        stages: Stages to run; empty means all.
+        repetitions: None means the suite's default.
     """
 
     suite: str
     folder: Path
     stages: tuple[str, ...] = ()
-    more_stages: Path | None = None
     repetitions: int | None = None
 
     @property
     def resumes(self) -> bool:
-        """Whether the folder holds results to go on with."""
+        """Whether the folder holds results that the suite would resume."""
         return (self.folder / "runs.csv").is_file()
 
     def arguments(self, *, dry: bool = False) -> list[str]:
-        """Arguments of `wavecomb`."""
+        """Returns the arguments of the `wavecomb` command."""
         words = ["bench", "run", self.suite, "-o", str(self.folder)]
         for stage in self.stages:
             words += ["--stage", stage]
-        if self.more_stages is not None:
-            words += ["--stages", str(self.more_stages)]
         if self.repetitions is not None:
             words += ["--repetitions", str(self.repetitions)]
         if self.resumes:
