@@ -9,6 +9,9 @@ SHELL := /bin/bash
 BUILD := build/editable
 # Sources of the core are compiled by sixes: a clean build is quicker, an edit dearer. OFF for who edits them.
 BATCH ?= ON
+# Lane widths: default means scalar lanes and the widest that the target has; all means every width it has. A build keeps the
+# widths it was last built with.
+LANES ?= $(shell cat build/.lanes 2> /dev/null || echo default)
 # Of make test-asan: ON, or all.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
@@ -49,12 +52,18 @@ build/.setup: tools/setup tools/setup_embree tools/setup_openvdb tools/debs cmak
 build/.setup-test: build/.setup
 	@$(LOCK) tools/setup test && touch $@
 
+.PHONY: lanes
+lanes:
+build/.lanes: lanes
+	@mkdir -p build; [ "$$(cat $@ 2> /dev/null)" = "$(LANES)" ] || echo "$(LANES)" > $@
+
 # pip configures, builds and installs once; after a source edit CMake alone is quicker.
-build/.configured: build/.setup $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
+build/.configured: build/.setup build/.lanes $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
 	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
 	  --config-settings=cmake.define.WAVECOMB_TESTS=ON --config-settings=cmake.define.WAVECOMB_BENCHMARKS=ON \
-	  --config-settings=cmake.define.WAVECOMB_BATCH=$(BATCH)
+	  --config-settings=cmake.define.WAVECOMB_BATCH=$(BATCH) \
+	  --config-settings=cmake.define.WAVECOMB_LANE_WIDTHS="$(LANES:default=)"
 	@touch $@
 
 build/.built: build/.configured $(NATIVE_INPUTS)
@@ -66,7 +75,7 @@ build/.built: build/.configured $(NATIVE_INPUTS)
 
 setup: build/.setup ## Install what building needs (system packages, .venv, Embree 4)
 setup-test: build/.setup-test
-build: build/.built ## Build the core and the Python module into .venv (editable)
+build: build/.built ## Build the core and the Python module into .venv (editable); LANES=all: every lane width
 
 # Dependencies are what their wheels bring; Embree travels in this one where it is staged. auditwheel copies nothing: what it
 # would find in the system travels already.
@@ -141,13 +150,18 @@ build-naive: build
 test-py: build-naive build/.setup-test ## Python and statistical tests
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
-test-long: build-naive build/.setup-test ## What takes minutes: 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
+# Python tests that go over the lane widths of the build; test-long runs them on a build of all widths.
+lane_tests = $(shell grep -lr --include='test_*.py' lane_widths tests/python tests/statistics)
+test-long: build-naive build/.setup-test ## What takes minutes: all lane widths, 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
 	@$(MAKE) --no-print-directory test-asan CHECKS=all
-	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON' EXIT; \
+	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON; \
+	    $(MAKE) --no-print-directory build LANES=$(LANES)' EXIT; \
+	  $(MAKE) --no-print-directory build LANES=all; \
 	  $(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=all; \
 	  $(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet; \
-	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
-	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
+	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error; \
+	  $(VENV)/python -m pytest -q -n $(JOBS) $(lane_tests); \
+	  WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
 
 # Of a machine that has no compiler either: tests/packaging/test_empty_root.py.
 test-wheel: wheels ## Install that wheel into a fresh environment and an empty root; render with each of its libraries

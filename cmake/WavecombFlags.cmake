@@ -7,7 +7,7 @@
 include(CheckCXXSourceCompiles)
 
 set(WAVECOMB_LANE_WIDTHS "" CACHE STRING
-  "Lane widths to build, of 1;4;8;16 (default: all that the target has; 1 and the widest with sanitizers)")
+  "Lane widths to build, of 1;4;8;16 (default: 1 and the widest that the target has); all: every width it has")
 
 # What is the same for every instruction set.
 add_library(wavecomb_common INTERFACE)
@@ -52,7 +52,7 @@ endfunction()
 
 # wavecomb_add_flags(NAME ARCH): the interface library NAME, for what is compiled with -march=ARCH (empty:
 # the compiler's default). Properties: WAVECOMB_WIDTHS, the lane widths that are built; WAVECOMB_LABEL, what
-# such a library is called in messages.
+# such a library is called in messages. The interface library NAME_widths defines WAVECOMB_HAS_LANES_<width>.
 function(wavecomb_add_flags name arch)
   _wavecomb_has(_isa_4 "${arch}" "defined(__SSE4_2__) || defined(__ARM_NEON)")
   _wavecomb_has(_isa_8 "${arch}" "defined(__AVX2__) && defined(__FMA__)")
@@ -63,7 +63,9 @@ function(wavecomb_add_flags name arch)
       list(APPEND supported ${width})
     endif()
   endforeach()
-  if(WAVECOMB_LANE_WIDTHS)
+  if(WAVECOMB_LANE_WIDTHS STREQUAL "all")
+    set(widths ${supported})
+  elseif(WAVECOMB_LANE_WIDTHS)
     set(widths ${WAVECOMB_LANE_WIDTHS})
     foreach(width IN LISTS widths)
       if(NOT width IN_LIST supported)
@@ -71,11 +73,9 @@ function(wavecomb_add_flags name arch)
           "(-march=${arch}); it has ${supported}. See WAVECOMB_NATIVE, WAVECOMB_ARCH and WAVECOMB_ISAS.")
       endif()
     endforeach()
-  elseif(WAVECOMB_SANITIZE)
+  else()
     list(GET supported -1 widest)
     set(widths 1 ${widest})
-  else()
-    set(widths ${supported})
   endif()
   list(REMOVE_DUPLICATES widths)
   list(SORT widths COMPARE NATURAL)
@@ -100,8 +100,10 @@ function(wavecomb_add_flags name arch)
     target_compile_options(${name} INTERFACE "-march=${arch}")
   endif()
   target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most} WAVECOMB_PLAIN=${plain})
+  # Only for units that list the widths: the others compile to the same objects with fewer widths or more.
+  add_library(${name}_widths INTERFACE)
   foreach(width IN LISTS widths)
-    target_compile_definitions(${name} INTERFACE WAVECOMB_HAS_LANES_${width}=1)
+    target_compile_definitions(${name}_widths INTERFACE WAVECOMB_HAS_LANES_${width}=1)
   endforeach()
 endfunction()
 

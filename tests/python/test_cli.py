@@ -506,3 +506,24 @@ def test_from_scene_to_comparison(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "different: " in done.stdout
     assert wavecomb("compare", a, stage).returncode == 2
+
+
+def test_lane_widths_that_are_not_built(tmp_path: Path) -> None:
+    from wavecomb import _core
+
+    built = _core.lane_widths()
+    assert len(built) == 1 or built[0] == 1
+    shown = "|".join(["auto", *(str(width) for width in built)])
+    assert f"--lanes [{shown}]" in wavecomb("render", "--help").stdout
+    stage, out = tmp_path / "stage.usdc", tmp_path / "a.exr"
+    assert wavecomb("scene", "cornell", "-o", stage).returncode == 0
+    for width in (1, 4, 8, 16):
+        done = wavecomb("render", stage, "-o", out, "--size", 8, 8, "--lanes", width, "--quiet")
+        assert (done.returncode == 0) == out.exists() == (width in built), width
+        if width in built:
+            out.unlink()
+            continue
+        lines = done.stderr.splitlines()
+        assert (done.returncode, len(lines)) == (2, 1)
+        assert f"lanes is {width}, which the " in lines[0]
+        assert "make build LANES=all" in lines[0]

@@ -323,7 +323,7 @@ def test_one_picture_for_all_schedules_from_a_stage(tmp_path):
             {"integrator": "reference"},
             {"policy": "none", "threads": 1},
             {"policy": "material", "threads": 2, "wave_size": 128},
-            {"policy": "cost-benefit", "lanes": 4},
+            {"policy": "cost-benefit", "lanes": 1},
         )
     ]
     assert len(set(pictures)) == 1

@@ -70,7 +70,7 @@ def _option(row: Setting) -> click.Option:
     # The core says what is out of range; only signs are told here.
     return row_option(
         [row.option, row.name],
-        _Steps(row) if row.steps else row.kind,
+        _Steps(row, _offered(row)) if row.steps else row.kind,
         row.help + (f" 0: {row.zero}." if row.zero and not row.steps else ""),
         default="" if row.kind == "flag" else default_text(row),
         choices=tuple(row.choices),
@@ -80,12 +80,24 @@ def _option(row: Setting) -> click.Option:
     )
 
 
-class _Steps(click.Choice):
-    """The few numbers of a setting; a word for 0."""
+def _offered(row: Setting) -> Iterable[float]:
+    """The steps of a setting that this build has."""
+    from wavecomb import _core
 
-    def __init__(self, row: Setting) -> None:
+    return _core.lane_widths() if row.name == "lanes" else row.steps
+
+
+class _Steps(click.Choice):
+    """The few numbers of a setting, of which help shows those in ``offered``; a word for 0."""
+
+    def __init__(self, row: Setting, offered: Iterable[float]) -> None:
         super().__init__([row.zero, *(f"{step:g}" for step in row.steps)])
         self._zero = row.zero
+        self._offered = [row.zero, *(f"{step:g}" for step in offered)]
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """The choices that help shows: those that this build has."""
+        return f"[{'|'.join(self._offered)}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Text to the number."""

@@ -47,7 +47,9 @@ uint32_t choose_lanes(uint32_t wanted) {
   std::string list;
   for (uint32_t w : built) list += (list.empty() ? "" : ", ") + std::to_string(w);
   throw Error("lanes is " + std::to_string(wanted) + ", which the " + library_name() +
-              " library has no kernels for; it has " + list);
+              " library has no kernels for; it has " + list +
+              ". A build with WAVECOMB_LANE_WIDTHS=all (make build LANES=all) has every width that "
+              "its CPU can run.");
 }
 
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveContext& context,
