@@ -38,7 +38,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-naive wheels sdist render docs test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
+.PHONY: help setup setup-test build build-test-tools wheels sdist render docs test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -143,16 +143,16 @@ test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
 	TSAN_OPTIONS="suppressions=$(CURDIR)/tests/cpp/tsan.supp $(TSAN_OPTIONS)" \
 	  $(TSAN)/tests/cpp/wavecomb_tests --gtest_brief=1 $(if $(FILTER),--gtest_filter='$(FILTER)')
 
-# The naive integrator, which statistical tests compare ours with.
-build-naive: build
-	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_naive -j $(JOBS) -- --quiet
+# The naive integrator, which statistical tests compare with, and the program that writes .nvdb files.
+build-test-tools: build
+	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_test_tools -j $(JOBS) -- --quiet
 
-test-py: build-naive build/.setup-test ## Python and statistical tests
+test-py: build-test-tools build/.setup-test ## Python and statistical tests
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
 # Python tests that go over the lane widths of the build; test-long runs them on a build of all widths.
 lane_tests = $(shell grep -lr --include='test_*.py' lane_widths tests/python tests/statistics)
-test-long: build-naive build/.setup-test ## What takes minutes: all lane widths, 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
+test-long: build-test-tools build/.setup-test ## What takes minutes: all lane widths, 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
 	@$(MAKE) --no-print-directory test-asan CHECKS=all
 	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON; \
 	    $(MAKE) --no-print-directory build LANES=$(LANES)' EXIT; \
@@ -218,10 +218,10 @@ test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for AR
 	@$(LOCK) $(VENV)/cmake --build $(ARM64) --target wavecomb_tests -j $(JOBS) -- --quiet
 	GTEST_FILTER='-$(arm64_without)' $(VENV)/ctest --test-dir $(ARM64) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-test-py-fast: build-naive build/.setup-test
+test-py-fast: build-test-tools build/.setup-test
 	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
 
-fuzz: build build/.setup-test ## Broken inputs for MINUTES=10; those that are wrong are kept in out/fuzz
+fuzz: build-test-tools build/.setup-test ## Broken inputs for MINUTES=10; those that are wrong are kept in out/fuzz
 	nice $(VENV)/python tests/python/fuzz_stages.py --minutes $(MINUTES) --seed $(SEED) --jobs $(JOBS) --keep out/fuzz
 
 bench: build ## Micro-benchmarks; JSON goes to out/micro

@@ -85,7 +85,7 @@ def asset(file: str) -> Path:
 
 
 def written_scenes() -> list[str]:
-    """Names of the scenes that can be written here: grids need OpenVDB."""
+    """Names of the scenes that can be written and read here: reading grids needs OpenVDB."""
     from wavecomb import vdb
     from wavecomb.scenes import SCENES
 

@@ -1,13 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "archive.h"
-
+/// A .vdb file, read by OpenVDB from a stream that throws where the file ends too early.
+/// openvdb::io::File continues behind the end of a file and gives zeros.
+#include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
+#include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
 
 #include <algorithm>
+#include <fstream>
+#include <limits>
 #include <map>
+#include <vector>
 
+#include "files.h"
+#include "open_tree.h"
 #include "opened.h"
+
+namespace openvdb {
+OPENVDB_USE_VERSION_NAMESPACE
+namespace OPENVDB_VERSION_NAME {
+// By its prototype: openvdb/openvdb.h, which declares it, includes grids of points.
+void initialize();
+}  // namespace OPENVDB_VERSION_NAME
+}  // namespace openvdb
 
 namespace vdb {
 
@@ -15,10 +30,78 @@ namespace {
 
 namespace vio = openvdb::io;
 
-}  // namespace
+/// Location of a grid in a file.
+struct Entry {
+  vio::GridDescriptor descriptor;
+  /// Position among the grids of this name.
+  uint32_t index = 0;
+
+  /// The name without the suffix that makes it unique.
+  const std::string& name() const { return descriptor.gridName(); }
+};
+
+/// Parts of a grid to read: the tree without values of voxels, or everything.
+enum class Part { kTopology, kWhole };
+
+class Archive final : public GridFile, private vio::Archive {
+ public:
+  explicit Archive(const std::string& path);
+
+  size_t size() const override { return entries_.size(); }
+  Head head(size_t number) const override {
+    const Entry& entry = entries_.at(number);
+    return {entry.name(), entry.index, entry.descriptor.gridType(),
+            entry.descriptor.saveFloatAsHalf()};
+  }
+  bool describe(size_t number, GridFacts& facts) override {
+    const uint64_t unlimited = std::numeric_limits<uint64_t>::max();
+    const auto grid = read_part(entries_.at(number), Part::kTopology, unlimited);
+    if (grid == nullptr) return false;
+    facts = facts_of(*grid);
+    return true;
+  }
+  Bricks read(size_t number, const BrickOptions& options, GridFacts& facts) override {
+    const Entry& entry = entries_.at(number);
+    const auto grid = read_part(entry, Part::kWhole, options.most_bytes);
+    if (grid == nullptr)
+      throw BrokenFile("it is of type " + entry.descriptor.gridType() + ", which is not known");
+    facts = facts_of(*grid);
+    return bricks_of(*grid, options);
+  }
+
+ private:
+  /// Returns what `read` returns; exceptions of the library become BrokenFile.
+  template <typename Read>
+  static auto guarded(Read&& read) {
+    try {
+      return read();
+    } catch (const openvdb::Exception& error) {
+      throw BrokenFile(one_line(error.what()));
+    } catch (const std::ios_base::failure&) {
+      throw BrokenFile("the file ends too early");
+    }
+  }
+
+  static std::string one_line(const char* text);
+  void read_entries(int64_t size);
+  /// Sets the stream's properties that functions of the library read; forgets the grid before.
+  void tag_stream();
+  /// A grid with its metadata and transform; null if the library does not know its type. The
+  /// stream is then at its tree.
+  openvdb::GridBase::Ptr begin(const Entry& entry);
+  const Entry& instance_parent(const Entry& entry) const;
+  /// A grid; null if the library does not know its type. Throws TooLarge after its topology was
+  /// read, and before there is memory for its values.
+  openvdb::GridBase::Ptr read_part(const Entry& entry, Part part, uint64_t most_bytes);
+
+  std::ifstream stream_;
+  /// The stream holds the address of this.
+  vio::StreamMetadata::Ptr metadata_;
+  std::vector<Entry> entries_;
+};
 
 Archive::Archive(const std::string& path) {
-  // Whatever is missing from the file throws; OpenVDB does not look.
+  // A read past the end throws; OpenVDB does not check.
   const uintmax_t size = open_to_read(stream_, path);
   guarded([&] {
     readHeader(stream_);
@@ -47,7 +130,7 @@ void Archive::read_entries(int64_t size) {
     entry.descriptor.read(stream_);
     const auto& d = entry.descriptor;
     const int64_t here = stream_.tellg();
-    // A file that is cut off loses what is last; and no table leads in a circle.
+    // A file that is cut off loses its last grids; and no table leads in a circle.
     if (d.getEndPos() > size) throw BrokenFile("the file ends too early");
     if (d.getGridPos() < here || d.getBlockPos() < d.getGridPos() ||
         d.getEndPos() < d.getBlockPos())
@@ -89,6 +172,26 @@ openvdb::GridBase::Ptr Archive::begin(const Entry& entry) {
   return grid;
 }
 
+openvdb::GridBase::Ptr Archive::read_part(const Entry& entry, Part part, uint64_t most_bytes) {
+  return guarded([&] {
+    openvdb::GridBase::Ptr grid = begin(entry);
+    if (grid == nullptr) return grid;
+    if (part == Part::kWhole) check_type_of(*grid);
+    if (entry.descriptor.isInstance()) {
+      const openvdb::GridBase::Ptr parent = read_part(instance_parent(entry), part, most_bytes);
+      if (parent == nullptr || parent->type() != grid->type())
+        throw BrokenFile("a grid shares the voxels of one of another type");
+      grid->setTree(parent->baseTreePtr());
+      return grid;
+    }
+    grid->readTopology(stream_);
+    if (part == Part::kTopology) return grid;
+    check_size_of(*grid, most_bytes);
+    grid->readBuffers(stream_);
+    return grid;
+  });
+}
+
 std::string Archive::one_line(const char* text) {
   std::string line(text);
   // The library's exceptions begin with their names.
@@ -97,6 +200,20 @@ std::string Archive::one_line(const char* text) {
   std::replace_if(
       line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   return line.empty() ? "it is damaged" : line.substr(0, 200);
+}
+
+}  // namespace
+
+std::unique_ptr<GridFile> open_archive(const std::string& path) {
+  return std::make_unique<Archive>(path);
+}
+
+void initialize_openvdb() {
+  openvdb::initialize();
+}
+
+const char* openvdb_version() {
+  return OPENVDB_LIBRARY_VERSION_STRING;
 }
 
 }  // namespace vdb

@@ -1,29 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A grid as bricks of 8^3 voxels: leaves as they are, and what is active in larger tiles.
+/// Values of a grid as bricks of 8^3 voxels: leaf nodes, and the active tiles above them cut into
+/// bricks.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <memory>
-#include <stdexcept>
 #include <string>
-#include <type_traits>
+
+#include "grid.h"
 
 namespace vdb {
 
 constexpr int kBrickEdge = 8;
 constexpr size_t kBrickVoxels = kBrickEdge * kBrickEdge * kBrickEdge;
 
-/// More than there may be memory for; says how much in a line.
-struct TooLarge : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// Numbers of a voxel as they are given: 1 or 3, of 2 (half) or 4 bytes (float).
+/// Storage of a voxel: 1 or 3 components of 2 bytes (half) or 4 bytes (float).
 struct BrickFormat {
   uint32_t channels = 1;
   bool is_half = false;
@@ -32,13 +26,14 @@ struct BrickFormat {
   size_t brick_bytes() const { return kBrickVoxels * voxel_bytes() + 3 * sizeof(int32_t); }
 };
 
-/// What the values of a grid are like.
+/// Statistics of the values of a grid.
 struct BrickFacts {
   uint64_t not_finite = 0;
   uint64_t negative = 0;
+  /// Extremes of the finite values and of 0.
   float least = 0.0f;
   float greatest = 0.0f;
-  /// Bricks that held nothing but zeros and were left out.
+  /// Number of bricks that held only zeros and were left out.
   uint64_t empty = 0;
 
   void see(float value) {
@@ -61,155 +56,53 @@ struct Bricks {
   BrickFacts facts;
 };
 
-/// How bricks are made.
+/// Options for making bricks.
 struct BrickOptions {
-  /// That they may take.
+  /// Upper limit of the memory of the bricks.
   uint64_t most_bytes = 0;
-  /// Voxels that are not active and hold the background become 0.
+  /// Inactive voxels that hold the background value become 0.
   bool background_is_zero = false;
-  /// Bricks of zeros are left out.
+  /// Bricks that hold only zeros are left out.
   bool drops_empty = false;
 };
 
-template <typename T>
-struct ChannelsOf : std::integral_constant<uint32_t, 1> {};
-template <typename T>
-struct ChannelsOf<openvdb::math::Vec3<T>> : std::integral_constant<uint32_t, 3> {};
-
-inline float channel(float value, uint32_t) {
-  return value;
-}
-inline float channel(double value, uint32_t) {
-  return static_cast<float>(value);
-}
-template <typename T>
-float channel(const openvdb::math::Vec3<T>& value, uint32_t c) {
-  return static_cast<float>(value[static_cast<int>(c)]);
+/// Number of bricks in a tile of `edge` voxels a side.
+inline uint64_t bricks_of_tile(uint64_t edge) {
+  const uint64_t along = edge / kBrickEdge;
+  return along * along * along;
 }
 
-/// Bricks that the leaves and active tiles of a tree come to; of more than any memory holds, about.
-template <typename Tree>
-uint64_t count_bricks(const Tree& tree) {
-  uint64_t count = tree.leafCount();
-  auto tile = tree.cbeginValueOn();
-  tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    const uint64_t edge = static_cast<uint64_t>(tile.getBoundingBox().dim().x()) / kBrickEdge;
-    count += edge * edge * edge;
-  }
-  return count;
-}
+/// One line that says that `what` takes more bytes than there is room for.
+std::string room_text(const std::string& what, uint64_t bytes, uint64_t most_bytes);
 
-/// The line that says that something takes more bytes than there is room for.
-inline std::string room_text(const std::string& what, uint64_t bytes, uint64_t most_bytes) {
-  char text[160];
-  std::snprintf(text, sizeof(text), "%s takes %.1f GB; there is room for %.1f GB", what.c_str(),
-                1e-9 * static_cast<double>(bytes), 1e-9 * static_cast<double>(most_bytes));
-  return text;
-}
+/// Throws TooLarge if this many bricks take more than `most_bytes`.
+void check_size(uint64_t bricks, const BrickFormat& format, uint64_t most_bytes);
 
-/// Throws TooLarge where bricks take more than they may.
-inline void check_size(uint64_t bricks, const BrickFormat& format, uint64_t most_bytes) {
-  if (bricks <= most_bytes / format.brick_bytes()) return;
-  const double gigabytes =
-      1e-9 * static_cast<double>(bricks) * static_cast<double>(format.brick_bytes());
-  char text[160];
-  std::snprintf(text, sizeof(text), "%llu million voxels take %.1f GB; there is room for %.1f GB",
-                static_cast<unsigned long long>(bricks * kBrickVoxels / 1000000), gigabytes,
-                1e-9 * static_cast<double>(most_bytes));
-  throw TooLarge(text);
-}
+/// Converts floats that are exactly representable to 16 bits.
+void to_halves(const float* values, size_t count, uint16_t* halves);
 
-/// Fills bricks one after another.
+/// Fills bricks one after another. Values are converted to float before they arrive.
 class BrickWriter {
  public:
-  BrickWriter(uint64_t most, const BrickFormat& format, bool drops_empty)
-      : drops_empty_(drops_empty) {
-    bricks_.format = format;
-    bricks_.origins = std::make_unique_for_overwrite<int32_t[]>(3 * most);
-    bricks_.values =
-        std::make_unique_for_overwrite<unsigned char[]>(most * kBrickVoxels * format.voxel_bytes());
-  }
+  using Origin = std::array<int32_t, 3>;
 
-  /// Adds a brick; `value_at(i)` is that of voxel i, x slowest.
-  template <typename ValueAt>
-  void add(const openvdb::Coord& origin, ValueAt&& value_at) {
-    const uint32_t channels = bricks_.format.channels;
-    bool is_empty = true;
-    for (uint32_t i = 0; i < kBrickVoxels; ++i) {
-      const auto value = value_at(i);
-      for (uint32_t c = 0; c < channels; ++c) {
-        const float v = channel(value, c);
-        bricks_.facts.see(v);
-        is_empty = is_empty && v == 0.0f;
-        scratch_[i * channels + c] = v;
-      }
-    }
-    if (is_empty && drops_empty_) {
-      ++bricks_.facts.empty;
-      return;
-    }
-    const size_t numbers = kBrickVoxels * channels;
-    unsigned char* out =
-        bricks_.values.get() + bricks_.count * kBrickVoxels * bricks_.format.voxel_bytes();
-    if (bricks_.format.is_half) {
-      for (size_t i = 0; i < numbers; ++i) {
-        const openvdb::math::half h(scratch_[i]);
-        const uint16_t bits = h.bits();
-        std::memcpy(out + 2 * i, &bits, 2);
-      }
-    } else {
-      std::memcpy(out, scratch_, numbers * sizeof(float));
-    }
-    for (int axis = 0; axis < 3; ++axis)
-      bricks_.origins[3 * bricks_.count + static_cast<size_t>(axis)] = origin[axis];
-    ++bricks_.count;
-  }
+  /// Allocates memory for `most` bricks. Throws TooLarge, std::bad_alloc.
+  BrickWriter(uint64_t most, const BrickFormat& format, const BrickOptions& options);
+
+  /// Buffer for the values of the next brick, x slowest, channels fastest.
+  float* scratch() { return scratch_; }
+  /// Appends the brick in scratch().
+  void add(const Origin& origin);
+  /// Appends the bricks of a tile of one value (`channels` components).
+  void add_tile(const Origin& first, int32_t edge, const float* value);
 
   Bricks take() { return std::move(bricks_); }
 
  private:
   Bricks bricks_;
+  uint64_t most_;
   bool drops_empty_;
   float scratch_[3 * kBrickVoxels];
 };
-
-template <typename Grid>
-BrickFormat format_of(const Grid& grid) {
-  return {ChannelsOf<typename Grid::ValueType>::value, grid.saveFloatAsHalf()};
-}
-
-/// The bricks of a grid. Throws TooLarge, std::bad_alloc.
-template <typename Grid>
-Bricks collect(const Grid& grid, const BrickOptions& options) {
-  using Tree = typename Grid::TreeType;
-  using Value = typename Grid::ValueType;
-  static_assert(Tree::LeafNodeType::DIM == kBrickEdge);
-  const Tree& tree = grid.tree();
-  const uint64_t most = count_bricks(tree);
-  const BrickFormat format = format_of(grid);
-  check_size(most, format, options.most_bytes);
-  BrickWriter writer(most, format, options.drops_empty);
-  const Value background = grid.background(), zero = openvdb::zeroVal<Value>();
-  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
-    writer.add(leaf->origin(), [&](uint32_t i) -> Value {
-      const Value value = leaf->getValue(i);
-      const bool is_outside = !leaf->isValueOn(i) && value == background;
-      return options.background_is_zero && is_outside ? zero : value;
-    });
-  auto tile = tree.cbeginValueOn();
-  tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    const openvdb::CoordBBox box = tile.getBoundingBox();
-    const openvdb::Coord first = box.min();
-    const int edge = box.dim().x();
-    const Value value = *tile;
-    for (int x = 0; x < edge; x += kBrickEdge)
-      for (int y = 0; y < edge; y += kBrickEdge)
-        for (int z = 0; z < edge; z += kBrickEdge)
-          writer.add(first.offsetBy(x, y, z), [&](uint32_t) { return value; });
-  }
-  return writer.take();
-}
 
 }  // namespace vdb

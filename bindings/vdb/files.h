@@ -1,59 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A file of grids, whichever of the two libraries wrote it.
+/// A file of grids that is open, written by OpenVDB or NanoVDB.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
-#include <cstdint>
+#include <cstddef>
 #include <memory>
 #include <string>
 
-#include "archive.h"
-#include "nano_file.h"
+#include "bricks.h"
+#include "grid.h"
 
 namespace vdb {
 
-/// A grid as the table of its file has it.
-struct Head {
-  std::string name;
-  /// Among the grids of its name.
-  uint32_t index = 0;
-  /// As OpenVDB calls it: "Tree_float_5_4_3".
-  std::string type;
-  bool is_half = false;
-};
-
-/// Calls `use` with the grid as its own type; false where bricks are not made of that type.
-template <typename Use>
-bool with_grid(const openvdb::GridBase& grid, Use&& use) {
-  const auto as = [&]<typename Grid>() {
-    if (!grid.isType<Grid>()) return false;
-    use(static_cast<const Grid&>(grid));
-    return true;
-  };
-  return as.template operator()<openvdb::FloatGrid>() ||
-         as.template operator()<openvdb::DoubleGrid>() ||
-         as.template operator()<openvdb::Vec3SGrid>() ||
-         as.template operator()<openvdb::Vec3DGrid>();
-}
-
-/// A file that is open: .nvdb by how it begins, else .vdb.
+/// Functions throw BrokenFile, std::system_error and std::bad_alloc.
 class GridFile {
  public:
-  /// Throws BrokenFile, std::system_error, std::bad_alloc.
-  explicit GridFile(const std::string& path);
+  GridFile() = default;
+  GridFile(const GridFile&) = delete;
+  GridFile& operator=(const GridFile&) = delete;
+  virtual ~GridFile() = default;
 
-  size_t size() const;
-  Head head(size_t number) const;
-
-  /// A grid, without values where `part` is its topology (of .nvdb files with them); null where it
-  /// is of a type that is not known. Throws TooLarge where its bricks would take more than
-  /// `most_bytes`, and as the constructor.
-  openvdb::GridBase::Ptr read(size_t number, Part part, uint64_t most_bytes);
-
- private:
-  std::unique_ptr<Archive> archive_;
-  std::unique_ptr<NanoFile> nano_;
+  virtual size_t size() const = 0;
+  virtual Head head(size_t number) const = 0;
+  /// Describes a grid; false if the library does not know its type.
+  virtual bool describe(size_t number, GridFacts& facts) = 0;
+  /// Reads a grid's values. Throws BrokenFile if its type is not read, and TooLarge.
+  virtual Bricks read(size_t number, const BrickOptions& options, GridFacts& facts) = 0;
 };
+
+/// Opens a file. Its first bytes decide which library's it is, not its name.
+std::unique_ptr<GridFile> open_file(const std::string& path);
+
+/// Opens a .vdb file (archive.cpp).
+std::unique_ptr<GridFile> open_archive(const std::string& path);
+
+/// Registers OpenVDB's types of grids. Called once, before any file is opened.
+void initialize_openvdb();
+
+/// Version of OpenVDB, "10.0.1".
+const char* openvdb_version();
 
 }  // namespace vdb

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nano_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+#include <fstream>
+#include <limits>
 #include <map>
-#include <memory>
 #include <new>
+#include <vector>
 
-#include "archive.h"
-#include "bricks.h"
 #include "nano_tree.h"
 #include "opened.h"
 #include "packed.h"
@@ -72,14 +73,68 @@ void check_head(const SegmentHead& head) {
   if (head.codec > 2) throw BrokenFile("it is packed in a way that is not known");
 }
 
-}  // namespace
+/// Location of a grid in a file.
+struct NanoEntry {
+  std::string name;
+  /// Position among the grids of this name.
+  uint32_t index = 0;
+  /// nanovdb::GridType.
+  uint32_t type = 0;
+  /// 0: plain, 1: zlib, 2: Blosc.
+  uint16_t codec = 0;
+  /// Bytes of it in memory, and in the file from `offset`.
+  uint64_t size = 0, file_size = 0, offset = 0;
+};
 
-bool NanoFile::is_one(const std::string& path) {
-  std::array<char, 8> start{};
-  std::ifstream(path, std::ios::binary).read(start.data(), start.size());
-  return std::memcmp(start.data(), kMagic, 7) == 0 ||
-         std::memcmp(start.data() + 1, kMagicOfOthers, 7) == 0;
-}
+constexpr std::align_val_t kAligned{64};
+struct FreeAligned {
+  void operator()(char* p) const { ::operator delete[](p, kAligned); }
+};
+using AlignedBytes = std::unique_ptr<char[], FreeAligned>;
+
+class NanoFile final : public GridFile {
+ public:
+  explicit NanoFile(const std::string& path);
+
+  size_t size() const override { return entries_.size(); }
+  Head head(size_t number) const override {
+    const NanoEntry& entry = entries_.at(number);
+    return {entry.name, entry.index, type_name(entry), false};
+  }
+  bool describe(size_t number, GridFacts& facts) override {
+    const NanoEntry& entry = entries_.at(number);
+    if (!is_nano_type_read(entry.type)) return false;
+    const AlignedBytes bytes = load(entry, std::numeric_limits<uint64_t>::max());
+    facts = nano_facts(bytes_of(bytes), entry.size, entry.type);
+    facts.metadata.emplace_back("name", entry.name);
+    return true;
+  }
+  Bricks read(size_t number, const BrickOptions& options, GridFacts& facts) override {
+    const NanoEntry& entry = entries_.at(number);
+    if (!is_nano_type_read(entry.type))
+      throw BrokenFile("it is of type " + type_name(entry) + ", which is not read");
+    const AlignedBytes bytes = load(entry, options.most_bytes);
+    facts = nano_facts(bytes_of(bytes), entry.size, entry.type);
+    return nano_bricks(bytes_of(bytes), entry.size, entry.type, options);
+  }
+
+ private:
+  /// OpenVDB's name of the type, with the bits of quantised grids: "Tree_fp8_5_4_3".
+  static std::string type_name(const NanoEntry& entry) {
+    return std::string("Tree_") + nano_type_word(entry.type) + "_5_4_3";
+  }
+  static const unsigned char* bytes_of(const AlignedBytes& bytes) {
+    return reinterpret_cast<const unsigned char*>(bytes.get());
+  }
+  template <typename T>
+  T take();
+  void find_grids(uint64_t file_bytes);
+  AlignedBytes load(const NanoEntry& entry, uint64_t most_bytes);
+  void unpack(const NanoEntry& entry, char* to);
+
+  std::ifstream stream_;
+  std::vector<NanoEntry> entries_;
+};
 
 NanoFile::NanoFile(const std::string& path) {
   const uintmax_t size = open_to_read(stream_, path);
@@ -127,10 +182,6 @@ void NanoFile::find_grids(uint64_t file_bytes) {
   }
 }
 
-std::string NanoFile::type_name(const NanoEntry& entry) {
-  return std::string("Tree_") + nano_type_word(entry.type) + "_5_4_3";
-}
-
 void NanoFile::unpack(const NanoEntry& entry, char* to) {
   stream_.seekg(static_cast<std::streamoff>(entry.offset));
   if (entry.codec == 0) {
@@ -152,24 +203,34 @@ void NanoFile::unpack(const NanoEntry& entry, char* to) {
   }
 }
 
-openvdb::GridBase::Ptr NanoFile::read(const NanoEntry& entry, uint64_t most_bytes) {
-  if (!is_nano_type_read(entry.type)) return nullptr;
+AlignedBytes NanoFile::load(const NanoEntry& entry, uint64_t most_bytes) {
   if (entry.codec == 0 ? entry.size != entry.file_size : entry.size / kMostPacked > entry.file_size)
     throw BrokenFile("sizes of a grid that do not fit each other");
   if (entry.size > most_bytes) throw TooLarge(room_text("the grid", entry.size, most_bytes));
-  constexpr std::align_val_t kAligned{64};
-  const auto free = [&](char* p) { ::operator delete[](p, kAligned); };
-  const std::unique_ptr<char[], decltype(free)> bytes(
-      static_cast<char*>(::operator new[](entry.size, kAligned)), free);
+  AlignedBytes bytes(static_cast<char*>(::operator new[](entry.size, kAligned)));
   try {
     unpack(entry, bytes.get());
   } catch (const std::ios_base::failure&) {
     throw BrokenFile("the file ends too early");
   }
-  auto grid = read_nano(reinterpret_cast<const unsigned char*>(bytes.get()), entry.size, entry.type,
-                        most_bytes);
-  grid->setName(entry.name);
-  return grid;
+  return bytes;
+}
+
+}  // namespace
+
+bool is_nano_file(const std::string& path) {
+  std::array<char, 8> start{};
+  std::ifstream(path, std::ios::binary).read(start.data(), start.size());
+  return std::memcmp(start.data(), kMagic, 7) == 0 ||
+         std::memcmp(start.data() + 1, kMagicOfOthers, 7) == 0;
+}
+
+std::unique_ptr<GridFile> open_nano_file(const std::string& path) {
+  return std::make_unique<NanoFile>(path);
+}
+
+std::unique_ptr<GridFile> open_file(const std::string& path) {
+  return is_nano_file(path) ? open_nano_file(path) : open_archive(path);
 }
 
 }  // namespace vdb

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nano_tree.h"
 
-#include "archive.h"
-#include "bricks.h"
+#include <iterator>
 
 #if __has_include(<nanovdb/NanoVDB.h>)
 #include <nanovdb/NanoVDB.h>
@@ -12,6 +11,8 @@
 #include <cmath>
 #include <cstring>
 #include <type_traits>
+#include <utility>
+#include <vector>
 #endif
 
 namespace vdb {
@@ -40,41 +41,45 @@ class Buffer {
   uint64_t size_;
 };
 
-/// OpenVDB's type for a value of a leaf.
 template <typename Value>
-struct OpenValueOf {
-  using Type = Value;
-};
-template <>
-struct OpenValueOf<nanovdb::Vec3f> {
-  using Type = openvdb::Vec3s;
-};
-template <>
-struct OpenValueOf<nanovdb::Vec3d> {
-  using Type = openvdb::Vec3d;
-};
+constexpr uint32_t kChannels = std::is_arithmetic_v<Value> ? 1 : 3;
 
 template <typename Value>
-auto open_value(const Value& value) {
+void put(const Value& value, float* to) {
   if constexpr (std::is_arithmetic_v<Value>)
-    return value;
+    *to = static_cast<float>(value);
   else
-    return typename OpenValueOf<Value>::Type(value[0], value[1], value[2]);
+    for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(value[c]);
 }
 
-/// The tree of a grid of one build type, which is walked node by node from the root. Offsets lead
-/// from node to node; that no more nodes are met than there is room for bounds what a loop of them
-/// costs.
+using Origin = BrickWriter::Origin;
+constexpr int32_t kRootEdge = 4096;
+
+/// Throws where a leaf does not lie in the buffer with all of its values.
 template <typename Build>
+const auto* leaf_at(const Buffer& buffer, uint64_t at) {
+  using Leaf = typename nanovdb::NanoLeaf<Build>::DataType;
+  const Leaf* leaf = buffer.at<Leaf>(at);
+  if constexpr (std::is_same_v<Build, nanovdb::FpN>) {
+    const uint32_t log2_bits = leaf->mFlags >> 5;
+    if (log2_bits > 4) throw BrokenFile("numbers of more than 16 bits in a FpN grid");
+    buffer.at<unsigned char>(at + sizeof(Leaf), uint64_t{64} << log2_bits);
+  }
+  return leaf;
+}
+
+/// The nodes of a grid, which are walked from the root. They depend on the type of values alone,
+/// not on how leaves are quantised, so that this is instantiated once for both. Offsets lead from
+/// node to node; that no more nodes are met than there is room for bounds the cost of a cycle.
+template <typename Value>
 class NanoWalk {
  public:
-  using Leaf = typename nanovdb::NanoLeaf<Build>::DataType;
-  using Lower = typename nanovdb::NanoLower<Build>::DataType;
-  using Upper = typename nanovdb::NanoUpper<Build>::DataType;
-  using Root = typename nanovdb::NanoRoot<Build>::DataType;
-  using Value = typename OpenValueOf<typename Leaf::ValueType>::Type;
+  using Lower = typename nanovdb::NanoLower<Value>::DataType;
+  using Upper = typename nanovdb::NanoUpper<Value>::DataType;
+  using Root = typename nanovdb::NanoRoot<Value>::DataType;
 
-  explicit NanoWalk(const Buffer& buffer) : buffer_(buffer) {
+  NanoWalk(const Buffer& buffer, uint64_t leaf_bytes)
+      : buffer_(buffer), most_nodes_(buffer.size() / leaf_bytes) {
     constexpr uint64_t kTree = sizeof(nanovdb::GridData);
     const uint64_t to_root = buffer.at<nanovdb::TreeData<3>>(kTree)->mNodeOffset[3];
     if (to_root > buffer.size()) throw BrokenFile("a grid without a root");
@@ -82,177 +87,245 @@ class NanoWalk {
     root_ = buffer.at<Root>(at_root_);
   }
 
-  Value background() const { return open_value(root_->mBackground); }
+  const Value& background() const { return root_->mBackground; }
 
-  /// Calls `tile(level, origin, edge, value)` for active tiles and `leaf(origin, data)`.
+  /// Calls `on_tile(origin, edge, value)` for active tiles and `on_leaf(origin, offset)`, in the
+  /// order of OpenVDB's trees.
   template <typename OnTile, typename OnLeaf>
   void walk(OnTile&& on_tile, OnLeaf&& on_leaf) const {
     uint64_t nodes = 0;
     const auto count_node = [&] {
-      if (++nodes > buffer_.size() / sizeof(Leaf)) throw BrokenFile("nodes in a circle");
+      if (++nodes > most_nodes_) throw BrokenFile("nodes in a circle");
     };
-    const uint32_t entries = root_->mTableSize;
-    const auto* tiles = buffer_.at<typename Root::Tile>(at_root_ + sizeof(Root), entries);
-    for (uint32_t t = 0; t < entries; ++t) {
-      const nanovdb::Coord key = tiles[t].origin();
-      const openvdb::Coord origin(key[0] & ~4095, key[1] & ~4095, key[2] & ~4095);
-      if (tiles[t].child == 0) {
-        if (tiles[t].state != 0) on_tile(3, origin, 4096, open_value(tiles[t].value));
+    for (const auto& [origin, tile] : root_tiles()) {
+      if (tile->child == 0) {
+        if (tile->state != 0) on_tile(origin, kRootEdge, tile->value);
         continue;
       }
       count_node();
-      walk_inner<Upper, 5>(at_root_ + static_cast<uint64_t>(tiles[t].child), origin, 128, on_tile,
-                           [&](uint64_t at_lower, const openvdb::Coord& lower) {
+      walk_inner<Upper, 5>(at_root_ + static_cast<uint64_t>(tile->child), origin, 128, on_tile,
+                           [&](uint64_t at_lower, const Origin& lower) {
                              count_node();
                              walk_inner<Lower, 4>(at_lower, lower, 8, on_tile,
-                                                  [&](uint64_t at_leaf, const openvdb::Coord& xyz) {
+                                                  [&](uint64_t at_leaf, const Origin& xyz) {
                                                     count_node();
-                                                    on_leaf(xyz, *leaf_at(at_leaf));
+                                                    on_leaf(xyz, at_leaf);
                                                   });
                            });
     }
   }
 
  private:
+  using Tile = typename Root::Tile;
+
+  /// Entries of the root by their origins.
+  std::vector<std::pair<Origin, const Tile*>> root_tiles() const {
+    const uint32_t count = root_->mTableSize;
+    const Tile* tiles = buffer_.at<Tile>(at_root_ + sizeof(Root), count);
+    std::vector<std::pair<Origin, const Tile*>> found(count);
+    for (uint32_t t = 0; t < count; ++t) {
+      const nanovdb::Coord key = tiles[t].origin();
+      constexpr int32_t kMask = ~(kRootEdge - 1);
+      found[t] = {Origin{key[0] & kMask, key[1] & kMask, key[2] & kMask}, &tiles[t]};
+    }
+    std::sort(found.begin(), found.end());
+    for (uint32_t t = 1; t < count; ++t)
+      if (found[t].first == found[t - 1].first) throw BrokenFile("two nodes in one place");
+    return found;
+  }
+
   /// Children and active tiles of an inner node of 2^Log2 entries an edge, each of `edge` voxels.
   template <typename Node, int Log2, typename OnTile, typename OnChild>
-  void walk_inner(uint64_t at, const openvdb::Coord& origin, int edge, OnTile&& on_tile,
+  void walk_inner(uint64_t at, const Origin& origin, int32_t edge, OnTile&& on_tile,
                   OnChild&& on_child) const {
     const Node* node = buffer_.at<Node>(at);
     constexpr uint32_t kMask = (1u << Log2) - 1;
     for (uint32_t n = 0; n < 1u << (3 * Log2); ++n) {
       const bool is_child = node->mChildMask.isOn(n);
       if (!is_child && !node->mValueMask.isOn(n)) continue;
-      const auto along = [&](int shift) { return static_cast<int>((n >> shift) & kMask) * edge; };
-      const openvdb::Coord xyz = origin.offsetBy(along(2 * Log2), along(Log2), along(0));
+      const auto along = [&](int shift) {
+        return static_cast<int32_t>((n >> shift) & kMask) * edge;
+      };
+      const Origin xyz{origin[0] + along(2 * Log2), origin[1] + along(Log2), origin[2] + along(0)};
       if (is_child)
         on_child(at + static_cast<uint64_t>(node->mTable[n].child), xyz);
       else
-        on_tile(Log2 - 3, xyz, edge, open_value(node->mTable[n].value));
+        on_tile(xyz, edge, node->mTable[n].value);
     }
-  }
-
-  const Leaf* leaf_at(uint64_t at) const {
-    const Leaf* leaf = buffer_.at<Leaf>(at);
-    if constexpr (std::is_same_v<Build, nanovdb::FpN>) {
-      const uint32_t log2_bits = leaf->mFlags >> 5;
-      if (log2_bits > 4) throw BrokenFile("numbers of more than 16 bits in a FpN grid");
-      buffer_.at<unsigned char>(at + sizeof(Leaf), uint64_t{64} << log2_bits);
-    }
-    return leaf;
   }
 
   Buffer buffer_;
+  uint64_t most_nodes_;
   uint64_t at_root_ = 0;
   const Root* root_ = nullptr;
 };
 
-openvdb::math::Transform::Ptr transform_of(const nanovdb::GridData& data) {
-  openvdb::Mat4d matrix = openvdb::Mat4d::identity();
-  bool is_finite = true;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) matrix(j, i) = data.mMap.mMatD[3 * i + j];
-    matrix(3, i) = data.mMap.mVecD[i];
-    for (int j = 0; j < 4; ++j) is_finite = is_finite && std::isfinite(matrix(j, i));
-  }
-  if (!is_finite || !openvdb::math::isInvertible(matrix))
-    throw BrokenFile("a grid whose transform has no inverse");
-  return openvdb::math::Transform::createLinearTransform(matrix);
-}
-
-openvdb::GridClass class_of(const nanovdb::GridData& data) {
-  switch (data.mGridClass) {
-    case nanovdb::GridClass::LevelSet:
-      return openvdb::GRID_LEVEL_SET;
-    case nanovdb::GridClass::FogVolume:
-      return openvdb::GRID_FOG_VOLUME;
-    case nanovdb::GridClass::Staggered:
-      return openvdb::GRID_STAGGERED;
-    default:
-      return openvdb::GRID_UNKNOWN;
-  }
-}
-
-/// A grid of OpenVDB in the making. Not inlined: one for all builds that have such values, since a
-/// compiler takes long over each.
+/// A grid of one type of values, whose leaves are read by functions of their build type.
 template <typename Value>
-class Making {
+class NanoGrid {
  public:
-  using Grid = openvdb::Grid<typename openvdb::tree::Tree4<Value, 5, 4, 3>::Type>;
-  using Values = std::array<Value, kBrickVoxels>;
-  using Mask = openvdb::util::NodeMask<3>;
+  /// Voxels of a leaf. `is_outside`: inactive, and of the background value.
+  struct LeafValues {
+    std::array<float, kChannels<Value> * kBrickVoxels> values;
+    std::array<bool, kBrickVoxels> is_on, is_outside;
+  };
+  struct LeafKind {
+    uint64_t bytes;
+    void (*read)(const Buffer& buffer, uint64_t at, const Value& background, LeafValues& leaf);
+  };
+  template <typename Build>
+  static LeafKind kind_of() {
+    using Nodes = nanovdb::NanoUpper<Build>;
+    static_assert(sizeof(typename Nodes::DataType) == sizeof(typename NanoWalk<Value>::Upper));
+    static_assert(sizeof(typename nanovdb::NanoLower<Build>::DataType) ==
+                  sizeof(typename NanoWalk<Value>::Lower));
+    static_assert(sizeof(typename nanovdb::NanoRoot<Build>::DataType) ==
+                  sizeof(typename NanoWalk<Value>::Root));
+    return {sizeof(typename nanovdb::NanoLeaf<Build>::DataType), &read_leaf<Build>};
+  }
 
-  [[gnu::noinline]] explicit Making(const Value& background) : grid_(Grid::create(background)) {}
-  [[gnu::noinline]] void add_tile(int level, const openvdb::Coord& xyz, const Value& value) {
-    grid_->tree().addTile(level, xyz, value, true);
+  NanoGrid(const Buffer& buffer, const LeafKind& kind)
+      : buffer_(buffer), kind_(kind), tree_(buffer, kind.bytes) {}
+
+  /// Background, and number and bounds of active voxels.
+  void describe(GridFacts& facts) const {
+    facts.background.resize(kChannels<Value>);
+    put(tree_.background(), facts.background.data());
+    const auto extend = [&](const Origin& first, const Origin& last) {
+      if (!facts.box) facts.box = IndexBox{first, last};
+      facts.box->extend(first, last);
+    };
+    LeafValues leaf;
+    tree_.walk(
+        [&](const Origin& xyz, int32_t edge, const Value&) {
+          facts.voxels += kBrickVoxels * bricks_of_tile(static_cast<uint64_t>(edge));
+          extend(xyz, {xyz[0] + edge - 1, xyz[1] + edge - 1, xyz[2] + edge - 1});
+        },
+        [&](const Origin& xyz, uint64_t at) {
+          kind_.read(buffer_, at, tree_.background(), leaf);
+          for (int32_t i = 0; i < static_cast<int32_t>(kBrickVoxels); ++i) {
+            if (!leaf.is_on[static_cast<size_t>(i)]) continue;
+            const Origin voxel{xyz[0] + i / 64, xyz[1] + i / 8 % 8, xyz[2] + i % 8};
+            extend(voxel, voxel);
+            ++facts.voxels;
+          }
+        });
   }
-  [[gnu::noinline]] void add_leaf(const openvdb::Coord& xyz, const Values& values,
-                                  const Mask& mask) {
-    auto* leaf = grid_->tree().touchLeaf(xyz);
-    std::copy(values.begin(), values.end(), leaf->buffer().data());
-    leaf->setValueMask(mask);
+
+  Bricks bricks(const BrickOptions& options) const {
+    uint64_t count = 0;
+    tree_.walk([&](const Origin&, int32_t edge,
+                   const Value&) { count += bricks_of_tile(static_cast<uint64_t>(edge)); },
+               [&](const Origin&, uint64_t) { ++count; });
+    BrickWriter writer(count, {kChannels<Value>, false}, options);
+    LeafValues leaf;
+    tree_.walk([](const Origin&, int32_t, const Value&) {},
+               [&](const Origin& xyz, uint64_t at) {
+                 kind_.read(buffer_, at, tree_.background(), leaf);
+                 for (size_t i = 0; i < leaf.values.size(); ++i) {
+                   const bool is_zero =
+                       options.background_is_zero && leaf.is_outside[i / kChannels<Value>];
+                   writer.scratch()[i] = is_zero ? 0.0f : leaf.values[i];
+                 }
+                 writer.add(xyz);
+               });
+    tree_.walk(
+        [&](const Origin& xyz, int32_t edge, const Value& value) {
+          float components[3];
+          put(value, components);
+          writer.add_tile(xyz, edge, components);
+        },
+        [](const Origin&, uint64_t) {});
+    return writer.take();
   }
-  openvdb::GridBase::Ptr grid() const { return grid_; }
 
  private:
-  typename Grid::Ptr grid_;
+  template <typename Build>
+  static void read_leaf(const Buffer& buffer, uint64_t at, const Value& background,
+                        LeafValues& leaf) {
+    const auto* data = leaf_at<Build>(buffer, at);
+    for (uint32_t i = 0; i < kBrickVoxels; ++i) {
+      const Value value = data->getValue(i);
+      put(value, leaf.values.data() + kChannels<Value> * i);
+      leaf.is_on[i] = data->mValueMask.isOn(i);
+      leaf.is_outside[i] = !leaf.is_on[i] && value == background;
+    }
+  }
+
+  Buffer buffer_;
+  LeafKind kind_;
+  NanoWalk<Value> tree_;
 };
 
-template <typename Build>
-openvdb::GridBase::Ptr read_as(const Buffer& buffer, uint64_t most_bytes) {
-  using Walk = NanoWalk<Build>;
-  using Value = typename Walk::Value;
-  const Walk tree(buffer);
-  uint64_t bricks = 0;
-  tree.walk(
-      [&](int, const openvdb::Coord&, int edge, const auto&) {
-        const uint64_t along = static_cast<uint64_t>(edge / kBrickEdge);
-        bricks += along * along * along;
-      },
-      [&](const openvdb::Coord&, const auto&) { ++bricks; });
-  check_size(bricks, {ChannelsOf<Value>::value, false}, most_bytes);
-  Making<Value> making(tree.background());
-  tree.walk([&](int level, const openvdb::Coord& xyz, int,
-                const Value& value) { making.add_tile(level, xyz, value); },
-            [&](const openvdb::Coord& xyz, const auto& from) {
-              typename Making<Value>::Values values;
-              typename Making<Value>::Mask mask;
-              for (uint32_t i = 0; i < kBrickVoxels; ++i) {
-                values[i] = open_value(from.getValue(i));
-                mask.set(i, from.mValueMask.isOn(i));
-              }
-              making.add_leaf(xyz, values, mask);
-            });
-  return making.grid();
+void set_transform(const nanovdb::GridData& data, GridFacts& facts) {
+  std::array<double, 16> m{};
+  m[15] = 1.0;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = 0; j < 3; ++j) m[4 * j + i] = data.mMap.mMatD[3 * i + j];
+    m[12 + i] = data.mMap.mVecD[i];
+  }
+  const double determinant = m[0] * (m[5] * m[10] - m[6] * m[9]) -
+                             m[1] * (m[4] * m[10] - m[6] * m[8]) +
+                             m[2] * (m[4] * m[9] - m[5] * m[8]);
+  const bool is_finite = std::all_of(m.begin(), m.end(), [](double x) { return std::isfinite(x); });
+  if (!is_finite || !std::isfinite(determinant) || determinant == 0.0)
+    throw BrokenFile("a grid whose transform has no inverse");
+  facts.index_to_object = m;
 }
 
-/// Calls `use` with the build type that a nanovdb::GridType stands for; false where it is not read.
+const char* kind_of(const nanovdb::GridData& data) {
+  switch (data.mGridClass) {
+    case nanovdb::GridClass::LevelSet:
+      return "level set";
+    case nanovdb::GridClass::FogVolume:
+      return "fog volume";
+    case nanovdb::GridClass::Staggered:
+      return "staggered";
+    default:
+      return "unknown";
+  }
+}
+
+/// Checks the head of a grid against the table of its file.
+const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
+  const auto* data = whole.at<nanovdb::GridData>(0);
+  if (std::memcmp(&data->mMagic, "NanoVDB", 7) != 0)
+    throw BrokenFile("a grid that does not begin like one");
+  if (data->mVersion.getMajor() != nano_major_version())
+    throw BrokenFile("a grid of another version than its file");
+  if (data->mGridSize > whole.size() || data->mGridType != static_cast<nanovdb::GridType>(type))
+    throw BrokenFile("a grid that is not what the file's table says");
+  return *data;
+}
+
+/// Calls `use` with the types of values and of leaves of a nanovdb::GridType; false if it is not
+/// read.
 template <typename Use>
 bool with_build(uint32_t type, Use&& use) {
   switch (static_cast<nanovdb::GridType>(type)) {
     case nanovdb::GridType::Float:
-      use.template operator()<float>();
+      use.template operator()<float, float>();
       return true;
     case nanovdb::GridType::Double:
-      use.template operator()<double>();
+      use.template operator()<double, double>();
       return true;
     case nanovdb::GridType::Vec3f:
-      use.template operator()<nanovdb::Vec3f>();
+      use.template operator()<nanovdb::Vec3f, nanovdb::Vec3f>();
       return true;
     case nanovdb::GridType::Vec3d:
-      use.template operator()<nanovdb::Vec3d>();
+      use.template operator()<nanovdb::Vec3d, nanovdb::Vec3d>();
       return true;
     case nanovdb::GridType::Fp4:
-      use.template operator()<nanovdb::Fp4>();
+      use.template operator()<float, nanovdb::Fp4>();
       return true;
     case nanovdb::GridType::Fp8:
-      use.template operator()<nanovdb::Fp8>();
+      use.template operator()<float, nanovdb::Fp8>();
       return true;
     case nanovdb::GridType::Fp16:
-      use.template operator()<nanovdb::Fp16>();
+      use.template operator()<float, nanovdb::Fp16>();
       return true;
     case nanovdb::GridType::FpN:
-      use.template operator()<nanovdb::FpN>();
+      use.template operator()<float, nanovdb::FpN>();
       return true;
     default:
       return false;
@@ -266,25 +339,32 @@ uint32_t nano_major_version() {
 }
 
 bool is_nano_type_read(uint32_t type) {
-  return with_build(type, []<typename Build>() {});
+  return with_build(type, []<typename Value, typename Build>() {});
 }
 
-openvdb::GridBase::Ptr read_nano(const unsigned char* bytes, uint64_t size, uint32_t type,
-                                 uint64_t most_bytes) {
-  const Buffer whole(bytes, size);
-  const auto* data = whole.at<nanovdb::GridData>(0);
-  if (std::memcmp(&data->mMagic, "NanoVDB", 7) != 0)
-    throw BrokenFile("a grid that does not begin like one");
-  if (data->mVersion.getMajor() != nano_major_version())
-    throw BrokenFile("a grid of another version than its file");
-  if (data->mGridSize > size || data->mGridType != static_cast<nanovdb::GridType>(type))
-    throw BrokenFile("a grid that is not what the file's table says");
-  const Buffer own(bytes, data->mGridSize);
-  openvdb::GridBase::Ptr grid;
-  with_build(type, [&]<typename Build>() { grid = read_as<Build>(own, most_bytes); });
-  grid->setTransform(transform_of(*data));
-  if (const auto kind = class_of(*data); kind != openvdb::GRID_UNKNOWN) grid->setGridClass(kind);
-  return grid;
+GridFacts nano_facts(const unsigned char* bytes, uint64_t size, uint32_t type) {
+  const nanovdb::GridData& data = head_of(Buffer(bytes, size), type);
+  const Buffer own(bytes, data.mGridSize);
+  GridFacts facts;
+  facts.is_read = with_build(type, [&]<typename Value, typename Build>() {
+    using Grid = NanoGrid<Value>;
+    Grid(own, Grid::template kind_of<Build>()).describe(facts);
+  });
+  set_transform(data, facts);
+  facts.kind = kind_of(data);
+  if (facts.kind != "unknown") facts.metadata.emplace_back("class", facts.kind);
+  return facts;
+}
+
+Bricks nano_bricks(const unsigned char* bytes, uint64_t size, uint32_t type,
+                   const BrickOptions& options) {
+  const Buffer own(bytes, head_of(Buffer(bytes, size), type).mGridSize);
+  Bricks made;
+  with_build(type, [&]<typename Value, typename Build>() {
+    using Grid = NanoGrid<Value>;
+    made = Grid(own, Grid::template kind_of<Build>()).bricks(options);
+  });
+  return made;
 }
 
 #else
@@ -297,7 +377,11 @@ bool is_nano_type_read(uint32_t) {
   return false;
 }
 
-openvdb::GridBase::Ptr read_nano(const unsigned char*, uint64_t, uint32_t, uint64_t) {
+GridFacts nano_facts(const unsigned char*, uint64_t, uint32_t) {
+  throw BrokenFile("this build is without NanoVDB");
+}
+
+Bricks nano_bricks(const unsigned char*, uint64_t, uint32_t, const BrickOptions&) {
   throw BrokenFile("this build is without NanoVDB");
 }
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plug-in that reads and writes .vdb and .nvdb files; ``wavecomb.vdb`` is its door."""
+"""The plug-in that reads .vdb and .nvdb files; ``wavecomb.vdb`` is its door."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 version: str
@@ -22,9 +21,3 @@ def bricks(
     path: str, number: int, most_bytes: int, background_is_zero: bool, drops_empty: bool
 ) -> dict[str, Any]:
     """The voxels of the grid at a place in the file. Raises as ``grids``, and TooLarge."""
-
-def write(path: str, grids: Sequence[Mapping[str, Any]]) -> None:
-    """Grids of float32 bricks. Raises ValueError, OSError."""
-
-def write_nano(path: str, grids: Sequence[Mapping[str, Any]], packed: str) -> None:
-    """The same as NanoVDB has them, where the plug-in was built with it. Raises as ``write``."""

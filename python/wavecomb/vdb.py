@@ -8,9 +8,7 @@ asks for a .vdb or .nvdb file.
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib
-import uuid
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb import vdb_writer
 from wavecomb.errors import WavecombError
 from wavecomb.run.isolate import memory
 
@@ -32,13 +31,10 @@ BRING = "tools/setup_openvdb && make build"
 ABSENT = f"OpenVDB, which this build is without ({BRING})"
 """What is said where a .vdb file is asked for and cannot be read."""
 
-BRICK = 8
+BRICK = vdb_writer.BRICK
 """Edge of a brick, in voxels."""
 
 _NUMBERS = {"float", "double", "vec3s", "vec3d", "fp4", "fp8", "fp16", "fpn"}
-
-_UUID = slice(21, 57)
-"""Where a file holds what makes it unique: 36 letters, drawn at random by OpenVDB."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +124,7 @@ class Bricks:
 
 @functools.cache
 def is_there() -> bool:
-    """Whether .vdb files can be read and written, and .nvdb files where ``nano_version`` is one."""
+    """Whether .vdb files can be read, and .nvdb files where ``nano_version`` is a number."""
     try:
         _plugin()
     except ImportError:
@@ -211,55 +207,23 @@ def read(
     )
 
 
-def write(path: str | Path, made: Sequence[Mapping[str, Any]], packed: str = "") -> None:
-    """Writes a file of grids; the same grids give the same bytes.
+def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
+    """Writes a .vdb file of grids, also without OpenVDB; the same grids give the same bytes.
 
     Args:
-        path: Of the file, .vdb or .nvdb; who calls sees to it that it is whole or not there.
-        made: Of each grid ``name``, ``origins``, ``values`` (as of ``Bricks``; of float16 they are
-            kept in 16 bits) and ``index_to_object``; with ``tiles`` bricks of one value become
-            tiles, which takes less room; ``boxes`` (first index, last index, value) are filled
-            before. In an .nvdb file ``bits`` ("4", "8", "16", "n") quantises numbers by leaf; it
-            has no halves.
-        packed: How an .nvdb file is packed: "zip" or "blosc"; "": it is not.
+        path: File to write. The caller sees to it that it is whole or absent.
+        made: Of each grid ``name``, ``origins``, ``values`` (as of ``Bricks``; those of float16
+            are kept in 16 bits) and ``index_to_object``; with ``tiles`` bricks of one value become
+            tiles, which takes less room; ``boxes`` (first index, last index, value), which begin
+            and end at multiples of 8 voxels, are filled before bricks are added.
 
     Raises:
-        WavecombError: There is no OpenVDB, or the file cannot be written.
+        WavecombError: It is another kind of file, arrays do not fit each other, or the file cannot
+            be written.
     """
-    plugin = _needed(path)
-    is_nano = Path(path).suffix.lower() == ".nvdb"
-    if is_nano and not hasattr(plugin, "write_nano"):
-        raise WavecombError(f"{path}: needs NanoVDB, which this build is without ({BRING})")
-    described = [
-        {
-            "name": one["name"],
-            "tiles": bool(one.get("tiles", False)),
-            "boxes": list(one.get("boxes", ())),
-            "half": np.asarray(one["values"]).dtype == np.float16,
-            "bits": str(one.get("bits", "32")),
-            "origins": np.ascontiguousarray(one["origins"], np.int32),
-            "values": np.ascontiguousarray(one["values"], np.float32),
-            "index_to_object": np.ascontiguousarray(one["index_to_object"], np.float64),
-        }
-        for one in made
-    ]
-    with _errors(plugin, path):
-        if is_nano:
-            plugin.write_nano(str(path), described, packed)
-        else:
-            plugin.write(str(path), described)
-            _make_repeatable(Path(path))
-
-
-def _make_repeatable(path: Path) -> None:
-    """Puts a hash of the file for what OpenVDB drew at random."""
-    with path.open("r+b") as file:
-        start = file.read(_UUID.stop)
-        told = hashlib.sha256(start[: _UUID.start])
-        while block := file.read(1 << 20):
-            told.update(block)
-        file.seek(_UUID.start)
-        file.write(str(uuid.UUID(bytes=told.digest()[:16], version=4)).encode())
+    if Path(path).suffix.lower() == ".nvdb":
+        raise WavecombError(f"{path}: .nvdb files are read, not written: name a .vdb file")
+    vdb_writer.write(path, made)
 
 
 @contextmanager

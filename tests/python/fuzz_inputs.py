@@ -20,6 +20,8 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import nvdb
+
 from wavecomb import vdb
 
 Mutation = Callable[[random.Random, bytes], bytes]
@@ -239,7 +241,7 @@ def Material "Look" {
 
 
 @cache
-def vdb_bytes(name: str = "a.vdb", packed: str = "", bits: str = "32") -> bytes:
+def vdb_bytes(name: str = "a.vdb", packed: str = "none", bits: str = "32") -> bytes:
     """Two small grids, one of them with a tile."""
     import numpy as np
 
@@ -254,8 +256,12 @@ def vdb_bytes(name: str = "a.vdb", packed: str = "", bits: str = "32") -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, name)
         halves = values.astype(np.float16)
-        vdb.write(file, [{"name": "density", "values": values, "bits": bits, **bricks},
-                         {"name": "heat", "values": halves, **bricks}], packed)  # fmt: skip
+        made = [{"name": "density", "values": values, "bits": bits, **bricks},
+                {"name": "heat", "values": halves, **bricks}]  # fmt: skip
+        if name.endswith(".nvdb"):
+            nvdb.write(file, made, packed)
+        else:
+            vdb.write(file, made)
         return file.read_bytes()
 
 
@@ -264,7 +270,7 @@ def _nvdb(rng: random.Random, mutate: Mutation) -> bytes:
 
     Most of such a file are zeros, which nobody reads.
     """
-    packed, bits = rng.choice(("", "", "zip", "blosc")), rng.choice(("32", "8", "n"))
+    packed, bits = rng.choice(("none", "none", "zip", "blosc")), rng.choice(("32", "8", "n"))
     data = vdb_bytes("a.nvdb", packed, bits)
     how = rng.random()
     if how < 0.3:
@@ -399,7 +405,8 @@ def make_input(kind: str, rng: random.Random, folder: Path, mutations: list[Muta
 
 INPUTS = (
     "ies", "mtlx", "ply", "obj", "checkpoint", "merge", "costs", "product names",
-    *(("vdb",) if vdb.is_there() else ()), *(("nvdb",) if vdb.nano_version() else ()),
+    *(("vdb",) if vdb.is_there() else ()),
+    *(("nvdb",) if vdb.nano_version() and nvdb.writer() else ()),
 )  # fmt: skip
 BY_COMMAND = ("product names",)
 """Kinds that only the command judges: it is what writes files."""

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import nvdb
 import pytest
 from fuzz_inputs import VOLUME, vdb_bytes
-from parts import needs, only_where
+from parts import needs
 from test_vdb import EDGE, in_order, noise
 
 import wavecomb
@@ -21,7 +22,7 @@ from wavecomb.errors import WavecombError
 
 pytestmark = [
     needs("wavecomb._core"),
-    only_where(bool(vdb.nano_version()), "this build is without NanoVDB"),
+    nvdb.needs_nvdb(),
 ]
 
 GRID_BYTES = 672
@@ -37,12 +38,12 @@ def same(a: vdb.Bricks, b: vdb.Bricks) -> bool:
     return np.array_equal(one[0], two[0]) and one[1].tobytes() == two[1].tobytes()
 
 
-@pytest.mark.parametrize("packed", ["", "zip", "blosc"])
+@pytest.mark.parametrize("packed", ["none", "zip", "blosc"])
 @pytest.mark.parametrize("channels", [1, 3])
 def test_a_grid_is_that_of_the_vdb_file(tmp_path: Path, channels: int, packed: str) -> None:
     made = {"name": "some", **noise(40, channels)}
     vdb.write(tmp_path / "a.vdb", [made])
-    vdb.write(tmp_path / "a.nvdb", [made], packed)
+    nvdb.write(tmp_path / "a.nvdb", [made], packed)
     (one,), (two,) = read_all(tmp_path / "a.vdb"), read_all(tmp_path / "a.nvdb")
     assert same(one, two)
     assert one.index_to_object is not None and two.index_to_object is not None
@@ -55,7 +56,7 @@ def test_a_grid_is_that_of_the_vdb_file(tmp_path: Path, channels: int, packed: s
 def test_several_grids_and_names(tmp_path: Path) -> None:
     path, long = tmp_path / "a.nvdb", "d" * 300
     some = [("density", 3), (long, 4), ("density", 5)]
-    vdb.write(path, [{"name": name, **noise(count, seed=count)} for name, count in some])
+    nvdb.write(path, [{"name": name, **noise(count, seed=count)} for name, count in some])
     heads = vdb.grid_heads(path)
     assert [(head.name, head.index) for head in heads] == [
         ("density", 0),
@@ -77,7 +78,7 @@ def test_several_grids_and_names(tmp_path: Path) -> None:
 def test_quantised_leaves(tmp_path: Path, bits: str, most: float) -> None:
     """Within half a step of the range of a leaf; of "n" within its tolerance for fog."""
     made = noise(20)
-    vdb.write(tmp_path / "a.nvdb", [{"name": "d", "bits": bits, **made}], "blosc")
+    nvdb.write(tmp_path / "a.nvdb", [{"name": "d", "bits": bits, **made}], "blosc")
     (head,) = vdb.grid_heads(tmp_path / "a.nvdb")
     assert head.value_name == f"fp{bits}" and not head.is_vector
     (got,) = read_all(tmp_path / "a.nvdb")
@@ -91,15 +92,15 @@ def test_tiles_come_as_bricks(tmp_path: Path) -> None:
     made = noise(1)
     made["origins"][:] = 4096
     made["boxes"] = [((0, 0, 0), (127, 127, 127), 0.5), ((-8, -8, -8), (-1, -1, -1), 0.25)]
-    for name in ("a.vdb", "a.nvdb"):
-        vdb.write(tmp_path / name, [{"name": "d", "tiles": True, **made}])
+    for name, write in (("a.vdb", vdb.write), ("a.nvdb", nvdb.write)):
+        write(tmp_path / name, [{"name": "d", "tiles": True, **made}])
     (one,), (two,) = read_all(tmp_path / "a.vdb"), read_all(tmp_path / "a.nvdb")
     assert same(one, two) and len(two.origins) == 16**3 + 2
 
 
 def test_the_same_grids_give_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a.nvdb", "b.nvdb"):
-        vdb.write(tmp_path / name, [{"name": "d", "bits": "n", **noise(5)}], "zip")
+        nvdb.write(tmp_path / name, [{"name": "d", "bits": "n", **noise(5)}], "zip")
     assert (tmp_path / "a.nvdb").read_bytes() == (tmp_path / "b.nvdb").read_bytes()
 
 
@@ -115,13 +116,19 @@ def test_a_picture_is_that_of_the_vdb_file(tmp_path: Path) -> None:
     assert pictures[0].max() > 0 and pictures[0].tobytes() == pictures[1].tobytes()
 
 
+def test_such_files_are_read_and_not_written(tmp_path: Path) -> None:
+    with pytest.raises(WavecombError, match=r"a.nvdb: .nvdb files are read, not written"):
+        vdb.write(tmp_path / "a.nvdb", [{"name": "d", **noise(1)}])
+    assert not list(tmp_path.iterdir())
+
+
 # What is broken
 
 
 def broken(tmp_path: Path, change: Any) -> str:
     """What reading says of a file after a change of its bytes."""
     path = tmp_path / "a.nvdb"
-    vdb.write(path, [{"name": "d", **noise(4)}])
+    nvdb.write(path, [{"name": "d", **noise(4)}])
     data = bytearray(path.read_bytes())
     path.write_bytes(change(data) or data)
     with pytest.raises(WavecombError) as error:
@@ -158,7 +165,7 @@ ROOT = HEAD + GRID_BYTES + 64
         (put(14, 7, "<H"), "packed in a way that is not known"),
         (put(0, int.from_bytes(b"NanoVDB0", "big")), "the other byte order"),
         (put(16, 2**60), "sizes of a grid that do not fit"),
-        (put(16 + 32, 9, "<I"), "a type that is not read"),
+        (put(16 + 32, 9, "<I"), "it is of type Tree_half_5_4_3, which is not read"),
         (put(16 + 32, 2, "<I"), "not what the file's table says"),
         (put(HEAD, 0), "does not begin like one"),
         (put(HEAD + 32, 2**63), "not what the file's table says"),
@@ -180,7 +187,7 @@ def test_more_than_there_is_room_for_is_one_line(
     path = tmp_path / "a.nvdb"
     made = noise(1)
     made["boxes"] = [((0, 0, 0), (1023, 1023, 1023), 0.5)]
-    vdb.write(path, [{"name": "density", **made}])
+    nvdb.write(path, [{"name": "density", **made}])
     monkeypatch.setattr("wavecomb.run.isolate.memory.room", lambda: 4_000_000_000)
     with pytest.raises(WavecombError, match=r"107\d million voxels take 4.3 GB; there is room for"):
         read_all(path)
@@ -192,7 +199,7 @@ def test_more_than_there_is_room_for_is_one_line(
 def test_numbers_that_are_none_are_counted(tmp_path: Path) -> None:
     made = noise(2)
     made["values"].flat[:4] = [np.nan, np.inf, -np.inf, -2.0]
-    vdb.write(tmp_path / "a.nvdb", [{"name": "d", **made}])
+    nvdb.write(tmp_path / "a.nvdb", [{"name": "d", **made}])
     (got,) = read_all(tmp_path / "a.nvdb")
     assert (got.not_finite, got.negative, got.least) == (3, 1, -2.0)
     assert got.values.shape == (2, EDGE, EDGE, EDGE)

@@ -127,6 +127,81 @@ def test_tiles_come_as_bricks(tmp_path: Path) -> None:
     assert sizes[1] < sizes[0] / 10
 
 
+def test_tiles_of_all_sizes(tmp_path: Path) -> None:
+    """Of 4096, 128 and 8 voxels a side; a brick in a tile leaves the rest of it as it is."""
+    path = tmp_path / "a.vdb"
+    made = noise(1)
+    made["origins"][:] = (4096 + 128, 0, 0)
+    made["values"][:] = 0.0
+    made["values"][0, 0, 0, 0] = 7.0
+    made["boxes"] = [
+        ((-4096, 0, 0), (-1, 4095, 4095), 0.5),
+        ((4096, 0, 0), (4096 + 255, 127, 127), 2.0),
+        ((0, -8, 0), (7, -1, 7), 3.0),
+    ]
+    vdb.write(path, [{"name": "d", **made}])
+    (info,) = vdb.grids(path)
+    assert info.voxels == 4096**3 + 256 * 128 * 128 + 8**3
+    assert info.box is not None
+    assert info.box.tolist() == [[-4096, -8, 0], [4096 + 255, 4095, 4095]]
+    assert path.stat().st_size < 100_000
+    made["boxes"] = made["boxes"][1:]
+    vdb.write(path, [{"name": "d", **made}])
+    got = vdb.read(path, vdb.grid_heads(path)[0])
+    (leaf,) = np.flatnonzero((got.origins == made["origins"][0]).all(axis=1))
+    assert got.values[leaf].flat[0] == 7.0 and (got.values[leaf].reshape(-1)[1:] == 2.0).all()
+    assert len(got.origins) == 2 * 16**3 + 1 and got.voxels == 512 * len(got.origins)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"origins": np.array([[0, 0, 4]], np.int32)}, "origins must be multiples of 8"),
+        ({"origins": np.zeros((2, 3), np.int32)}, "bricks of another shape"),
+        ({"boxes": [((0, 0, 0), (8, 7, 7), 1.0)]}, "boxes must begin and end at multiples of 8"),
+        ({"index_to_object": np.zeros((4, 4))}, "a transform without an inverse"),
+    ],
+)
+def test_what_cannot_be_written_is_one_line(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(WavecombError, match=f"a.vdb: {said}"):
+        vdb.write(tmp_path / "a.vdb", [{"name": "d", **noise(1), **change}])
+    assert not list(tmp_path.iterdir())
+
+
+def test_writing_needs_no_openvdb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vdb, "_plugin", lambda: pytest.fail("the plug-in was loaded"))
+    vdb.write(tmp_path / "a.vdb", [{"name": "d", **noise(1)}])
+    assert (tmp_path / "a.vdb").stat().st_size > 0
+
+
+@pytest.mark.parametrize("kind", ["int32", "bool", "vec3i"])
+def test_a_type_that_is_not_read_is_named(tmp_path: Path, kind: str) -> None:
+    """Grids of other types are in the table, and reading one is a line that names its type."""
+    path = tmp_path / "a.vdb"
+    vdb.write(path, [{"name": "d", **noise(1)}])
+    data = path.read_bytes()
+    word = b"Tree_float_5_4_3"
+    other = f"Tree_{kind}_5_4_3".encode()
+    at = data.index(word)
+    # The row of the table becomes longer or shorter, and all places behind it move.
+    moved = len(other) - len(word)
+    row = at + len(word) + 4
+    places = struct.pack("<qqq", *(p + moved for p in struct.unpack_from("<qqq", data, row)))
+    data = (
+        data[: at - 4] + struct.pack("<I", len(other)) + other
+        + data[at + len(word) : row] + places + data[row + 24 :]
+    )  # fmt: skip
+    path.write_bytes(data)
+    (head,) = vdb.grid_heads(path)
+    assert head.value_name == kind and not head.is_of_numbers
+    with pytest.raises(WavecombError) as error:
+        vdb.read(path, head)
+    said = str(error.value)
+    assert said.startswith(f"{path}: grid 'd': ") and f"of type {kind}, which is not read" in said
+
+
 def test_what_is_not_finite_is_counted(tmp_path: Path) -> None:
     path = tmp_path / "a.vdb"
     made = noise(2)

@@ -57,10 +57,10 @@ def naive_module() -> ModuleType:
             core = folder.parents[1] / "libwavecomb.a"
             if core.exists() and core.stat().st_mtime > module.stat().st_mtime:
                 # It would take scenes of another layout.
-                raise ImportError("is older than the core: make build-naive")
+                raise ImportError("is older than the core: make build-test-tools")
             sys.path.insert(0, str(folder))
             return importlib.import_module("wavecomb_naive")
-    raise ImportError("is not built: make build-naive")
+    raise ImportError("is not built: make build-test-tools")
 
 
 @dataclass(frozen=True)

@@ -1,21 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nano_write.h"
+/// Writes an .nvdb file of the first grids of .vdb files, by NanoVDB's own code.
+///
+///     wavecomb_nvdb_writer OUT.nvdb PACKED (BITS IN.vdb)...
+///
+/// PACKED is none, zip or blosc. BITS of a number: 32, and of a float grid 4, 8, 16 or n, in which
+/// leaves are quantised. The same grids give the same bytes.
+#include <openvdb/openvdb.h>
 
-#include <stdexcept>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
 
 #if __has_include(<nanovdb/util/OpenToNanoVDB.h>)
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <new>
-#include <system_error>
+#include <stdexcept>
 
-// By their prototypes, as those that unpack (packed.h).
+// By their prototypes: the libraries are OpenVDB's, and their headers need not be installed.
 extern "C" {
 int blosc_compress_ctx(int level, int shuffle, size_t type_size, size_t bytes, const void* from,
                        void* to, size_t most, const char* name, size_t block, int threads);
@@ -23,15 +31,10 @@ int compress(unsigned char* to, unsigned long* size, const unsigned char* from,
              unsigned long from_size);
 unsigned long compressBound(unsigned long size);
 }
-#endif
-
-namespace vdb {
-
-#if __has_include(<nanovdb/util/OpenToNanoVDB.h>)
 
 namespace {
 
-/// Memory of a grid, 0 where nothing is written, so that files repeat.
+/// Memory of a grid, 0 where nothing is written, so that the same grids give the same bytes.
 class ZeroedBuffer {
  public:
   ZeroedBuffer() = default;
@@ -76,14 +79,13 @@ Handle convert(const openvdb::GridBase& grid) {
       static_cast<const Grid&>(grid));
 }
 
-Handle convert(const NanoDesc& desc) {
-  const openvdb::GridBase& grid = *desc.grid;
+Handle convert(const openvdb::GridBase& grid, const std::string& bits) {
   if (grid.isType<openvdb::Vec3SGrid>()) return convert<openvdb::Vec3f, nanovdb::Vec3f>(grid);
-  if (desc.bits == "4") return convert<float, nanovdb::Fp4>(grid);
-  if (desc.bits == "8") return convert<float, nanovdb::Fp8>(grid);
-  if (desc.bits == "16") return convert<float, nanovdb::Fp16>(grid);
-  if (desc.bits == "n") return convert<float, nanovdb::FpN>(grid);
-  if (desc.bits != "32") throw std::invalid_argument("bits must be 4, 8, 16, 32 or n");
+  if (bits == "4") return convert<float, nanovdb::Fp4>(grid);
+  if (bits == "8") return convert<float, nanovdb::Fp8>(grid);
+  if (bits == "16") return convert<float, nanovdb::Fp16>(grid);
+  if (bits == "n") return convert<float, nanovdb::FpN>(grid);
+  if (bits != "32") throw std::invalid_argument("bits must be 4, 8, 16, 32 or n");
   return convert<float, float>(grid);
 }
 
@@ -115,44 +117,52 @@ std::string packed_bytes(const Handle& handle, nanovdb::io::Codec codec) {
   return out;
 }
 
-}  // namespace
-
-bool can_write_nano() {
-  return true;
-}
-
-void write_nano(const std::string& path, const std::vector<NanoDesc>& grids,
-                const std::string& packed) {
+void write(const std::string& path, const std::string& packed,
+           const std::vector<std::pair<std::string, std::string>>& inputs) {
   using nanovdb::io::Codec;
-  if (packed != "" && packed != "zip" && packed != "blosc")
-    throw std::invalid_argument("packed must be zip, blosc or nothing");
+  if (packed != "none" && packed != "zip" && packed != "blosc")
+    throw std::invalid_argument("PACKED must be none, zip or blosc");
   const Codec codec = packed == "zip" ? Codec::ZIP : packed == "blosc" ? Codec::BLOSC : Codec::NONE;
   nanovdb::io::Segment segment(codec);
   std::vector<std::string> all;
-  for (const NanoDesc& desc : grids) {
-    const Handle handle = convert(desc);
+  for (const auto& [bits, input] : inputs) {
+    openvdb::io::File file(input);
+    file.open(false);
+    const Handle handle = convert(*file.readGrid(file.beginName().gridName()), bits);
     segment.add(handle);
     all.push_back(packed_bytes(handle, codec));
     segment.meta.back().fileSize = all.back().size();
   }
   std::ofstream file(path, std::ios::binary);
-  if (file && !grids.empty()) segment.write(file);
+  if (file && !inputs.empty()) segment.write(file);
   for (const std::string& bytes : all)
     file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.close();
-  if (!file) throw std::system_error(errno != 0 ? errno : EIO, std::generic_category());
+  if (!file) throw std::runtime_error(path + " cannot be written");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.size() < 4 || words.size() % 2 != 0) return 2;
+  std::vector<std::pair<std::string, std::string>> inputs;
+  for (size_t i = 2; i < words.size(); i += 2) inputs.emplace_back(words[i], words[i + 1]);
+  try {
+    openvdb::initialize();
+    write(words[0], words[1], inputs);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "wavecomb_nvdb_writer: %s\n", error.what());
+    return 1;
+  }
+  return 0;
 }
 
 #else
 
-bool can_write_nano() {
-  return false;
-}
-
-void write_nano(const std::string&, const std::vector<NanoDesc>&, const std::string&) {
-  throw std::invalid_argument("this build is without NanoVDB");
+int main() {
+  std::fprintf(stderr, "wavecomb_nvdb_writer: NanoVDB's headers were not there\n");
+  return 1;
 }
 
 #endif
-
-}  // namespace vdb

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Description of a grid in a file, and the errors of reading one. Knows neither library.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace vdb {
+
+/// The file is not a volume file, ends too early, or holds what no library writes. The text is one
+/// line that says what is wrong.
+struct BrokenFile : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Reading needs more memory than allowed. The text is one line that says how much.
+struct TooLarge : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Row of a file's table of grids.
+struct Head {
+  std::string name;
+  /// Position among the grids of this name, in the order of the file.
+  uint32_t index = 0;
+  /// OpenVDB's name of the type, "Tree_float_5_4_3"; "Tree_fp8_5_4_3" for quantised grids.
+  std::string type;
+  bool is_half = false;
+};
+
+/// First and last index of an axis-aligned box of voxels, both inclusive.
+struct IndexBox {
+  std::array<int32_t, 3> first{}, last{};
+
+  void extend(const std::array<int32_t, 3>& from, const std::array<int32_t, 3>& to) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (from[axis] < first[axis]) first[axis] = from[axis];
+      if (to[axis] > last[axis]) last[axis] = to[axis];
+    }
+  }
+};
+
+/// Properties of a grid that need no values of voxels.
+struct GridFacts {
+  /// Whether bricks can be made of a grid of this type.
+  bool is_read = false;
+  /// "fog volume", "level set", "staggered" or "unknown".
+  std::string kind;
+  /// Row-major matrix of p' = p M; empty if the transform is not affine.
+  std::optional<std::array<double, 16>> index_to_object;
+  /// 1 or 3 components; empty if the type is not read.
+  std::vector<float> background;
+  /// Number of active voxels.
+  uint64_t voxels = 0;
+  /// Bounds of the active voxels; empty if there are none.
+  std::optional<IndexBox> box;
+  std::vector<std::pair<std::string, std::string>> metadata;
+};
+
+}  // namespace vdb
