@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from pxr import Usd, Vt
 
 from wavecomb.usd.geometry.triangulate import Topology
+from wavecomb.usd.looks.colour_space import colours_in_linear, holds_colour, space_of
+from wavecomb.usd.stage.report import LoadReport
 
 
 class PrimvarError(ValueError):
@@ -26,12 +28,14 @@ class Primvar:
         interpolation: constant, uniform, varying, vertex or faceVarying.
         name: As authored.
         index: (k,) Which authored value each came from; None where no indices are authored.
+        space: The colour space of its values where these are colours; "" means linear Rec.709.
     """
 
     values: NDArray[Any]
     interpolation: str
     name: str
     index: NDArray[np.int32] | None = None
+    space: str = ""
 
 
 def as_array(value: Any) -> NDArray[Any] | None:
@@ -87,7 +91,20 @@ def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> P
             if len(index) and (index.min() < 0 or index.max() >= len(values)):
                 raise PrimvarError(f"indices of primvar {name!r} are out of range")
             values, kept = values[index], np.ascontiguousarray(index, np.int32)
-    return Primvar(values, interpolation, name, kept)
+    space = space_of(attribute) if holds_colour(attribute) else ""
+    return Primvar(values, interpolation, name, kept, space)
+
+
+def in_linear(primvar: Primvar, report: LoadReport, place: object) -> Primvar:
+    """A primvar whose colours are in linear Rec.709; lists a space that is not known."""
+    if not primvar.space or primvar.values.shape[1] < 3:
+        return primvar
+    try:
+        values = colours_in_linear(primvar.values, primvar.space)
+    except ValueError as error:
+        report.missing(f"{error} of primvar {primvar.name!r} (read as linear)", place)
+        values = primvar.values
+    return replace(primvar, values=values, space="")
 
 
 def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:

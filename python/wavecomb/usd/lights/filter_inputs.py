@@ -8,7 +8,9 @@ from typing import Any
 
 from pxr import Usd
 
+from wavecomb.usd.looks.colour_space import Colour, read_colour
 from wavecomb.usd.looks.network import colour, number, word
+from wavecomb.usd.stage.report import LoadReport
 
 _PREFIXES = (
     "inputs:", "inputs:ri:light:", "inputs:ri:lightFilter:", "inputs:arnold:", "arnold:",
@@ -53,10 +55,13 @@ class FilterInputs:
         value = self.value(name, *others)
         return default if value is None else word(value, default)
 
-    def colour(self, name: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Three finite numbers."""
+    def colour(self, name: str, default: Colour, report: LoadReport) -> Colour:
+        """A finite colour in linear Rec.709."""
         value = self.value(name)
-        return default if value is None else colour(value, default)
+        if value is None:
+            return default
+        rgb = colour(value, default)
+        return read_colour(rgb, self.attribute(name), report, self.prim.GetPath())
 
 
 def filter_prims(light: Usd.Prim) -> list[tuple[str, Usd.Prim | None]]:

@@ -14,6 +14,7 @@ from pxr import Usd
 
 from wavecomb.picture.working_space import LUMINANCE
 from wavecomb.usd.lights.filter_inputs import FilterInputs, filter_prims, plain_kind
+from wavecomb.usd.stage.report import LoadReport
 
 GELS = frozenset({"kmalfiltergel", "pxrintmultlightfilter", "pxrintmult"})
 """Kinds of filters that are nothing but gels."""
@@ -56,19 +57,20 @@ class Gel:
         }
 
 
-def gel_of(light: Usd.Prim, time: Usd.TimeCode) -> Gel:
+def gel_of(light: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> Gel:
     """The gels among a light's filters, together; also of what is listed as not supported."""
     gel = Gel()
     for _, prim in filter_prims(light):
         if prim is not None and plain_kind(prim) in _WITH_GEL:
-            gel = _together(gel, _read(FilterInputs(prim, time)))
+            gel = _together(gel, _read(FilterInputs(prim, time), report))
     return gel
 
 
-def _read(inputs: FilterInputs) -> Gel:
+def _read(inputs: FilterInputs, report: LoadReport) -> Gel:
     exposure = min(inputs.number("exposure", 0.0), 200.0)
     power = max(inputs.number("intensity", 1.0), 0.0) * 2.0**exposure
-    r, g, b = (power * max(c, 0.0) for c in inputs.colour("tint", (1.0, 1.0, 1.0)))
+    tint = inputs.colour("tint", (1.0, 1.0, 1.0), report)
+    r, g, b = (power * max(c, 0.0) for c in tint)
     return Gel(
         (r, g, b),
         max(inputs.number("saturation", 1.0), 0.0),

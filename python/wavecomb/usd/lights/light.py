@@ -24,7 +24,7 @@ from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.filters import Filter, FilterReader
 from wavecomb.usd.lights.gels import Gel, gel_of
 from wavecomb.usd.lights.links import LinkTable
-from wavecomb.usd.looks.colour_space import linear_colour, space_of
+from wavecomb.usd.looks.colour_space import Colour, read_colour, space_of
 from wavecomb.usd.looks.network import colour, number
 from wavecomb.usd.looks.texture import UDIM, TextureTable, asset_file, tile_files
 from wavecomb.usd.looks.texture_cache import Image
@@ -148,7 +148,7 @@ class LightReader:
 
     def _common(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
         """Options that lights of all kinds have."""
-        gel = gel_of(prim, self.time)
+        gel = gel_of(prim, self.time, self.report)
         radiance = self._colour(prim, gel)
         if not all(0 <= value < 1e30 for value in radiance):
             self.report.warn("light whose colour is negative or not finite: black", prim.GetPath())
@@ -184,7 +184,8 @@ class LightReader:
         low = -math.inf if row.least is None else row.least
         high = math.inf if row.most is None else row.most
         if row.kind == "colour":
-            return tuple(min(max(float(one), low), high) for one in colour(found, row.default))
+            given = self._linear(prim, row.input, colour(found, row.default))
+            return tuple(min(max(float(one), low), high) for one in given)
         value = number(found, row.default)
         return min(max(abs(value) if row.group == "shape" else value, low), high)
 
@@ -202,10 +203,7 @@ class LightReader:
         # What is not finite stays so, and is warned of.
         bad = math.nan
         authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
-        try:
-            base = linear_colour(base, prim.GetAttribute("inputs:color"))
-        except ValueError as error:
-            self.report.missing(f"{error} (read as linear)", prim.GetPath())
+        base = self._linear(prim, "color", base)
         exposure = min(number(self._get(prim, "exposure", 0.0), bad), 200.0)
         power = number(self._get(prim, "intensity", 1.0), bad) * 2.0**exposure
         tint = (1.0, 1.0, 1.0)
@@ -219,6 +217,10 @@ class LightReader:
         if min(authored) >= 0:  # what the working space cannot hold is at its edge
             r, g, b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
         return (r, g, b)
+
+    def _linear(self, prim: Usd.Prim, name: str, value: Colour) -> Colour:
+        """A colour of an input in linear Rec.709."""
+        return read_colour(value, prim.GetAttribute(f"inputs:{name}"), self.report, prim.GetPath())
 
     def _sphere(
         self, prim: Usd.Prim, options: dict[str, Any], normalize: bool, scale: float
@@ -254,7 +256,9 @@ class LightReader:
         shaping: dict[str, Any] = {}
         focus = read("focus", 0.0)
         if focus > 0:
-            tint = colour(self._get(prim, "shaping:focusTint", (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
+            black = (0.0, 0.0, 0.0)
+            tint = colour(self._get(prim, "shaping:focusTint", black), black)
+            tint = self._linear(prim, "shaping:focusTint", tint)
             shaping["focus"] = focus
             shaping["focus_tint"] = tuple(min(max(float(c), 0.0), 1e6) for c in tint)
         angle = read("cone:angle", 180.0)

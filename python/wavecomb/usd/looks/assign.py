@@ -15,7 +15,7 @@ from wavecomb.usd.geometry.attributes import MAX_WIDTH, Wanted, check_fit
 from wavecomb.usd.geometry.curves import CurveArrays
 from wavecomb.usd.geometry.mesh import find_primvar
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
-from wavecomb.usd.geometry.primvar import PrimvarError, as_integers
+from wavecomb.usd.geometry.primvar import PrimvarError, as_integers, in_linear
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
 from wavecomb.usd.graphs.bind import asks_for, at_other_sets, bound
@@ -309,6 +309,7 @@ class _Primvars:
         primvar = find_primvar(self._draw.prim, name, self._draw.inherited, self._time)
         if primvar is None or len(primvar.values) == 0:
             return None
+        primvar = in_linear(primvar, self._report, self.path)
         if self._mesh.topology is None:  # an implicit shape
             primvar = replace(primvar, values=primvar.values[:1], interpolation="constant")
         check_fit(primvar, self._mesh, width)

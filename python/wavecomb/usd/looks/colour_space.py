@@ -10,6 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd
 
+from wavecomb.usd.stage.report import LoadReport
+
+Colour = tuple[float, float, float]
+
 OCIO_NAMES = {"rec709": "Linear Rec.709 (sRGB)", "acescg": "ACEScg"}
 """What OpenColorIO calls the working spaces."""
 
@@ -64,12 +68,20 @@ def space_of(attribute: Usd.Attribute | None) -> str:
         return ""
     if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
         return str(attribute.GetColorSpace())
-    return str(Usd.ColorSpaceAPI.ComputeColorSpaceName(attribute, None) or "")
+    if attribute.HasColorSpace():
+        return str(attribute.GetColorSpace())
+    # USD's own search gives up at names that it does not know itself, such as srgb_texture.
+    prim = attribute.GetPrim()
+    while prim and not prim.IsPseudoRoot():
+        if prim.HasAPI(Usd.ColorSpaceAPI):
+            name = Usd.ColorSpaceAPI(prim).GetColorSpaceNameAttr().Get()
+            if name:
+                return str(name)
+        prim = prim.GetParent()
+    return ""
 
 
-def linear_colour(
-    colour: tuple[float, float, float], attribute: Usd.Attribute | None
-) -> tuple[float, float, float]:
+def linear_colour(colour: Colour, attribute: Usd.Attribute | None) -> Colour:
     """A colour of an attribute in linear Rec.709.
 
     Raises:
@@ -82,6 +94,37 @@ def linear_colour(
     if space is None:
         raise ValueError(f"colour space {name}")
     return convert_colour(colour, space, "rec709")
+
+
+def read_colour(
+    colour: Colour, attribute: Usd.Attribute | None, report: LoadReport, place: object
+) -> Colour:
+    """A colour of an attribute in linear Rec.709; lists a space that is not known."""
+    try:
+        return linear_colour(colour, attribute)
+    except ValueError as error:
+        report.missing(f"{error} (read as linear)", place)
+        return colour
+
+
+def holds_colour(attribute: Usd.Attribute | None) -> bool:
+    """Whether the type of an attribute is a colour, which has a colour space."""
+    return attribute is not None and attribute.GetTypeName().role == "Color"
+
+
+def colours_in_linear(colours: NDArray[Any], name: str) -> NDArray[np.float32]:
+    """Colours (k, 3 or more) of a space in linear Rec.709; further components stay.
+
+    Raises:
+        ValueError: OpenColorIO does not know the space.
+    """
+    space = canonical(name)
+    if space is None:
+        raise ValueError(f"colour space {name}")
+    out = np.array(colours, np.float32)
+    if space not in (RAW, LINEAR):
+        out[:, :3] = convert(out[None, :, :3], space, "rec709")[0]
+    return out
 
 
 def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float32]:
@@ -110,9 +153,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
 
 
 @functools.cache
-def convert_colour(
-    colour: tuple[float, float, float], source: str, working: str
-) -> tuple[float, float, float]:
+def convert_colour(colour: Colour, source: str, working: str) -> Colour:
     """One colour, as ``convert``."""
     if source in (RAW, OCIO_NAMES[working]):
         return colour

@@ -129,6 +129,8 @@ class _Tracer:
             value = bool(number(value, default))
         elif definition.kind == COLOUR:
             value = colour(value, default)
+            if (space := _other_space(attribute)) is not None:
+                return replace(self._encoded(name, value, attribute, space), definition=definition)
         else:
             value = number(value, default)
         types = Sdf.ValueTypeNames
@@ -151,14 +153,20 @@ class _Tracer:
             return Parameter(parameter, driven_by=self._driver(source))
         attribute = None if source is None else source.attribute
         value = constant(parameter, default if source is None else source.value, default)
-        space = space_of(attribute) if parameter in COLOUR_PARAMETERS else ""
-        if space and canonical(space) not in (LINEAR, RAW):
-            with contextlib.suppress(ValueError):  # the loader says that it does not know it
-                value = linear_colour(value, attribute)
-            return Parameter(parameter, value, reason=f"it is in the colour space {space}")
+        space = _other_space(attribute) if parameter in COLOUR_PARAMETERS else None
+        if space is not None:
+            return self._encoded(parameter, value, attribute, space)
         wide = parameter in COLOUR_PARAMETERS
         usual = Sdf.ValueTypeNames.Color3f if wide else Sdf.ValueTypeNames.Float
         return self._constant(parameter, value, self._path_of(name, attribute), attribute, usual)
+
+    def _encoded(
+        self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
+    ) -> Parameter:
+        """A colour that cannot be edited, since it is written in another space."""
+        with contextlib.suppress(ValueError):  # the loader lists the space
+            value = linear_colour(value, attribute)
+        return Parameter(parameter, value, reason=f"it is in the colour space {space}")
 
     def _constant(
         self,
@@ -244,3 +252,9 @@ def as_stored(value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return tuple(float(np.float32(v)) for v in value)
     return float(np.float32(value))
+
+
+def _other_space(attribute: Usd.Attribute | None) -> str | None:
+    """The colour space of a colour that is not linear Rec.709; None: it is, or says nothing."""
+    space = space_of(attribute)
+    return space if space and canonical(space) not in (LINEAR, RAW) else None

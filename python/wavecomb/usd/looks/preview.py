@@ -13,7 +13,7 @@ from wavecomb.material_table import own_parameters, preview_programs, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.graphs.node import PARAMETERS
 from wavecomb.usd.graphs.surface import Drivers
-from wavecomb.usd.looks.colour_space import SRGB, canonical, linear_colour, space_of
+from wavecomb.usd.looks.colour_space import SRGB, canonical, read_colour, space_of
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
     Source,
@@ -216,11 +216,7 @@ class PreviewReader:
 
     def _linear(self, value: Any, source: Source) -> Any:
         """A colour in linear Rec.709, whatever its attribute holds."""
-        try:
-            return linear_colour(value, source.attribute)
-        except ValueError as error:
-            self.report.missing(f"{error} (read as linear)", self.material.GetPath())
-            return value
+        return read_colour(value, source.attribute, self.report, self.material.GetPath())
 
     def _texture(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """Adds a texture use; gives a constant where there is no image."""

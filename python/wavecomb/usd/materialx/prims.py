@@ -119,8 +119,10 @@ class Prims:
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:
                 port.SetInfo("colorSpace", "raw" if space == "none" else space)
-        elif kind in ("color3", "color4") and space not in _PLAIN_SPACES:
-            port.SetInfo("colorSpace", space)
+        elif kind in ("color3", "color4") and (
+            space not in _PLAIN_SPACES or (space and element.hasColorSpace())
+        ):
+            port.SetInfo("colorSpace", "raw" if space == "none" else space)
         try:
             port.default = usd_value(text, kind)
         except ValueError as error:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute
+from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute, in_linear
 from wavecomb.usd.looks.assign import is_alike
 from wavecomb.usd.looks.material import MaterialTable, bound_materials
 from wavecomb.usd.stage.group import Scope
@@ -182,7 +182,7 @@ class InstanceLooks:
         if len(found.values) != count:
             self._report.warn(f"primvar {name!r} does not match protoIndices: ignored", path)
             return None
-        return np.asarray(found.values, np.float32)
+        return np.asarray(in_linear(found, self._report, path).values, np.float32)
 
     def _constant(self, name: str, value: NDArray[np.float32]) -> Any:
         """A primvar with one value, as a prim above would have it."""

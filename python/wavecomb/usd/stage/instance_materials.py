@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute
+from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute, in_linear
 from wavecomb.usd.looks.colour import quantise
 from wavecomb.usd.looks.material import (
     DEFAULT_COLOUR,
@@ -50,6 +50,7 @@ class InstanceMaterials:
             if primvar.GetPrimvarName() == "displayColor":
                 value = from_attribute(primvar.GetAttr(), "displayColor", self.time)
                 if value is not None and len(value.values):
+                    value = in_linear(value, self.report, placed.prim.GetPath())
                     return self.materials.plain(colour(value.values[0], DEFAULT_COLOUR))
         return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
@@ -71,6 +72,7 @@ class InstanceMaterials:
                 continue
             if primvar is None or primvar.values.shape[1] < 3:
                 continue
+            primvar = in_linear(primvar, self.report, placed.prim.GetPath())
             if len(primvar.values) == 1:
                 return np.full(count, self.materials.plain(primvar.values[0]), np.uint32)
             if len(primvar.values) == count:

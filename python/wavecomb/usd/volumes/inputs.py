@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pxr import Usd, UsdShade
 
+from wavecomb.usd.looks.colour_space import holds_colour, read_colour
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
     colour,
@@ -54,7 +55,10 @@ class Inputs:
         if source is None:
             return Driven(default)
         if source.shader is None:
-            r, g, b = (max(c, 0.0) for c in colour(source.value, default))
+            rgb = colour(source.value, default)
+            if holds_colour(source.attribute):
+                rgb = read_colour(rgb, source.attribute, self.report, self.material.GetPath())
+            r, g, b = (max(c, 0.0) for c in rgb)
             return Driven((r, g, b))
         return self._node(source.shader, name, default, depth + 1)
 

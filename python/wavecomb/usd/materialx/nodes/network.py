@@ -11,7 +11,8 @@ from pxr import Gf, Sdf, Usd, UsdShade
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.usd.graphs.expressions import Expressions
 from wavecomb.usd.graphs.node import Value, fit, numbers
-from wavecomb.usd.graphs.surface import COLOURS
+from wavecomb.usd.graphs.surface import COLOURS, NORMAL
+from wavecomb.usd.looks.colour_space import holds_colour, read_colour
 from wavecomb.usd.looks.network import Source, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes.body import Body
@@ -180,8 +181,12 @@ class Networks:
             return None
         if not 1 <= len(found) <= 4:
             return None
-        of_colour = attribute is not None and str(attribute.GetTypeName()).startswith("color")
-        if self.converts and kind in COLOURS and of_colour and len(found) >= 3:
+        of_colour = holds_colour(attribute) and len(found) >= 3
+        if of_colour and kind != NORMAL:
+            rgb = (found[0], found[1], found[2])
+            rgb = read_colour(rgb, attribute, self.report, self.material.GetPath())
+            found = [*rgb, *found[3:]]
+        if self.converts and kind in COLOURS and of_colour:
             there = from_rec709(np.array(found[:3]), self.textures.working)
             found = [*(float(x) for x in there), *found[3:]]
         return numbers(*found)

@@ -14,6 +14,7 @@ from pxr import Usd, UsdShade
 
 from wavecomb.usd.graphs.node import Value, is_constant, numbers
 from wavecomb.usd.graphs.surface import Drivers, sampled
+from wavecomb.usd.looks.colour_space import holds_colour
 from wavecomb.usd.looks.network import colour, number, source_of
 from wavecomb.usd.looks.surface import Surface
 from wavecomb.usd.materialx.nodes.network import Networks
@@ -144,8 +145,10 @@ class _Layers:
         if name in self._reader.values:
             return self._reader.values[name]
         source = source_of(self._shader, name, self._reader.time)
-        if source is None or source.is_value:
-            return None if source is None else source.value
+        if source is None:
+            return None
+        if source.is_value and not holds_colour(source.attribute):
+            return source.value
         value = self._reader.drivers.value(self._shader, name, parameter)
         if value is None:
             return None
