@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdShade
+from pxr import Gf, Sdf, Usd, UsdShade, Vt
 
 from wavecomb.usd.geometry.attributes import MAX_WIDTH, Wanted, check_fit
 from wavecomb.usd.geometry.curves import CurveArrays
@@ -92,18 +92,19 @@ class Assigner:
         self.table = table
         self.time = time
         self.report = report
+        self._last: tuple[Draw, dict[Sdf.Path, Surface]] | None = None
         self._bound_graphs: dict[tuple[Any, ...], tuple[Surface, Surface]] = {}
 
     def uv_names(self, draw: Draw) -> tuple[str, ...]:
         """Texture coordinates that the bound materials read, first use first."""
         if not draw.subsets:
-            own = () if draw.material is None else self.table.surface(draw.material).uv_names
+            own = () if draw.material is None else self._surface(draw, draw.material).uv_names
             if len(own) <= 1:
                 return own
         names: list[str] = []
         for material in (draw.material, *draw.subset_materials):
             if material is not None:
-                names += self.table.surface(material).uv_names
+                names += self._surface(draw, material).uv_names
         return tuple(dict.fromkeys(names))
 
     def assign(self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None) -> Worn:
@@ -114,7 +115,7 @@ class Assigner:
             mesh: Its arrays.
             otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
         """
-        surface = None if draw.material is None else self.table.surface(draw.material)
+        surface = None if draw.material is None else self._surface(draw, draw.material)
         self._tell_of_hair(draw, mesh)
         if surface is not None and not draw.subsets and is_alike(surface):
             return Worn(self.table.add(surface))
@@ -130,6 +131,51 @@ class Assigner:
             worn.by_face = self._subsets(draw, mesh.topology, worn.material, primvars)
         worn.reads = primvars.read
         return worn
+
+    def _surface(self, draw: Draw, material: UsdShade.Material) -> Surface:
+        """The surface of a material on a gprim."""
+        surface = self.table.surface(material)
+        if not surface.object_reads:
+            return surface
+        if self._last is None or self._last[0] is not draw:
+            self._last = (draw, {})
+        path, known = material.GetPath(), self._last[1]
+        if path not in known:
+            known[path] = self._surface_of_object(draw, material, surface)
+        return known[path]
+
+    def _surface_of_object(
+        self, draw: Draw, material: UsdShade.Material, surface: Surface
+    ) -> Surface:
+        values: dict[str, Any] = {}
+        # A primvar may name another one: twice is enough for that.
+        for _ in range(2):
+            new = [name for name in surface.object_reads if name not in values]
+            if not new:
+                break
+            values |= {name: self._one_value(draw, name) for name in new}
+            given = {name: value for name, value in values.items() if value is not None}
+            surface = self.table.surface_of_object(material, given)
+        return surface
+
+    def _one_value(self, draw: Draw, name: str) -> Any:
+        """The value of a primvar on a gprim; its mean, and listed, where it varies."""
+        path = draw.prim.GetPath()
+        if (text := _text_of(draw, name, self.time)) is not None:
+            return text
+        try:
+            found = find_primvar(draw.prim, name, draw.inherited, self.time)
+        except PrimvarError as error:
+            self.report.warn(f"{error}: ignored", path)
+            return None
+        if found is None or len(found.values) == 0:
+            return None
+        values = in_linear(found, self.report, path).values
+        if not (values == values[0]).all():
+            what = f"varying primvar {name!r} for an input of a texture (its mean is used)"
+            self.report.missing(what, path)
+            return _plain(values.mean(axis=0, dtype=np.float64))
+        return _plain(values[0])
 
     def _tell_of_hair(self, draw: Draw, mesh: MeshArrays | CurveArrays) -> None:
         """Says where hair is worn by what is no tube."""
@@ -157,7 +203,7 @@ class Assigner:
             if not inside.all():
                 self.report.warn("subset names faces that are not there", subset.GetPath())
                 index = index[inside]
-            per_face[index] = self._bound(primvars, self.table.surface(material))
+            per_face[index] = self._bound(primvars, self._surface(draw, material))
             bound = True
         return per_face if bound else None
 
@@ -253,7 +299,7 @@ class Assigner:
 def is_alike(surface: Surface) -> bool:
     """Whether a surface is the same on all gprims."""
     reads = surface.primvars or asks_for(surface.graph) or surface.emission_attributes()
-    return not (reads or surface.texture_uvs)
+    return not (reads or surface.texture_uvs or surface.object_reads)
 
 
 class _Primvars:
@@ -319,6 +365,20 @@ class _Primvars:
             self._report.warn(what, self.path)
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
         return Wanted(replace(primvar, values=values), width or values.shape[1])
+
+
+def _text_of(draw: Draw, name: str, time: Usd.TimeCode) -> str | None:
+    """The text of a constant primvar; None where it is none."""
+    attribute = draw.prim.GetAttribute(f"primvars:{name}")
+    if not attribute or not attribute.HasAuthoredValue():
+        inherited = [p.GetAttr() for p in draw.inherited if p.GetPrimvarName() == name]
+        if not inherited:
+            return None
+        attribute = inherited[0]
+    value = attribute.Get(time)
+    if isinstance(value, (Vt.StringArray, Vt.TokenArray)) and len(value) == 1:
+        value = value[0]
+    return value if isinstance(value, str) else None
 
 
 def _plain(values: Iterable[Any]) -> Any:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -135,6 +135,7 @@ class MaterialTable:
         self._report = report
         self._surfaces: dict[Sdf.Path, Surface] = {}
         self._by_object: dict[int, tuple[UsdShade.Material, Surface]] = {}
+        self._of_objects: dict[tuple[Any, ...], Surface] = {}
         self._ids: dict[str, int] = {}
         self._graph_ids: dict[Graph, int] = {}
         self._surface_ids: dict[int, tuple[Surface, int]] = {}
@@ -177,6 +178,23 @@ class MaterialTable:
             self._report.tally("materials")
         # Holding the object keeps its address from being used again.
         self._by_object[id(material)] = material, surface
+        return surface
+
+    def surface_of_object(
+        self, material: UsdShade.Material, primvars: Mapping[str, Any]
+    ) -> Surface:
+        """The surface of a material on an object, by values of its ``object_reads``."""
+        key = (material.GetPath(), tuple(sorted(primvars.items())))
+        surface = self._of_objects.get(key)
+        if surface is None:
+            surface = self.surface(material)
+            shader = surface_source(material)[1]
+            again = LoadReport()  # the first reading told most of it
+            prim = material.GetPrim()
+            reader = PreviewReader(prim, self.time, self._textures, again, primvars)
+            surface = replace(reader.read(shader), name=surface.name)
+            self._report.absorb_new(again)
+            self._of_objects[key] = surface
         return surface
 
     def add(self, surface: Surface, brightest: float = 0.0) -> int:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from pxr import Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 MAX_DEPTH = 32
 """Shaders in a row before a network is taken for a cycle."""
@@ -56,6 +56,18 @@ def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: An
     """The constant value of an input, or the default."""
     source = source_of(shader, name, time)
     return source.value if source is not None and source.is_value else default
+
+
+def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
+    """The layer of the strongest opinion that has a value: relative paths start there.
+
+    Stronger opinions may hold metadata or a connection alone.
+    """
+    for spec in attribute.GetPropertyStack() if attribute else []:
+        has_default = spec.HasDefaultValue() and not isinstance(spec.default, Sdf.ValueBlock)
+        if has_default or spec.layer.GetNumTimeSamplesForPath(spec.path):
+            return spec.layer
+    return None
 
 
 def shader_id(shader: UsdShade.Shader) -> str:

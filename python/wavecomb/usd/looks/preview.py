@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from wavecomb.usd import mtlx
 from wavecomb.usd.graphs.node import PARAMETERS
 from wavecomb.usd.graphs.surface import Drivers
 from wavecomb.usd.looks.colour_space import SRGB, canonical, read_colour, space_of
+from wavecomb.usd.looks.input_values import InputValues
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
     Source,
@@ -22,7 +24,6 @@ from wavecomb.usd.looks.network import (
     pair,
     shader_id,
     source_of,
-    value_of,
     word,
 )
 from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
@@ -88,13 +89,21 @@ class PreviewReader:
     """Reads one UsdPreviewSurface network."""
 
     def __init__(
-        self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
+        self,
+        material: Usd.Prim,
+        time: Usd.TimeCode,
+        textures: TextureTable,
+        report: LoadReport,
+        primvars: Mapping[str, Any] | None = None,
     ) -> None:
+        """``primvars``: values of the object's primvars that inputs of textures read."""
         self.material = material
         self.time = time
         self.textures = textures
         self.report = report
         self.drivers = Drivers(mtlx.networks(material, time, textures, report))
+        self.values = InputValues(time, report, self.drivers.networks, primvars)
+        self._by_object = True
         self.uv_names = self.drivers.networks.uv_names
         self.textured = self.drivers.textured
         self.primvars: dict[str, str] = {}
@@ -121,9 +130,9 @@ class PreviewReader:
         if program == "dielectric" and "base_color" not in parameters:
             parameters["base_color"] = (1.0, 1.0, 1.0)
         if program == "principled":
-            workflow = value_of(shader, "useSpecularWorkflow", self.time, 0)
+            workflow = self._value(shader, "useSpecularWorkflow", 0)
             parameters["specular_workflow"] = bool(number(workflow, 0))
-            mode = value_of(shader, "opacityMode", self.time, "transparent")
+            mode = self._value(shader, "opacityMode", "transparent")
             parameters["presence"] = word(mode) == "presence"
         for key, parameter in (("wavecomb:eta", "conductor_eta"), ("wavecomb:k", "conductor_k")):
             attribute = self.material.GetAttribute(key)
@@ -144,7 +153,12 @@ class PreviewReader:
             displacement,
             self.drivers.graph(),
             self.texture_uvs,
+            tuple(self.values.reads),
         )
+
+    def _value(self, shader: UsdShade.Shader, name: str, default: Any = None) -> Any:
+        """The value of an input that is the same all over an object."""
+        return self.values.of(shader, name, default, by_object=self._by_object)
 
     def _flat_normal(self, value: Any) -> None:
         """Tilts the whole surface by a constant normal, as a map of one texel."""
@@ -173,6 +187,7 @@ class PreviewReader:
             what = "displacement that the material's displacement output does not lead to: ignored"
             self.report.note(what, self.material.GetPath())
             return None
+        self._by_object = False  # shapes are displaced by one reading of their material
         value = self._input("displacement", source, 0.0)
         texture = self.textured.pop("displacement", None)
         if self.primvars.pop("displacement", None) is not None:
@@ -193,8 +208,8 @@ class PreviewReader:
                 return default
             return self._texture(parameter, shader, source.output, default)
         if shader is not None and identifier.startswith("UsdPrimvarReader_"):
-            name = value_of(shader, "varname", self.time, "")
-            fallback = value_of(shader, "fallback", self.time)
+            name = self._value(shader, "varname", "")
+            fallback = self._value(shader, "fallback")
             if name and parameter == "normal":
                 self.report.missing("normals by a primvar of a material", self.material.GetPath())
             elif name:
@@ -220,10 +235,13 @@ class PreviewReader:
 
     def _texture(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
         """Adds a texture use; gives a constant where there is no image."""
-        time = self.time
-        scale = _four(value_of(shader, "scale", time), _ONES)
-        bias = _four(value_of(shader, "bias", time), _ZEROS)
-        file = source_of(shader, "file", time)
+        scale = _four(self._value(shader, "scale"), _ONES)
+        bias = _four(self._value(shader, "bias"), _ZEROS)
+        file = source_of(shader, "file", self.time)
+        if file is not None and file.shader is not None:
+            by = shader_id(file.shader)
+            self.report.missing(f"UsdUVTexture input file by {by}", shader.GetPath())
+            return default
         path = asset_file(file.value, file.attribute) if file is not None else ""
         image = self.textures.image(path, shader.GetPath())
         channel = output if output in ("rgb", "r", "g", "b", "a") else "rgb"
@@ -243,7 +261,7 @@ class PreviewReader:
                 scale, bias = (2.0, 2.0, 2.0, 1.0), (-1.0, -1.0, -1.0, 0.0)
                 what = "normal map without scale and bias: read as 2 x - 1, linear"
                 self.report.note(what, shader.GetPath())
-        missing = _four(value_of(shader, "fallback", time), (0.0, 0.0, 0.0, 1.0))
+        missing = _four(self._value(shader, "fallback"), (0.0, 0.0, 0.0, 1.0))
         wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
         matrix = self._coordinates(shader, parameter)
         if not any((*matrix[:2], *matrix[3:5])):
@@ -262,7 +280,7 @@ class PreviewReader:
 
     def _wrap(self, shader: UsdShade.Shader, name: str, of_file: str) -> str:
         """A wrap mode, useMetadata being that of the file, else black."""
-        mode = word(value_of(shader, name, self.time), "useMetadata")
+        mode = word(self._value(shader, name), "useMetadata")
         if mode not in ("black", "clamp", "repeat", "mirror", "useMetadata"):
             self.report.warn(
                 f"{name} {mode!r} is no wrap mode: read as useMetadata", shader.GetPath()
@@ -275,7 +293,7 @@ class PreviewReader:
     ) -> str:
         """The colour space of a normal map, which is never sRGB, whatever the stage says."""
         if image.automatic_srgb if space == "auto" else canonical(space) == SRGB:
-            if word(value_of(shader, "sourceColorSpace", self.time)) == "sRGB":
+            if word(self._value(shader, "sourceColorSpace")) == "sRGB":
                 what = "normal map whose sourceColorSpace is sRGB: read as raw"
                 self.report.warn(what, shader.GetPath())
             else:
@@ -285,7 +303,7 @@ class PreviewReader:
 
     def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
         """By sourceColorSpace, else by the colour space of the file's attribute, else auto."""
-        space = word(value_of(shader, "sourceColorSpace", self.time))
+        space = word(self._value(shader, "sourceColorSpace"))
         if space in ("raw", "sRGB"):
             return str(space)
         # An explicit auto asks the file; what the stage says of it goes before a default auto.
@@ -301,7 +319,7 @@ class PreviewReader:
         default: Any,
     ) -> Any:
         """The value that stands for an image that cannot be read."""
-        authored = value_of(shader, "fallback", self.time)
+        authored = self._value(shader, "fallback")
         if authored is not None:
             texel = _four(authored, (0.0, 0.0, 0.0, 1.0))
             value = [t * s + b for t, s, b in zip(texel, scale, bias, strict=True)]
@@ -339,7 +357,7 @@ class PreviewReader:
                 matrix = _compose(matrix, self._transform_2d(node))
                 key = "in"
             elif identifier.startswith("UsdPrimvarReader_float2"):
-                self._note_uv(str(value_of(node, "varname", self.time, "") or "st"), parameter)
+                self._note_uv(str(self._value(node, "varname", "") or "st"), parameter)
                 return matrix
             else:
                 self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
@@ -355,9 +373,9 @@ class PreviewReader:
 
     def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
         """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""
-        angle = math.radians(number(value_of(node, "rotation", self.time), 0.0))
-        sx, sy = pair(value_of(node, "scale", self.time), (1.0, 1.0))
-        tx, ty = pair(value_of(node, "translation", self.time), (0.0, 0.0))
+        angle = math.radians(number(self._value(node, "rotation"), 0.0))
+        sx, sy = pair(self._value(node, "scale"), (1.0, 1.0))
+        tx, ty = pair(self._value(node, "translation"), (0.0, 0.0))
         c, s = math.cos(angle), math.sin(angle)
         return (c * sx, -s * sy, tx, s * sx, c * sy, ty)
 

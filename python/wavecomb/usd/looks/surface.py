@@ -87,6 +87,8 @@ class Surface:
         displacement: How far points move along their normals: a length, or a texture use; None: not
             at all. Part of the mesh's shape, not of the material's look.
         graph: Computes parameters that neither constants nor plain textures give.
+        object_reads: Primvars whose one value on an object changes how textures are read: the
+            material is read again for each value.
     """
 
     name: str
@@ -98,6 +100,7 @@ class Surface:
     displacement: float | dict[str, Any] | None = None
     graph: SurfaceGraph | None = None
     texture_uvs: dict[str, str] = field(default_factory=dict)
+    object_reads: tuple[str, ...] = ()
 
     def key(self) -> str:
         """Equal for surfaces that look alike."""

@@ -19,6 +19,7 @@ from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import memory
 from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.looks.halve import halve
+from wavecomb.usd.looks.network import layer_of_value
 from wavecomb.usd.looks.pixels import ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.looks.texture_cache import Image, TextureCache
 from wavecomb.usd.stage.report import LoadReport
@@ -46,20 +47,8 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
         return path
     if UDIM in value.resolvedPath:
         return value.resolvedPath
-    layer = _layer_of_value(attribute)
+    layer = layer_of_value(attribute)
     return UsdShade.UdimUtils.ResolveUdimPath(value.path, layer) or value.path
-
-
-def _layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
-    """The layer of the strongest opinion that has a value: relative paths start there.
-
-    Stronger opinions may hold metadata or a connection alone.
-    """
-    for spec in attribute.GetPropertyStack() if attribute else []:
-        has_default = spec.HasDefaultValue() and not isinstance(spec.default, Sdf.ValueBlock)
-        if has_default or spec.layer.GetNumTimeSamplesForPath(spec.path):
-            return spec.layer
-    return None
 
 
 def tile_files(pattern: str) -> list[tuple[int, str]]:

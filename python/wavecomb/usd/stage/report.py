@@ -138,6 +138,18 @@ class LoadReport:
         for kind, count in other.counts.items():
             self.tally(kind, count)
 
+    def absorb_new(self, other: LoadReport) -> None:
+        """Adds what another report was told, of places where this one was not told the same."""
+        for known, add, findings in (
+            (self._notes, self.note, other.notes),
+            (self._warnings, self.warn, other.warnings),
+            (self._unsupported, self.missing, other.unsupported),
+        ):
+            for finding in findings:
+                there = known[finding.what]._known if finding.what in known else set()
+                for place in [one for one in finding.all_places if one not in there]:
+                    add(finding.what, place)
+
     def tally(self, kind: str, count: int = 1) -> None:
         """Counts prims of a kind."""
         if count:
