@@ -29,7 +29,8 @@ EXTRAS = {
     "denoise": Extra("denoising", ("pyoidn",)),
     "farm": Extra("farms on Dask, certificates", ("cryptography", "distributed")),
     "bench": Extra(
-        "SSIM, FLIP, z-tests, reports", ("flip_evaluator", "matplotlib", "pandas", "scipy")
+        "SSIM, FLIP, z-tests, reports",
+        ("flip_evaluator", "jinja2", "matplotlib", "pandas", "scipy"),
     ),
 }
 """By name; those for people who work on Wavecomb itself are not here."""

@@ -11,7 +11,7 @@ import pytest
 from bench_results import MACHINE, runs_of, write_folder
 from click.testing import CliRunner
 
-from wavecomb.bench.folders import compare_folders, from_dict
+from wavecomb.bench.folders import compare_folders
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 
@@ -46,7 +46,8 @@ def test_known_ratios_are_found(tmp_path: Path) -> None:
     assert none.verdict != "faster" and none.verdict != "slower"
     assert found.mean_ratio == pytest.approx((program.ratio * none.ratio) ** 0.5)
     assert not found.only_before and "material" in found.only_after[0]
-    assert from_dict(json.loads(json.dumps(found.to_dict()))) == found
+    told = json.loads(json.dumps(found.to_dict()))
+    assert told["changes"][0]["ratio"] == found.changes[0].ratio and told["pictures"] == 32
 
 
 def test_pictures_and_machines_are_compared(tmp_path: Path) -> None:

@@ -6,18 +6,19 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import html5lib
 import numpy as np
 import pytest
-from bench_results import everything, runs_of, write_folder
+from bench_results import everything, policy_rows, runs_of, write_folder
 
-from wavecomb.bench.report import build
-from wavecomb.bench.report_html import nested, number, table
-from wavecomb.bench.report_markdown import LARGEST_PNG, LARGEST_SVG
-from wavecomb.bench.report_parts import Markup, read_report
+from wavecomb.bench.analysis_data import load
+from wavecomb.bench.report import LARGEST_PNG, LARGEST_SVG, build
+from wavecomb.bench.report_facts import equality, warnings_of
+from wavecomb.bench.report_parts import number, table
 from wavecomb.picture.image import read_image
 
 HTML = "{http://www.w3.org/1999/xhtml}"
@@ -172,24 +173,21 @@ def test_markdown_page(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_parts_are_kept_beside_the_page(folder: Path, tree: ElementTree.Element) -> None:
-    """What the window shows is what the page says, section by section and figure by figure."""
-    report = read_report(folder)
-    assert report is not None
-    headings = [text for text in texts(tree, "h2") if text != "Read the figures with care"]
-    assert [section.title for section in report.sections] == headings
-    captions = texts(tree, "figcaption")
-    titles = [title.strip() for title in texts(tree, "p")]
-    for figure in report.figures():
-        assert (folder / "figures" / f"{figure.name}.png").is_file()
-        assert figure.title in titles
-        assert figure.caption.split("n = ")[0] in "".join(captions).replace("\u00a0", " ")
-    told = texts(tree, "li")
-    assert report.figures() and report.warnings and set(report.warnings) <= set(told)
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    for section in report.sections:
-        for part in section.parts:
-            assert not isinstance(part, Markup) or part.html in text
+def test_markdown_says_what_the_page_says(folder: Path, tree: ElementTree.Element) -> None:
+    """Headings, findings, captions of figures, and tables that are not folded."""
+    text = " ".join((folder.parent / "docs" / "made-up.md").read_text(encoding="utf-8").split())
+    silent = ("Read the figures with care", "Words")  # the second holds folded parts only
+    for heading in texts(tree, "h2"):
+        assert heading in silent or f"## {heading}" in text
+    viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]
+    flipped = {name for viewer in viewers for name in texts(viewer, "figcaption")}
+    captions = [text for text in texts(tree, "figcaption") if text not in flipped]
+    for words in (*texts(tree, "li"), *captions, *texts(tree, "h3")):
+        plain = " ".join(words.replace("\u00a0", " ").split()).replace("<", "&lt;")
+        assert plain in text or plain in texts(tree, "h2"), plain
+    folded = {c for part in tree.iter(HTML + "details") for c in texts(part, "caption")}
+    assert folded and not any(f"**{caption}**" in text for caption in folded)
+    assert all(f"**{c}**" in text for c in texts(tree, "caption") if c not in folded)
 
 
 @pytest.mark.slow
@@ -222,18 +220,56 @@ def test_one_run_makes_a_report(tmp_path: Path) -> None:
     assert "no &lt;memory&gt; left" in text
 
 
+@pytest.mark.slow
+def test_text_of_results_cannot_be_markup(tmp_path: Path) -> None:
+    """Names and messages come from files; in no place are they HTML or a new table cell."""
+    rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
+    evil = "<b>|x<i> & 'y' \"z\""
+    for row in rows:
+        row["stage"] = evil
+        row["experiment"] = evil
+    target = tmp_path / "page.md"
+    text = build(write_folder(tmp_path / "r", rows, pictures=True), target).read_text("utf-8")
+    html5lib.HTMLParser(strict=True).parse(text)
+    assert "<b>" not in text and "&lt;b&gt;|x&lt;i&gt; &amp;" in text
+    assert "<b>" not in target.read_text("utf-8")
+    assert "| &lt;b>\\|x&lt;i> & 'y' \"z\" |" in target.read_text("utf-8")
+
+
 def test_parts() -> None:
     assert [number(v) for v in (0.0, 123456.0, 0.5, 1e-9)] == ["0", "123,000", "0.500", "1.00e-09"]
-    html = table("Caption", ["a", "b"], [["x", "1"], ["x", "2"], ["y & z", "3"]])
-    assert 'rowspan="2" scope="rowgroup">x</th>' in html
-    assert "y &amp; z" in html
-    assert nested({"a": {"b": [1, 2]}, "empty": {}, "none": None}).count("<dt>") == 2
+    made = table("Caption", ["a", "b"], [["x", "1"], ["x", "2"], ["y", "3"]])
+    assert [(head, len(rows)) for head, rows in made.groups()] == [("x", 2), ("y", 1)]
+    assert made.summary == "" and not made.is_word(1)
+    assert table("Long", ["a"], [["x"]] * 61).summary == "Long (61 rows)"
+
+
+def test_warnings(tmp_path: Path) -> None:
+    rows = policy_rows(repetitions=2)
+    rows[1] |= {"status": "failed", "error": "no light"}
+
+    def of(rows: list, **machine: object) -> list[str]:
+        found = load(write_folder(tmp_path / "r", rows))
+        return warnings_of(replace(found, machine=machine))
+
+    assert any("ran only once" in line for line in of(rows))
+    assert any("1 runs failed" in line and "no light" in line for line in of(rows))
+    assert "changed after the commit" in of(rows, dirty=True)[-1]
+    noisy = [row | {"noisy": True} for row in rows]
+    assert any("71 of 71 runs were disturbed" in line for line in of(noisy))
+    assert any("vary" in line for line in of(noisy, noise={"lines": ["equal runs vary"]}))
+    rows[0]["picture_sha256"] = "1" * 64
+    assert of(rows)[0].startswith("Pictures that must be equal differ, in 1 groups")
+    count, different = equality(load(tmp_path / "r").runs)
+    assert count > 1 and len(different) == 1
+    rows = [row | {"time_limit": 5.0} for row in rows]
+    assert equality(load(write_folder(tmp_path / "r", rows)).runs) == (0, [])
 
 
 def test_nothing_heavy_is_imported_for_a_render() -> None:
     code = (
         "import sys, wavecomb.cli, wavecomb.picture.compare, wavecomb.bench; "
-        "print([m for m in ('pandas', 'matplotlib', 'scipy') if m in sys.modules])"
+        "print([m for m in ('pandas', 'matplotlib', 'scipy', 'jinja2') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

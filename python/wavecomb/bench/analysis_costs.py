@@ -6,8 +6,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wavecomb.bench.analysis_interval import RESAMPLES, SEED
+from wavecomb.bench.analysis_interval import bca
 from wavecomb.bench.oracle import ORACLES
 from wavecomb.extras import needed
 
@@ -21,50 +22,44 @@ PREDICTIONS = {
     "predicted_ns": "moving average, after the last pass",
 }
 LEAST_RECORDS = 256
-"""Timed records that a material needs to be in the comparison."""
+"""Timed records that a material needs to enter the comparison."""
 
 
 def material_costs(results: Results) -> pd.DataFrame:
-    """One row for each run and material that was timed often enough.
+    """Returns one row per run and material with enough timed records.
 
     Columns: ``run_id``, ``stage``, ``policy``, ``lanes``, ``repetition``, ``material``,
-    ``program``, ``timed_records``, ``measured_ns``, ``calibrated_ns``, ``predicted_ns``; ns a
-    record.
+    ``program``, ``timed_records``, ``measured_ns``, ``calibrated_ns``, ``predicted_ns``; times in
+    ns per record. The oracles are left out: their costs are no predictions.
     """
     pandas = needed("pandas", "the analysis")
-    settings = results.runs.set_index("run_id")[["stage", "policy", "lanes", "repetition"]]
-    known = settings.to_dict("index")
-    rows = []
-    for record in results.records():
-        run_id = record["row"]["run_id"]
-        of_run = known.get(run_id)
-        if of_run is None or of_run["policy"] in ORACLES:  # their costs are no predictions
-            continue
-        for entry in (record.get("stats") or {}).get("materials", ()):
-            if entry.get("timed_records", 0) >= LEAST_RECORDS and entry.get("ns_per_record", 0) > 0:
-                rows.append(
-                    {
-                        "run_id": run_id,
-                        **of_run,
-                        "material": entry.get("name", ""),
-                        "program": entry.get("program", ""),
-                        "timed_records": entry["timed_records"],
-                        "measured_ns": entry["ns_per_record"],
-                        **{name: entry.get(name) or np.nan for name in PREDICTIONS},
-                    }
-                )
-    return pandas.DataFrame(rows)
+    found = pandas.DataFrame(
+        {"run_id": record["row"]["run_id"], **entry}
+        for record in results.records()
+        for entry in (record.get("stats") or {}).get("materials", ())
+    )
+    renamed = {"name": "material", "ns_per_record": "measured_ns"}
+    columns = ["material", "program", "timed_records", "measured_ns", *PREDICTIONS]
+    found = found.rename(columns=renamed).reindex(columns=["run_id", *columns])
+    settings = results.runs[["run_id", "stage", "policy", "lanes", "repetition"]]
+    settings = settings[~settings["policy"].isin(ORACLES)]
+    found = settings.merge(found, on="run_id")
+    numbers = ["timed_records", "measured_ns", *PREDICTIONS]
+    found[numbers] = found[numbers].astype(np.float64)
+    found[[*PREDICTIONS]] = found[[*PREDICTIONS]].replace(0.0, np.nan)
+    timed = (found["timed_records"] >= LEAST_RECORDS) & (found["measured_ns"] > 0)
+    return found[timed].reset_index(drop=True)
 
 
 def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
-    """How good predictions are, materials weighted by their timed records.
+    """Computes the quality of predictions, materials weighted by their timed records.
 
         r2 = 1 - sum w (measured - predicted)^2 / sum w (measured - mean)^2
         slope, intercept: of the weighted least squares line measured = intercept + slope predicted
 
-    A perfect prediction has r2 = 1, slope 1, intercept 0. r2 is below 0 where the mean would have
-    predicted better. Intervals resample materials, over all runs of each: materials are what a new
-    scene would bring others of.
+    A perfect prediction has r2 = 1, slope 1, intercept 0. r2 is negative if the mean would have
+    predicted better. Intervals resample materials, each with all its runs, since a new scene would
+    bring other materials.
 
     Returns:
         ``r2``, ``slope``, ``intercept`` (ns), ``mean_error`` (relative, weighted), each with
@@ -73,32 +68,31 @@ def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
     kept = costs.dropna(subset=[prediction])
     if kept.empty:
         return {}
-    names, index = np.unique(
-        (kept["stage"] + "|" + kept["material"]).to_numpy(str), return_inverse=True
+    x, y, w = (kept[name] for name in (prediction, "measured_ns", "timed_records"))
+    moments = needed("pandas", "the analysis").concat(
+        [w, w * x, w * y, w * x * x, w * x * y, w * y * y, w * (x - y).abs() / y], axis=1
     )
-    if len(names) < 3:
+    sums = moments.groupby([kept["stage"], kept["material"]]).sum().to_numpy(np.float64)
+    if len(sums) < 3:
         return {}
-    x, y = kept[prediction].to_numpy(float), kept["measured_ns"].to_numpy(float)
-    w = kept["timed_records"].to_numpy(float)
-    moments = np.stack([w, w * x, w * y, w * x * x, w * x * y, w * y * y, w * np.abs(x - y) / y])
-    per_material = np.stack([np.bincount(index, m, len(names)) for m in moments], axis=1)
-    rng = np.random.default_rng(SEED)
-    weights = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
-    value = _line(per_material.sum(axis=0))
-    resampled = _line(weights @ per_material)
-    result: dict[str, Any] = {"materials": len(names), "runs": int(kept["run_id"].nunique())}
+
+    def of_materials(index: NDArray[np.intp], axis: int = -1) -> NDArray[np.float64]:
+        return _line(np.moveaxis(sums[index].sum(axis=-2), -1, 0))
+
+    value = of_materials(np.arange(len(sums)))
+    low, high = bca(of_materials, len(sums), widened=False)
+    result: dict[str, Any] = {"materials": len(sums), "runs": int(kept["run_id"].nunique())}
     for k, name in enumerate(("r2", "slope", "intercept", "mean_error")):
-        ends = np.nanquantile(resampled[:, k], [0.025, 0.975])
-        result |= {name: float(value[k]), f"{name}_low": float(ends[0])}
-        result[f"{name}_high"] = float(ends[1])
+        result |= {name: float(value[k])}
+        result |= {f"{name}_low": float(low[k]), f"{name}_high": float(high[k])}
     return result
 
 
-def _line(sums: np.ndarray) -> np.ndarray:
-    """r2, slope, intercept and mean error from weighted sums, (..., 7) -> (..., 4)."""
-    w, wx, wy, wxx, wxy, wyy, we = np.moveaxis(np.asarray(sums, np.float64), -1, 0)
+def _line(sums: NDArray[np.float64]) -> NDArray[np.float64]:
+    """r2, slope, intercept and mean error, (4, ...), from weighted sums, (7, ...)."""
+    w, wx, wy, wxx, wxy, wyy, we = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         total = wyy - wy**2 / w
         slope = (wxy - wx * wy / w) / (wxx - wx**2 / w)
         r2 = 1.0 - (wyy - 2 * wxy + wxx) / total
-        return np.stack([r2, slope, (wy - slope * wx) / w, we / w], axis=-1)
+        return np.stack([r2, slope, (wy - slope * wx) / w, we / w])

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -62,7 +62,6 @@ class Results:
         failed: The others.
         machine: machine.json; empty where there is none.
         suite_text: suite.toml; "" where there is none.
-        rows: All of runs.csv, typed.
     """
 
     folder: Path
@@ -70,7 +69,6 @@ class Results:
     failed: pd.DataFrame
     machine: dict[str, Any]
     suite_text: str
-    rows: Sequence[dict[str, Any]]
 
     def experiments(self) -> list[tuple[str, pd.DataFrame]]:
         """Names and runs, in the order of the suite."""
@@ -125,7 +123,6 @@ def load(folder: Path) -> Results:
         failed=frame[~ended].reset_index(drop=True),
         machine=_json(folder / "machine.json"),
         suite_text=_text(folder / "suite.toml"),
-        rows=rows,
     )
 
 
@@ -151,9 +148,10 @@ def cells(
 
 
 def rounds(group: pd.DataFrame, by: str, metric: str) -> tuple[list[Any], NDArray[np.float64]]:
-    """Levels and their values, (rounds, levels), NaN where a run is missing."""
+    """Returns levels and their values, (rounds, levels), NaN where a run is missing."""
     table = group.pivot_table(index="repetition", columns=by, values=metric, aggfunc="mean")
-    return in_order(by, table.columns), table[in_order(by, table.columns)].to_numpy(np.float64)
+    levels = in_order(by, list(table.columns))
+    return levels, table[levels].to_numpy(np.float64)
 
 
 def baseline_of(factor: str, levels: Sequence[Any]) -> Any:
@@ -172,44 +170,69 @@ def in_order(factor: str, levels: Sequence[Any]) -> list[Any]:
     return sorted(levels, key=lambda level: (level != BASELINES.get(factor), level))
 
 
-def label(cell: dict[str, Any], varying: Sequence[str]) -> str:
-    """A short name of a cell: the settings that tell it from the others of its table."""
-    words = {
-        "lanes": lambda v: f"{v:.0f} lane{'s' if v != 1 else ''}",
-        "spp": lambda v: f"{v:.0f} spp",
-        "time_limit": lambda v: f"{v:g} s",
-        "threads": lambda v: f"{v:.0f} thread{'s' if v != 1 else ''}",
-        "wave_size": lambda v: f"waves of {short_count(v)}",
-        "width": lambda v: f"{v:.0f} wide",
-        "roulette": lambda v: f"roulette {v}",
-        "ray_order": lambda v: f"rays by {v}",
-        "shadow_order": lambda v: f"shadow rays by {v}",
-        "factor_value": lambda v: f"asked for {short_count(v)}",
-    }
-    parts = []
-    for name in varying:
-        value = cell.get(name)
-        if value is None or value == "" or value != value:
-            continue
-        parts.append(words[name](value) if name in words else str(value))
+_LABELS: dict[str, Callable[[Any], str]] = {
+    "lanes": lambda v: f"{v:.0f} lane{'s' if v != 1 else ''}",
+    "spp": lambda v: f"{v:.0f} spp",
+    "time_limit": lambda v: f"{v:g} s",
+    "threads": lambda v: f"{v:.0f} thread{'s' if v != 1 else ''}",
+    "wave_size": lambda v: f"waves of {short_count(v)}",
+    "width": lambda v: f"{v:.0f} wide",
+    "roulette": lambda v: f"roulette {v}",
+    "ray_order": lambda v: f"rays by {v}",
+    "shadow_order": lambda v: f"shadow rays by {v}",
+    "factor_value": lambda v: f"asked for {short_count(v)}",
+}
+
+
+def label(cell: dict[str, Any], names: Sequence[str]) -> str:
+    """Returns a short name of a cell from the settings ``names``."""
+    known = [(name, cell.get(name)) for name in names]
+    parts = [
+        _LABELS.get(name, str)(value)
+        for name, value in known
+        if value is not None and value != "" and value == value
+    ]
     return ", ".join(parts) or str(cell.get("stage", "all"))
 
 
-def varying(found: Sequence[dict[str, Any]]) -> list[str]:
-    """Settings in which cells differ, but for the experiment; "stage" where they differ in none.
+def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
+    """Returns the settings in which cells differ, except the experiment; else "stage".
 
-    The value of a factor is named where nothing else tells cells apart: a renderer may have used
-    less than it was given, as of waves that are larger than a picture.
+    The value of a factor is included if nothing else distinguishes cells: a renderer may have used
+    less than the suite asked for, as with waves that are larger than an image.
     """
-    told = ("experiment", "height", "factor", "factor_value")  # by the heading, or by others
-    names = [name for name in (*SETTINGS, "variant") if name not in told]
-    differ = [n for n in names if len({str(cell.get(n, "")) for cell in found}) > 1]
+    redundant = ("experiment", "height", "factor", "factor_value")  # in the heading, or implied
+    names = [name for name in (*SETTINGS, "variant") if name not in redundant]
+    differ = [n for n in names if len({str(cell.get(n, "")) for cell in cells}) > 1]
     names = differ if "stage" in differ else ["stage", *differ]
 
     def apart(keys: Sequence[str]) -> int:
-        return len({tuple(str(cell.get(key, "")) for key in keys) for cell in found})
+        return len({tuple(str(cell.get(key, "")) for key in keys) for cell in cells})
 
     return names if apart(names) == apart([*names, "factor_value"]) else [*names, "factor_value"]
+
+
+def labelled(
+    rows: list[dict[str, Any]],
+    only: Sequence[str] = (),
+    column: str = "cell",
+    default: str = "all",
+    leave_out: Sequence[str] = (),
+) -> pd.DataFrame:
+    """Returns a table of rows with the short names of their cells.
+
+    Args:
+        rows: Rows with the settings of their cells.
+        only: Settings to use; empty means all.
+        column: Column for the names.
+        default: Name if no setting varies.
+        leave_out: Settings that are no part of a cell.
+    """
+    names = varying(rows) if rows else []
+    names = [n for n in names if n not in leave_out and (not only or n in only)]
+    for row in rows:
+        row[column] = label(row, names) if names else default
+    return needed("pandas", "the analysis").DataFrame(rows)
 
 
 def short_count(value: float) -> str:

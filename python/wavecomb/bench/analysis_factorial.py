@@ -7,16 +7,9 @@ import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wavecomb.bench.analysis_data import baseline_of, in_order, short_count
-from wavecomb.bench.analysis_interval import (
-    Array,
-    bootstrap,
-    holm,
-    paired_p,
-    verdict,
-)
+from wavecomb.bench.analysis_interval import Array, bootstrap, holm, paired_p, verdict
 from wavecomb.extras import needed
 
 if TYPE_CHECKING:
@@ -24,147 +17,109 @@ if TYPE_CHECKING:
 
 FACTORS = ("policy", "lanes", "wave_size", "roulette", "ray_order", "shadow_order")
 _UNITS = ("stage", "renderer", "width", "height", "spp", "threads", "max_depth")
+_WORDS = {"wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"}
 
 
 def factors_of(runs: pd.DataFrame) -> list[str]:
-    """The factors that an experiment varies."""
+    """Returns the factors that an experiment varies."""
     return [name for name in FACTORS if runs[name].nunique() > 1]
 
 
-def effects(runs: pd.DataFrame, metric: str, *, interactions: bool = True) -> pd.DataFrame:
-    """What each level of each factor does, over all combinations of the others.
+def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Computes the effect of each level of each factor, over all combinations of the others.
 
-    Main effect of level l of factor F against its baseline b, over the combinations c of all other
-    factors (and stages) in which both were run:
+    The main effect of level l of factor F against its baseline b, over the combinations c of all
+    other factors (and stages) in which both were run, is
 
         effect(F = l) = exp(mean over c of [log T(l, c) - log T(b, c)])
 
-    and the interaction of F = l with G = m, the factor by which G = m changes it:
+    and the interaction of F = l with G = m, the factor by which G = m changes it, is
 
         effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
 
-    over those combinations of the rest in which all four were run: in a suite that is no full
-    factorial, what differs besides must not count as interaction.
+    over those combinations of the rest in which all four were run: where the suite is no full
+    factorial, other differences must not count as interaction.
 
-    With T the mean over rounds; intervals by resampling rounds, p by the same figures of single
-    rounds, corrected after Holm over all effects of the table.
+    T is the mean over rounds. Intervals resample rounds; p-values test the effects of single
+    rounds and are corrected after Holm over all effects of the table.
 
     Returns:
-        One row for each effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``,
-        ``baseline``, ``other``, ``other_level`` (interactions), ``name``, ``cells`` (pairs that it
-        is a mean of), ``n``, ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
+        One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``,
+        ``baseline``, ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of
+        pairs), ``n``, ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
     """
     pandas = needed("pandas", "the analysis")
     runs = runs.dropna(subset=[metric])
-    factors = factors_of(runs)
     keys = [*FACTORS, *_UNITS]
     runs = runs.assign(**{key: runs[key].astype(object).fillna("") for key in keys})
     table = runs.pivot_table(index="repetition", columns=keys, values=metric, aggfunc="mean")
-    if table.empty or not factors:
-        return pandas.DataFrame()
-    points = [dict(zip(keys, column, strict=True)) for column in table.columns]
-    place = {tuple(point[key] for key in keys): k for k, point in enumerate(points)}
-    levels = {f: in_order(f, sorted({point[f] for point in points})) for f in factors}
-    base = {f: baseline_of(f, levels[f]) for f in factors}
-    terms: list[dict[str, Any]] = []
-    contrasts: list[NDArray[np.float64]] = []
-
-    def contrast(of: dict[str, Any]) -> NDArray[np.float64]:
-        """Weights of the points that give the mean contrast of log T over one or two factors.
-
-        A difference for one factor, a difference of differences for two; all 0 where no
-        combination of the others has all the points that it takes.
-        """
-        weights = np.zeros(len(points))
-        count = 0
-        for point in points:
-            if any(point[factor] != level for factor, level in of.items()):
-                continue
-            corners = [
-                ({**point, **{f: base[f] for f in at_base}}, (-1.0) ** len(at_base))
-                for n in range(len(of) + 1)
-                for at_base in itertools.combinations(of, n)
-            ]
-            found = [place.get(tuple(corner[key] for key in keys)) for corner, _ in corners]
-            if None not in found:
-                for where, (_, sign) in zip(found, corners, strict=True):
-                    weights[where] += sign
-                count += 1
-        return weights / count if count else weights
-
-    for factor in factors:
-        for level in levels[factor]:
-            if base[factor] is None or level == base[factor]:
-                continue
-            main = contrast({factor: level})
-            if main.any():
-                terms.append(_term("main", factor, level, base[factor]))
-                contrasts.append(main)
-    for factor, other in itertools.combinations(factors, 2) if interactions else ():
-        for level, other_level in itertools.product(levels[factor], levels[other]):
-            if None in (base[factor], base[other]):
-                continue
-            if level == base[factor] or other_level == base[other]:
-                continue
-            both = contrast({factor: level, other: other_level})
-            if both.any():
-                terms.append(_term("interaction", factor, level, base[factor], other, other_level))
-                contrasts.append(both)
-    return pandas.DataFrame(_rows(terms, np.array(contrasts), table.to_numpy(np.float64)))
+    levels = {f: in_order(f, sorted(runs[f].unique())) for f in factors_of(runs)}
+    base = {f: baseline_of(f, known) for f, known in levels.items()}
+    others = [
+        (f, level) for f, known in levels.items() if base[f] is not None
+        for level in known if level != base[f]
+    ]  # fmt: skip
+    pairs = [pair for pair in itertools.combinations(others, 2) if pair[0][0] != pair[1][0]]
+    # An effect is linear in the logarithms: applied to unit vectors it gives its weights.
+    unit = pandas.DataFrame(np.eye(table.shape[1]), columns=table.columns)
+    terms, weights = [], []
+    for term in ((one,) for one in others), pairs:
+        for of in term:
+            found = unit
+            for factor, level in of:
+                found = _difference(found, factor, level, base[factor])
+            if found.shape[1]:
+                weights.append(found.mean(axis=1).to_numpy())
+                terms.append(_term(of, base, found.shape[1] * len(of)))
+    return pandas.DataFrame(_rows(terms, weights, table.to_numpy(np.float64)))
 
 
-def _term(
-    kind: str, factor: str, level: Any, base: Any, other: str = "", other_level: Any = ""
-) -> dict[str, Any]:
-    name = f"{_words(factor)} {_level(level)}"
-    if other:
-        name += f" × {_words(other)} {_level(other_level)}"
+def _difference(table: pd.DataFrame, factor: str, level: Any, base: Any) -> pd.DataFrame:
+    """Differences between two levels of a factor, over the combinations that have both."""
+    columns = table.columns.names
+    if level not in table.columns.unique(factor) or base not in table.columns.unique(factor):
+        return table.iloc[:, :0].droplevel(columns.index(factor), axis=1)
+    found = table.xs(level, axis=1, level=factor) - table.xs(base, axis=1, level=factor)
+    return found.dropna(axis=1)
+
+
+def _term(of: tuple[tuple[str, Any], ...], base: dict[str, Any], cells: int) -> dict[str, Any]:
+    (factor, level), (other, other_level) = of[0], of[1] if len(of) > 1 else ("", "")
     return {
-        "kind": kind,
+        "kind": "interaction" if other else "main",
         "factor": factor,
         "level": level,
-        "baseline": base,
+        "baseline": base[factor],
         "other": other,
         "other_level": other_level,
-        "name": name,
+        "name": " × ".join(
+            f"{_WORDS.get(f, f)} {value if isinstance(value, str) else short_count(float(value))}"
+            for f, value in of
+        ),
+        "cells": cells,
     }
 
 
-def _rows(terms: list[dict[str, Any]], contrasts: Array, values: Array) -> list[dict[str, Any]]:
-    """Figures of all effects at once: every one is a weighted sum of logarithms."""
-    used = contrasts != 0
+def _rows(terms: list[dict[str, Any]], weights: list[Array], values: Array) -> list[dict[str, Any]]:
+    """Estimates all effects at once, each from the columns that have a weight."""
 
     def statistic(means: Array) -> Array:
         logs = np.log(means)
-        if not np.isnan(logs).any():
-            return np.exp(logs @ contrasts.T)
-        known = np.where(np.isnan(logs), 0.0, logs) @ contrasts.T
-        touched = np.isnan(logs).astype(float) @ used.T.astype(float) > 0
-        return np.exp(np.where(touched, np.nan, known))
+        return np.exp(np.stack([logs[..., w != 0] @ w[w != 0] for w in weights], axis=-1))
 
-    found = bootstrap(values, statistic, positive=True)
+    if not terms:
+        return []
     per_round = statistic(values)
-    p_values = holm([paired_p(per_round[:, k], np.ones(len(values))) for k in range(len(terms))])
+    p_values = holm([paired_p(effect, np.ones(len(values))) for effect in per_round.T])
     return [
         {
             **term,
-            "cells": int((weights > 0).sum()),
             "n": estimate.n,
-            "ratio": estimate.value,
-            "low": estimate.low,
-            "high": estimate.high,
+            **estimate.columns("ratio"),
             "p": p,
             "verdict": verdict(estimate, p, ("less", "more")),
         }
-        for term, weights, estimate, p in zip(terms, contrasts, found, p_values, strict=True)
+        for term, estimate, p in zip(
+            terms, bootstrap(values, statistic, positive=True), p_values, strict=True
+        )
     ]
-
-
-def _words(factor: str) -> str:
-    return {"wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"}.get(
-        factor, factor
-    )
-
-
-def _level(level: Any) -> str:
-    return level if isinstance(level, str) else short_count(float(level))

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Intervals for statistics of mean times: a bootstrap over rounds; corrections for many tests.
+"""Intervals and verdicts for statistics of mean times, computed by SciPy.
 
-Repetition k of every configuration ran in one round, so what shook the machine then shook them all.
-Rounds are therefore resampled whole: a ratio keeps what its two sides have in common.
+Repetition k of every configuration ran in one round, and a disturbance of the machine affects all
+runs of a round. Rounds are therefore resampled as a whole, so that a ratio keeps what its two sides
+have in common.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -24,18 +26,18 @@ RESAMPLES = 4000
 SEED = 20260117
 SAME_WITHIN = 0.01
 LEAST_FOR_BOOTSTRAP = 8
-"""Rounds. Resamples of n values never leave their range, which covers 1 - 2^(1 - n) at best."""
+"""Rounds. Resamples of n values stay within their range, which covers 1 - 2^(1 - n) at most."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure with its interval.
+    """A value with its 95 % interval.
 
     Attributes:
-        value: Of the means over all rounds.
-        low: Of the 95 % interval; NaN where there are fewer than two rounds.
-        high: Likewise.
-        n: Rounds.
+        value: Statistic of the means over all rounds.
+        low: Lower end; NaN if there are fewer than two rounds.
+        high: Upper end; NaN if there are fewer than two rounds.
+        n: Number of rounds.
     """
 
     value: float
@@ -45,144 +47,140 @@ class Estimate:
 
     @property
     def known(self) -> bool:
-        """It has an interval."""
+        """Whether there is an interval."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
+    def columns(self, name: str, prefix: str = "") -> dict[str, float]:
+        """Returns the columns ``name``, ``low`` and ``high`` of a table row."""
+        return {name: self.value, f"{prefix}low": self.low, f"{prefix}high": self.high}
 
-def bootstrap(
-    rounds: Array, statistic: Statistic, *, positive: bool = False, level: float = LEVEL
-) -> list[Estimate]:
-    """Intervals of statistics of the columns' means, by resampling rows.
 
-    With fewer than ``LEAST_FOR_BOOTSTRAP`` rounds: value +- t(n - 1) x the jackknife's standard
-    error (Tukey 1958), of the logarithm if ``positive``, which is as wide as so few rounds deserve.
-    With more: BCa (Efron 1987, "Better bootstrap confidence intervals") with the level widened for
-    small n, that is with t(n - 1) sqrt(n / (n - 1)) in place of the normal quantile (Hesterberg
-    2015, "What teachers should know about the bootstrap"), since resampling alone is too narrow by
-    sqrt((n - 1) / n).
-    The seed is fixed: the same figures give the same intervals.
+def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) -> list[Estimate]:
+    """Computes statistics of the columns' means with intervals, by resampling rows.
+
+    Below ``LEAST_FOR_BOOTSTRAP`` rows the interval is value +- t(n - 1) times the jackknife's
+    standard error (Tukey 1958), of the logarithm if ``positive``. From there on it is SciPy's BCa
+    bootstrap (Efron 1987) whose level is widened for small n: t(n - 1) sqrt(n / (n - 1)) replaces
+    the normal quantile (Hesterberg 2015), because resampling alone is too narrow by
+    sqrt((n - 1) / n). The seed is fixed.
 
     Args:
-        rounds: (n, k): one row for each round, one column for each configuration; NaN where a run
-            is missing, and then a mean is over the others.
-        statistic: Means, (..., k), to statistics, (..., m).
-        positive: The statistics are ratios or times.
-        level: Of confidence.
+        rounds: (n, k): one row per round, one column per configuration; NaN marks a missing run,
+            and the mean is then that of the other runs.
+        statistic: Maps means, (..., k), to statistics, (..., m).
+        positive: Whether the statistics are ratios or times.
 
     Returns:
-        m estimates.
+        m estimates. There is no interval for a statistic that some resample leaves undefined.
     """
-    special = needed("scipy.special", "the analysis")
     n = len(rounds)
-    value = np.atleast_1d(statistic(_means(np.ones((1, n)), rounds))[0])
+
+    def of_rows(index: NDArray[np.intp], axis: int = -1) -> Array:
+        """Statistics, (m, ...), of the rows ``index``, (..., rows)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.moveaxis(statistic(_nanmean(rounds[index])), -1, 0)
+
+    value = of_rows(np.arange(n))
     if n < 2:
-        return [Estimate(float(v), math.nan, math.nan, n) for v in value]
-    student = float(special.stdtrit(n - 1, 0.5 + 0.5 * level))
-    widened = student * math.sqrt(n / (n - 1))
-    weights = np.random.default_rng(SEED).multinomial(n, np.full(n, 1.0 / n), RESAMPLES)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        left_out = statistic(_means(1.0 - np.eye(n), rounds))
-        if n >= LEAST_FOR_BOOTSTRAP:
-            resampled = statistic(_means(weights.astype(np.float64), rounds))
-    found = []
-    for k, v in enumerate(value):
-        if n < LEAST_FOR_BOOTSTRAP:
-            found.append(_jackknife(float(v), left_out[:, k], student, positive))
-            continue
-        low, high = _bca(float(v), resampled[:, k], left_out[:, k], widened)
-        found.append(Estimate(float(v), low, high, n))
-    return found
+        low = high = np.full(value.shape, np.nan)
+    elif n < LEAST_FOR_BOOTSTRAP:
+        low, high = _jackknife(value, of_rows, n, positive)
+    else:
+        low, high = bca(of_rows, n, widened=True)
+    return [
+        Estimate(float(v), float(a), float(b), n) for v, a, b in zip(value, low, high, strict=True)
+    ]
 
 
-def _means(weights: Array, rounds: Array) -> Array:
-    known = ~np.isnan(rounds)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        means: Array = (weights @ np.where(known, rounds, 0.0)) / (weights @ known)
+def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array, Array]:
+    """Ends of SciPy's BCa intervals of statistics of resampled rows.
+
+    The percentile interval replaces it for a statistic that does not vary with single rows.
+
+    Args:
+        of_rows: Maps row indices, (..., rows), to statistics, (m, ...).
+        n: Number of rows.
+        widened: Whether to widen the level for a small n (Hesterberg 2015).
+    """
+    stats = needed("scipy.stats", "the analysis")
+    level = LEVEL
+    if widened:
+        quantile = stats.t.ppf(0.5 + 0.5 * LEVEL, n - 1) * math.sqrt(n / (n - 1))
+        level = 2.0 * stats.norm.cdf(quantile) - 1.0
+    options = {"vectorized": True, "axis": -1, "confidence_level": level}
+    rows = (np.arange(n),)
+    with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
+        warnings.simplefilter("ignore")  # statistics that do not vary
+        rng = np.random.default_rng(SEED)
+        found = stats.bootstrap(rows, of_rows, n_resamples=RESAMPLES, rng=rng, **options)
+        plain = stats.bootstrap(
+            rows, of_rows, n_resamples=0, bootstrap_result=found, method="percentile", **options
+        )
+    ends, others = found.confidence_interval, plain.confidence_interval
+    return (
+        np.where(np.isnan(ends.low), others.low, ends.low),
+        np.where(np.isnan(ends.high), others.high, ends.high),
+    )
+
+
+def _nanmean(values: Array) -> Array:
+    """Means over the last axis but one; NaN where no value is known."""
+    known = ~np.isnan(values)
+    means: Array = np.where(known, values, 0.0).sum(axis=-2) / known.sum(axis=-2)
     return means
 
 
-def _bca(value: float, resampled: Array, left_out: Array, z: float) -> tuple[float, float]:
-    """The interval of one statistic; NaN where too few resamples have a value."""
-    from scipy.special import ndtr, ndtri
-
-    resampled = resampled[np.isfinite(resampled)]
-    if not math.isfinite(value) or len(resampled) < RESAMPLES // 2:
-        return math.nan, math.nan
-    below = (resampled < value).mean() + 0.5 * (resampled == value).mean()
-    edge = 1.0 / (len(resampled) + 1)
-    bias = float(ndtri(np.clip(below, edge, 1.0 - edge)))
-    squared = _spread(left_out, 2) ** 1.5
-    acceleration = _spread(left_out, 3) / (6.0 * squared) if squared > 0.0 else 0.0
-    ends = []
-    for end in (-z, z):
-        shifted = bias + end
-        share = float(ndtr(bias + shifted / max(1.0 - acceleration * shifted, 1e-3)))
-        ends.append(float(np.quantile(resampled, share)))
-    return ends[0], ends[1]
-
-
-def _jackknife(value: float, left_out: Array, student: float, positive: bool) -> Estimate:
-    """Few rounds: value +- t x standard error, as factors where it must be positive."""
-    n = len(left_out)
-    if positive and value > 0.0:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            left_out = np.log(left_out)
-    half = student * math.sqrt((n - 1) / n * _spread(left_out, 2))
-    if positive and value > 0.0:
-        factor = math.exp(min(half, 700.0)) if math.isfinite(half) else math.nan
-        return Estimate(value, value / factor, value * factor, n)
-    return Estimate(value, value - half, value + half, n)
-
-
-def _spread(left_out: Array, power: int) -> float:
-    """Sum of powers of what each round does to the statistic; NaN where one is decisive."""
-    return float(((left_out.mean() - left_out) ** power).sum())
+def _jackknife(
+    value: Array, of_rows: Callable[[NDArray[np.intp]], Array], n: int, positive: bool
+) -> tuple[Array, Array]:
+    """Ends of t intervals with the jackknife's standard error."""
+    stats = needed("scipy.stats", "the analysis")
+    left_out = of_rows(np.array([np.delete(np.arange(n), k) for k in range(n)]))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        centre, left_out = (np.log(v) if positive else v for v in (value, left_out))
+        half = stats.t.ppf(0.5 + 0.5 * LEVEL, n - 1) * math.sqrt(n - 1) * left_out.std(axis=-1)
+        low, high = centre - half, centre + half
+        return (np.exp(low), np.exp(high)) if positive else (low, high)
 
 
 def to_column(rounds: Array, denominator: int) -> list[Estimate]:
-    """The ratio of each column's mean to one column's mean."""
+    """Estimates the ratio of each column's mean to the mean of one column."""
     return bootstrap(rounds, lambda means: means / means[..., [denominator]], positive=True)
 
 
 def paired_p(a: Array, b: Array) -> float:
-    """Two-sided p-value of no difference: paired t-test of the logarithms, round by round.
+    """Returns the two-sided p-value of a paired t-test of the logarithms, round by round.
 
-    1 where there are fewer than two pairs; 0 or 1 where all pairs differ alike.
+    It is 1 if there are fewer than two pairs or all pairs are equal.
     """
-    special = needed("scipy.special", "the analysis")
-    both = np.isfinite(a) & np.isfinite(b) & (a > 0) & (b > 0)
-    if both.sum() < 2:
-        return 1.0
-    difference = np.log(a[both]) - np.log(b[both])
-    if np.ptp(difference) <= 1e-12:
-        return 1.0 if abs(difference[0]) <= 1e-12 else 0.0
-    n = len(difference)
-    t = float(difference.mean()) * math.sqrt(n) / float(difference.std(ddof=1))
-    return float(2.0 * special.stdtr(n - 1, -abs(t)))
+    stats = needed("scipy.stats", "the analysis")
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # differences without spread
+        difference = np.round(np.log(a) - np.log(b), 12)
+        found = stats.ttest_1samp(difference[np.isfinite(difference)], 0.0)
+    return float(np.nan_to_num(found.pvalue, nan=1.0))
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """p-values corrected for their number (Holm 1979, "A simple sequentially rejective ...").
+    """Corrects p-values for their number (Holm 1979), which SciPy lacks.
 
     >>> holm([0.01, 0.04, 0.03])
     [0.03, 0.06, 0.06]
     """
-    order = sorted(range(len(p_values)), key=lambda k: p_values[k])
-    corrected = [1.0] * len(p_values)
-    largest = 0.0
-    for place, k in enumerate(order):
-        largest = max(largest, min(1.0, (len(p_values) - place) * p_values[k]))
-        corrected[k] = largest
-    return corrected
+    p = np.asarray(p_values, np.float64)
+    order = np.argsort(p)
+    corrected = np.empty_like(p)
+    corrected[order] = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
+    return [float(v) for v in np.minimum(corrected, 1.0)]
 
 
 def verdict(estimate: Estimate, p: float, words: tuple[str, str] = ("faster", "slower")) -> str:
-    """What may be said of a ratio: below 1, above 1, the same within 1 %, or nothing.
+    """Returns the verdict on a ratio: below 1, above 1, the same within 1 %, or not shown.
 
     Args:
         estimate: The ratio.
-        p: Corrected for all that is said beside it.
-        words: For below and above 1.
+        p: p-value, corrected for all verdicts of the table.
+        words: Verdicts for below and above 1.
     """
     if estimate.n < 2:
         return "one run"

@@ -87,13 +87,6 @@ class FolderComparison:
         return dataclasses.asdict(self)
 
 
-def from_dict(document: dict[str, Any]) -> FolderComparison:
-    """The inverse of ``to_dict``, after a way through JSON."""
-    changes = tuple(Change(**{**c, "runs": tuple(c["runs"])}) for c in document["changes"])
-    lists = {k: tuple(v) for k, v in document.items() if isinstance(v, list)}
-    return FolderComparison(**{**document, **lists, "changes": changes})
-
-
 def compare_folders(before: Path, after: Path, metric: str = "render_s") -> FolderComparison:
     """Compares two result folders.
 

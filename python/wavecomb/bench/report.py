@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import math
+import os
 import shlex
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,37 +15,45 @@ from wavecomb.bench.analysis_data import load
 from wavecomb.bench.figures_style import style
 from wavecomb.bench.report_experiment import experiment
 from wavecomb.bench.report_facts import equality, machine_parts, warnings_of
-from wavecomb.bench.report_html import (
-    escape,
-    folded,
-    nested,
-    page,
-    paragraph,
-    prose,
+from wavecomb.bench.report_parts import (
+    Code,
+    Facts,
+    Figure,
+    Lines,
+    Section,
+    Table,
+    Text,
+    Writer,
+    key_of,
     table,
 )
-from wavecomb.bench.report_markdown import copy_figures, write_page
-from wavecomb.bench.report_parts import Markup, Report, Section, Viewer
 from wavecomb.bench.report_suite import suite
-from wavecomb.bench.report_writer import Writer
+from wavecomb.extras import needed
 from wavecomb.picture.files import replacing
 
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results
 
+LARGEST_SVG = 150_000
+LARGEST_PNG = 120_000
+"""Bytes of a figure beside a Markdown page; a repository keeps every version of them."""
+_HERE = Path(__file__).parent
+
 
 def build(folder: Path, markdown: Path | None = None) -> Path:
-    """Writes DIR/report.html, its parts as DIR/report.json, and DIR/figures, SVG and PNG.
+    """Writes DIR/report.html and DIR/figures, each figure as SVG and PNG.
 
     Args:
         folder: DIR.
-        markdown: A .md file that is written, too, with a folder of figures beside it.
+        markdown: A .md file to write too, with a folder of figures beside it. It has the same
+            text, tables and figures, without viewers and folded parts.
 
     Raises:
         WavecombError: The folder holds no results, or a file in it is damaged; or a library of the
             extra "bench" is missing.
         OSError: It cannot be written.
     """
+    environment = _environment()
     results = load(folder)
     figures = folder / "figures"
     figures.mkdir(exist_ok=True)
@@ -54,25 +65,92 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
         _pictures(out, results)
     _about(out, results)
     if out.findings:
-        lines = "".join(f"<li>{prose(line)}</li>" for line in out.findings)
-        out.sections.insert(0, _findings(f'<ul class="findings">{lines}</ul>'))
-    target = folder / "report.html"
-    warnings = warnings_of(results.machine, results.rows)
-    report = Report(_title(results), _lead(results), warnings, out.sections)
-    with replacing(target) as part:
-        part.write_text(page(report), encoding="utf-8")
-    report.write(folder)
+        out.sections.insert(0, _findings(out))
+    values: dict[str, Any] = {
+        "title": f"Wavecomb benchmark: {results.runs['suite'].iloc[0] or results.folder.name}",
+        "lead": _lead(results),
+        "warnings": warnings_of(results),
+        "sections": [section for section in out.sections if section.parts],
+    }
+    files = {name: (_HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
+    text = environment.get_template("report.html.j2").render(
+        values, style=files["css"], script=files["js"]
+    )
+    _write(folder / "report.html", text)
     if markdown is not None:
-        write_page(markdown, report)
-        copy_figures(figures, markdown)
-    return target
+        target = markdown.with_suffix("")
+        values |= {"folder": markdown.stem, "files": _copy_figures(out, target)}
+        _write(markdown, environment.get_template("report.md.j2").render(values).strip() + "\n")
+    return folder / "report.html"
 
 
-def _title(results: Results) -> str:
-    return f"Wavecomb benchmark: {results.runs['suite'].iloc[0] or results.folder.name}"
+def _environment() -> Any:
+    """Jinja2 with the filters of the templates; text is escaped in HTML."""
+    jinja2 = needed("jinja2", "the report")
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_HERE),
+        autoescape=lambda name: ".html" in (name or ""),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.filters |= {"prose": _prose, "md": _markdown, "key": key_of}
+    return environment
 
 
-def _lead(results: Results) -> str:
+def _prose(text: str) -> str:
+    """Keeps numbers beside their unit."""
+    return text.replace(" %", "\u00a0%").replace("n = ", "n\u00a0=\u00a0")
+
+
+def _markdown(text: str) -> str:
+    """Text on one line that a Markdown table can hold."""
+    return " ".join(text.split()).replace("<", "&lt;").replace("|", "\\|")
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
+    """Copies the figures of all sections and returns their files: SVG, or if too large PNG."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {}
+    for part in (part for section in out.sections for part in section.parts):
+        if not isinstance(part, Figure):
+            continue
+        drawing = out.figures / f"{part.name}.svg"
+        if drawing.stat().st_size <= LARGEST_SVG:
+            shutil.copyfile(drawing, folder / drawing.name)
+        else:
+            drawing = drawing.with_suffix(".png")
+            _small_png(drawing, folder / drawing.name)
+        files[part.name] = drawing.name
+    return files
+
+
+def _small_png(source: Path, target: Path) -> None:
+    """Writes the image with 256 colours, and smaller until its file is small enough."""
+    from PIL import Image
+
+    with Image.open(source) as opened:
+        image = opened.convert("RGB")
+    scale = 1.0
+    while True:
+        size = (round(image.width * scale), round(image.height * scale))
+        small = image.resize(size, Image.Resampling.LANCZOS).quantize(256)
+        with replacing(target) as part:
+            small.save(part, format="PNG", optimize=True)
+        if os.path.getsize(target) <= LARGEST_PNG or min(size) < 200:
+            return
+        scale *= 0.85
+
+
+# ---- sections ------------------------------------------------------------------------------------
+
+
+def _lead(results: Results) -> list[str]:
     machine, runs = results.machine, results.runs
     about = [
         str(machine.get("cpu") or "unknown CPU"),
@@ -80,27 +158,26 @@ def _lead(results: Results) -> str:
         str(machine.get("isa") or ""),
         f"commit {str(machine['commit'])[:10]}" if machine.get("commit") else "",
     ]
-    started = [text for text in runs["started"] if text]
-    when = f", {min(started)[:16].replace('T', ' ')} to {max(started)[:16].replace('T', ' ')} UTC"
+    started = [text[:16].replace("T", " ") for text in runs["started"] if text]
+    when = f", {min(started)} to {max(started)} UTC" if started else ""
     counts = (
         f"{len(runs)} runs of {runs['config'].nunique()} configurations on "
-        f"{runs['stage'].nunique()} stages{when if started else ''}"
+        f"{runs['stage'].nunique()} stages{when}"
     )
-    lines = [" · ".join(part for part in about if part), counts]
-    return "".join(f'<p class="facts">{escape(line)}</p>' for line in lines)
+    return [" · ".join(part for part in about if part), counts]
 
 
-def _findings(inside: str) -> Section:
-    note = paragraph(
+def _findings(out: Writer) -> Section:
+    note = Text(
         "Found by the rules of docs/bench-report.md, not chosen by hand. A difference is spoken of "
         "where its p-value, corrected for all comparisons of its table, is below 5 %.",
         "note",
     )
-    return Section("findings", "What the figures say", [Markup(inside), Markup(note)])
+    return Section("What the figures say", [Lines(out.findings), note])
 
 
 def _pictures(out: Writer, results: Results) -> None:
-    groups, different = equality(results.rows)
+    groups, different = equality(results.runs)
     found = report_pictures.shots(results)
     if not groups and not found:
         return
@@ -111,11 +188,10 @@ def _pictures(out: Writer, results: Results) -> None:
             f"{same} of {groups} groups of runs that may differ in the order and spread of work "
             "only gave equal pictures, bit for bit"
         )
-        out.add(paragraph(text + ("." if same == groups else "; these did not:")))
-        out.add("".join(paragraph(line, "worse") for line in different[:10]))
+        out.add(Text(text + ("." if same == groups else "; these did not:")))
+        out.add(*(Text(line, "worse") for line in different[:10]))
     for shot in found:
-        if shown := report_pictures.viewer(shot):
-            out.add(Viewer(shown))
+        out.add(report_pictures.viewer(shot))
         out.draw(report_pictures.differences(shot))
 
 
@@ -129,36 +205,37 @@ def _about(out: Writer, results: Results) -> None:
     words = shlex.split(commands[-1]) if commands else []
     folder = words[words.index("-o") + 1] if "-o" in words[:-1] else results.folder.name
     commands.append(f"wavecomb bench report {shlex.quote(folder)}")
-    out.add(f"<pre><code>{escape(chr(10).join(dict.fromkeys(commands)))}</code></pre>")
+    out.add(Code("\n".join(dict.fromkeys(commands))))
     if results.suite_text:
-        suite_text = f"<pre><code>{escape(results.suite_text)}</code></pre>"
-        out.add(folded("The suite: suite.toml", suite_text))
-    settings = [
-        [str(row.config), f"{row.width:.0f} x {row.height:.0f}", *_numbers(row), str(row.runs)]
-        for row in _configurations(results)
-    ]
-    head = ["configuration", "pixels", "spp", "threads", "lanes", "wave", "max depth", "runs"]
-    text = table("Settings as used", head, settings)
-    out.add(folded(f"Settings of all {len(settings)} configurations", text))
+        out.add(Code(results.suite_text, summary="The suite: suite.toml"))
+    out.add(_settings(results))
     if len(results.failed):
-        rows = [[str(row.run_id), str(row.error)] for row in results.failed.itertuples()]
-        out.add(folded("Runs that failed", table("Runs that failed", ["run", "why"], rows)))
+        rows = results.failed[["run_id", "error"]].astype(str).to_numpy().tolist()
+        out.add(table("Runs that failed", ["run", "why"], rows, summary="Runs that failed"))
     out.begin("Machine")
     out.add(*machine_parts(results.machine))
     out.begin("Words")
-    out.add(nested(WORDS))
+    out.add(Facts(WORDS))
 
 
-def _configurations(results: Results) -> list[Any]:
-    numbers = ("width", "height", "spp", "threads", "lanes", "wave_size", "max_depth")
-    first = results.runs.groupby("config", sort=False)[list(numbers)].first()
-    sizes = results.runs.groupby("config").size()
-    return list(first.assign(runs=sizes).reset_index().itertuples())
-
-
-def _numbers(row: Any) -> list[str]:
-    values = (row.spp, row.threads, row.lanes, row.wave_size, row.max_depth)
-    return ["–" if value != value else f"{value:.0f}" for value in values]
+def _settings(results: Results) -> Table:
+    """The settings of each configuration as they were used, folded."""
+    names = ["spp", "threads", "lanes", "wave_size", "max_depth"]
+    by_config = results.runs.groupby("config", sort=False)
+    used = by_config[["width", "height", *names]].first().assign(runs=by_config.size())
+    rows = [
+        [
+            str(row.Index),
+            f"{row.width:.0f} x {row.height:.0f}",
+            *("–" if math.isnan(v := getattr(row, name)) else f"{v:.0f}" for name in names),
+            str(row.runs),
+        ]
+        for row in used.itertuples()
+    ]
+    head = ["configuration", "pixels", "spp", "threads", "lanes", "wave", "max depth", "runs"]
+    return table(
+        "Settings as used", head, rows, summary=f"Settings of all {len(rows)} configurations"
+    )
 
 
 WORDS = {

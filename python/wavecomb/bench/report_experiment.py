@@ -1,181 +1,234 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the report says of each experiment."""
+"""Sections about one experiment each."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from wavecomb.bench import figures_runs
-from wavecomb.bench.analysis_data import BASELINES
+from wavecomb.bench import figures_runs, figures_verdicts
+from wavecomb.bench.analysis_data import BASELINES, BOUNDS
+from wavecomb.bench.analysis_order import order_effects, regrets
 from wavecomb.bench.analysis_ratios import means, ratios
 from wavecomb.bench.columns import COUNTER_COLUMNS
-from wavecomb.bench.report_html import key_of, paragraph
-from wavecomb.bench.report_policies import policies
-from wavecomb.bench.report_tables import mean_table, ratio_table
-from wavecomb.bench.report_writer import Writer
+from wavecomb.bench.oracle import BEST, COSTS, WORST
+from wavecomb.bench.report_parts import Text, Writer, interval, key_of
+from wavecomb.bench.report_tables import mean_table, order_table, ratio_table, regret_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_LABELS = {
+    **{"shade": "shade time", "shade + order": "shade + order time", "render": "render time"},
+    "samples/s": "samples per second",
+}
 SCHEDULING = ("lanes", "wave_size", "policy", "roulette", "ray_order", "shadow_order")
 
 
 def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """All of one experiment."""
+    """Writes everything about one experiment."""
     out.begin(f"Experiment {name}")
-    repetitions = runs.groupby("config").size()
+    repetitions = figures_runs.count_words(runs.groupby("config").size())
     out.add(
-        paragraph(
-            f"{runs['config'].nunique()} configurations, {len(runs)} runs, "
-            f"{figures_runs.count_words(repetitions)} of each, interleaved in random order."
+        Text(
+            f"{runs['config'].nunique()} configurations, {len(runs)} runs, {repetitions} of each, "
+            "interleaved in random order."
         )
     )
+    key = key_of(name)
     ours = runs[runs["renderer"] == "wavecomb"]
     if runs["renderer"].nunique() > 1:
-        _renderers(out, name, runs)
+        _renderers(out, key, runs)
     if ours["policy"].nunique() > 1:
-        policies(out, name, ours)
+        _policies(out, name, ours)
     elif ours["ray_order"].nunique() > 1:
-        _levels(out, name, ours, "ray_order", "order of rays")
+        _ray_orders(out, key, ours)
     _cases(out, name, ours)
-    _curves(out, name, runs)
-    out.draw(figures_runs.error_over_time(runs, f"{key_of(name)}-error"))
-    _errors(out, name, runs)
-    _counters(out, name, ours)
+    _curves(out, key, runs)
+    out.draw(figures_runs.error_over_time(runs, f"{key}-error"))
+    _errors(out, runs)
+    _counters(out, ours)
 
 
-def _levels(out: Writer, name: str, runs: pd.DataFrame, factor: str, words: str) -> None:
-    metrics = {
-        text: ratios(runs, factor, column)
-        for text, column in (
-            ("order of rays", "order_rays_s"),
-            ("trace", "trace_s"),
-            ("render", "render_s"),
-        )
-        if (runs[column] > 0).all()
+def compared(
+    runs: pd.DataFrame, factor: str, columns: Mapping[str, str], ignore: Sequence[str] = ()
+) -> dict[str, pd.DataFrame]:
+    """Returns tables of ``ratios`` by title, for the columns whose values are all positive."""
+    measured = {words: runs[column].dropna() for words, column in columns.items()}
+    tables = {
+        words: ratios(runs, factor, columns[words], ignore=ignore)
+        for words, values in measured.items()
+        if len(values) and (values > 0).all()
     }
-    main = metrics.get("render")
-    if main is None or main.empty:
-        return
-    title = f"Times by {words}, ratio of means to {main.loc[main['is_baseline'], 'level'].iloc[0]}"
-    out.rows(len(main), title, ratio_table(title, metrics, words))
-    drawn = figures_runs.ratio_figure(
-        main, f"{key_of(name)}-{key_of(factor)}", f"Render time by {words}", "render time", factor
-    )
-    out.draw(drawn)
+    return {words: table for words, table in tables.items() if not table.empty}
+
+
+def _ratio_figure(
+    out: Writer, metrics: Mapping[str, pd.DataFrame], words: str, factor: str, name: str, title: str
+) -> None:
+    """Draws the ratios of one metric, if there are any."""
+    if words in metrics:
+        x_label = _LABELS.get(words, words)
+        out.draw(figures_runs.ratio_figure(metrics[words], name, title, x_label, factor))
+
+
+def _ray_orders(out: Writer, key: str, runs: pd.DataFrame) -> None:
+    columns = {"order of rays": "order_rays_s", "trace": "trace_s", "render": "render_s"}
+    metrics = compared(runs, "ray_order", columns)
+    title = f"Times by order of rays, ratio of means to {BASELINES['ray_order']}"
+    out.add(ratio_table(title, metrics, "order of rays"))
+    name, title = f"{key}-ray-order", "Render time by order of rays"
+    _ratio_figure(out, metrics, "render", "ray_order", name, title)
 
 
 def _cases(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """Named settings that change together, each compared with those that are named "off"."""
+    """Compares named settings that change together with the case "off"."""
     if BASELINES["case"] not in set(runs["case"]) or runs["case"].nunique() < 2:
         return
-    metrics = {
-        text: ratios(runs, "case", column, ignore=("roulette",))
-        for text, column in (
-            ("relMSE", "rel_mse"),
-            ("render", "render_s"),
-            ("efficiency", "efficiency"),
-        )
-        if runs[column].notna().any()
-    }
-    main = next(reversed(metrics.values()))
-    title = f"Ratio of means to {BASELINES['case']}"
-    out.rows(len(main), title, ratio_table(title, metrics, "with"))
-    for text, table in metrics.items():
-        key = f"{key_of(name)}-cases-{key_of(text)}"
-        out.draw(figures_runs.ratio_figure(table, key, f"{name}: {text}", text, "case"))
+    columns = {"relMSE": "rel_mse", "render": "render_s", "efficiency": "efficiency"}
+    metrics = compared(runs, "case", columns, ("roulette",))
+    out.add(ratio_table(f"Ratio of means to {BASELINES['case']}", metrics, "with"))
+    for words, table in metrics.items():
+        key = f"{key_of(name)}-cases-{key_of(words)}"
+        out.draw(figures_runs.ratio_figure(table, key, f"{name}: {words}", words, "case"))
 
 
-def _renderers(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    metrics = {
-        text: ratios(runs, "renderer", column, ignore=(*SCHEDULING, "max_depth"))
-        for text, column in (
-            ("relMSE", "rel_mse"),
-            ("efficiency", "efficiency"),
-            ("samples/s", "samples_per_s"),
-        )
-        if runs[column].notna().any()
-    }
-    title = "Renderers, ratio of means to Wavecomb"
-    out.add(ratio_table(title, metrics, "renderer"))
-    for text, column in (("samples/s", "samples per second"), ("efficiency", "efficiency")):
-        if text in metrics:
-            key = f"{key_of(name)}-renderers-{key_of(column)}"
-            drawn = figures_runs.ratio_figure(
-                metrics[text], key, f"Renderers: {column}", column, "renderer"
-            )
-            out.draw(drawn)
+def _renderers(out: Writer, key: str, runs: pd.DataFrame) -> None:
+    columns = {"relMSE": "rel_mse", "efficiency": "efficiency", "samples/s": "samples_per_s"}
+    metrics = compared(runs, "renderer", columns, (*SCHEDULING, "max_depth"))
+    out.add(ratio_table("Renderers, ratio of means to Wavecomb", metrics, "renderer"))
+    for words, name in (("samples/s", "samples per second"), ("efficiency", "efficiency")):
+        file = f"{key}-renderers-{key_of(name)}"
+        _ratio_figure(out, metrics, words, "renderer", file, f"Renderers: {name}")
 
 
-def _curves(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """Over the factor of a scaling experiment, and over lanes and wave sizes where they vary."""
-    key = key_of(name)
+def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
+    """Draws times over the factor of a scaling experiment, or over lanes and wave sizes."""
     times = (("shade_and_order_s", "shade + order, thread s"), ("render_s", "render, s"))
     series = next(
         (n for n in ("policy", "ray_order", "renderer", "roulette") if runs[n].nunique() > 1),
         "policy",
     )
+
+    def curves(by: pd.Series, column: str, words: str, end: str) -> None:
+        for stage, part in runs.groupby(by, sort=False):
+            name, title = f"{key}-{key_of(str(stage))}-{end}", f"{stage}: time over {words}"
+            out.draw(figures_runs.curve(part, column, times, name, title, words, series))
+
     factor = str(runs["factor"].iloc[0])
     if factor and runs["factor_value"].notna().all():
-        # A factor of the stage is part of the stage's name: what is before it is the stage.
+        # The stage's name ends with the value of a factor of the stage.
         bases = runs["stage"].map(lambda stage: stage.partition(f"-{factor}-")[0])
-        for base, part in runs.groupby(bases, sort=False):
-            words = factor.replace("_", " ")
-            drawn = figures_runs.curve(
-                part,
-                "factor_value",
-                times,
-                f"{key}-{key_of(str(base))}-curve",
-                f"{base}: time over {words}",
-                words,
-                series,
-            )
-            out.draw(drawn)
+        curves(bases, "factor_value", factor.replace("_", " "), "curve")
         return
     for column, words in (("lanes", "SIMD lanes"), ("wave_size", "paths in a wave")):
-        others = [n for n in ("stage", "width", "spp", *SCHEDULING) if n not in (column, series)]
-        if runs[column].nunique() < 2 or any(runs[n].nunique() > 1 for n in others if n != "stage"):
-            continue
-        for stage, part in runs.groupby("stage", sort=False):
-            drawn = figures_runs.curve(
-                part,
-                column,
-                times,
-                f"{key}-{key_of(str(stage))}-{key_of(column)}",
-                f"{stage}: time over {words}",
-                words,
-                series,
-            )
-            out.draw(drawn)
+        others = [n for n in ("width", "spp", *SCHEDULING) if n not in (column, series)]
+        if runs[column].nunique() > 1 and all(runs[n].nunique() <= 1 for n in others):
+            curves(runs["stage"], column, words, key_of(column))
 
 
-def _errors(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """Variance and efficiency, where pictures were compared with golden ones."""
+def _errors(out: Writer, runs: pd.DataFrame) -> None:
+    """Shows variance and efficiency, where images were compared with golden ones."""
     if runs["rel_mse"].isna().all():
         return
     factor = "renderer" if runs["renderer"].nunique() > 1 else "policy"
-    ignore = SCHEDULING if factor == "renderer" else ()
-    found = means(
-        runs.dropna(subset=["rel_mse"]),
-        factor,
-        ("variance", "rel_mse", "render_s", "efficiency"),
-        ignore,
-    )
     columns = {
-        "variance": "variance",
-        "relMSE": "rel_mse",
-        "render, s": "render_s",
+        **{"variance": "variance", "relMSE": "rel_mse", "render, s": "render_s"},
         "efficiency, 1/s": "efficiency",
     }
-    title = "Variance and efficiency"
+    known = runs.dropna(subset=["rel_mse"])
+    found = means(known, factor, list(columns.values()), SCHEDULING if factor == "renderer" else ())
     note = "Efficiency: 1 / (relMSE x render time). Variance: mean squared error to golden."
-    out.rows(len(found), title, mean_table(found, title, factor, columns, note))
+    out.add(mean_table(found, "Variance and efficiency", factor, columns, note))
 
 
-def _counters(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    if not runs[list(COUNTER_COLUMNS)].notna().any().any():
-        return
-    found = means(runs, "policy", COUNTER_COLUMNS)
-    columns = {column.replace("_", " "): column for column in COUNTER_COLUMNS}
-    title = "Hardware counters, events per record"
-    out.rows(len(found), title, mean_table(found, title, "policy", columns))
+def _counters(out: Writer, runs: pd.DataFrame) -> None:
+    if runs[list(COUNTER_COLUMNS)].notna().any().any():
+        columns = {column.replace("_", " "): column for column in COUNTER_COLUMNS}
+        found = means(runs, "policy", COUNTER_COLUMNS)
+        out.add(mean_table(found, "Hardware counters, events per record", "policy", columns))
+
+
+# ---- policies ------------------------------------------------------------------------------------
+
+
+def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
+    """Shows times by policy, the gain of an order, and the regret of a choice."""
+    columns = {"shade": "shade_s", "render": "render_s", "shade + order": "shade_and_order_s"}
+    metrics = compared(runs, "policy", columns)
+    note = (
+        "Brackets: 95 % intervals, rounds resampled whole. At none: seconds, threads together "
+        "but for render. The verdict is on shade + order, which holds what an order costs."
+    )
+    title = "Times by policy, ratio of means to none"
+    out.add(ratio_table(title, metrics, "policy", note))
+    if (runs["factor"] != "").any():
+        return  # curves over the factor say more
+    key = key_of(name)
+    for words, end in (("shade", "shade"), ("shade + order", "policies")):
+        title = f"{words.capitalize()} time by policy"
+        _ratio_figure(out, metrics, words, "policy", f"{key}-{end}", title)
+    out.draw(figures_runs.pipeline(runs, f"{key}-pipeline"))
+    out.draw(figures_runs.coherence(runs, f"{key}-coherence"))
+    order = order_effects(runs)
+    if not order.empty:
+        out.add(Text("The verdict on order", "heading"))
+        out.add(order_table(order, "Each order apart from roulette: shade + order time"))
+        out.draw(figures_verdicts.order_figure(order, f"{key}-order", "shade + order time"))
+        out.findings += _order_findings(name, order)
+    regret = regrets(runs)
+    if not regret.empty:
+        out.add(Text("Regret", "heading"))
+        out.add(regret_table(regret, "Regret of a policy for all cells: render time"))
+        out.draw(figures_verdicts.regret_figure(regret, f"{key}-regret"))
+        adaptive = regret[regret["policy"] == "adaptive"]
+        if not adaptive.empty:
+            worst = adaptive.loc[adaptive["regret"].idxmax()]
+            out.findings.append(
+                f"{name}: adaptive takes {100 * adaptive['regret'].mean():+.1f} % on average "
+                f"beside the best fixed policy of each cell, at worst {100 * worst.regret:+.1f} % "
+                f"{interval(100 * worst.low, 100 * worst.high, 1)} ({worst.cell})."
+            )
+
+
+def _order_findings(name: str, order: pd.DataFrame) -> list[str]:
+    lines = []
+    for stratum, part in order.groupby("stratum", sort=False):
+        real = part[~part["policy"].isin([*BOUNDS, "none"])]
+        faster = real[real["verdict"] == "faster"].sort_values("ratio")
+        if faster.empty:
+            text = "no order is shown to be quicker than arrival order"
+        else:
+            best = faster.iloc[0]
+            text = (
+                f"{len(faster)} of {len(real)} orders are quicker than arrival order; "
+                f"{best.policy} takes {best.ratio:.3f} of its shade + order time "
+                f"[{best.low:.3f}, {best.high:.3f}]"
+            )
+        slower = list(real[real["verdict"] == "slower"]["policy"])
+        text += f"; slower: {', '.join(slower)}" if slower else ""
+        text += _bound_words(part)
+        lines.append(f"{name if stratum == 'all' else f'{name}, {stratum}'}: {text}.")
+    return lines
+
+
+def _bound_words(part: pd.DataFrame) -> str:
+    """States the gain of the oracles; "" without placebo and oracle."""
+    known = part.dropna(subset=["placebo_ratio"]).set_index("policy")
+    words = {
+        BEST: "The best order of runs that a trace with true costs gives",
+        COSTS: "Cost-benefit with true costs",
+        WORST: "The worst order of runs",
+    }
+    text = ""
+    for policy, name in words.items():
+        if policy not in known.index:
+            continue
+        row = known.loc[policy]
+        text += (
+            f". {name} takes {row.placebo_ratio:.3f} "
+            f"{interval(row.placebo_low, row.placebo_high)} of the placebo's time"
+        )
+        if policy != WORST and not row.placebo_high < 1.0:
+            text += ": it is not shown to beat it"
+    return text

@@ -1,158 +1,222 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a report: made once, shown as HTML, as Markdown and in the window.
-
-A result folder keeps them as report.json beside report.html. What is drawn is in figures/, so that
-the file holds words and tables only.
-"""
+"""The parts of a report; the templates ``report.html.j2`` and ``report.md.j2`` render them."""
 
 from __future__ import annotations
 
-import json
+import itertools
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from wavecomb.errors import WavecombError
-from wavecomb.picture.files import reason, replacing
+from wavecomb.bench.figures_style import Drawn, fixed, lay_out, save, svg
 
-FILE = "report.json"
-SCHEMA = "wavecomb-report/1"
-
-
-@dataclass(frozen=True)
-class Markup:
-    """Text, a table, something folded: HTML as ``report_html`` makes it."""
-
-    html: str
+MOST_ROWS = 60
+"""Longer tables are folded."""
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A drawing with its words; its files are figures/NAME.svg and figures/NAME.png.
+class Part:
+    """Anything below a heading.
+
+    Attributes:
+        kind: Name of the macro of the templates that renders it.
+        summary: If not empty, the part is folded behind this line; Markdown leaves it out.
+    """
+
+    kind: ClassVar[str]
+    summary: str = field(default="", kw_only=True)
+
+
+@dataclass(frozen=True)
+class Text(Part):
+    """A paragraph, or with ``mark="heading"`` a heading; other marks are CSS classes."""
+
+    kind = "text"
+    text: str
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Lines(Part):
+    """A list of findings."""
+
+    kind = "lines"
+    lines: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Code(Part):
+    """Preformatted text."""
+
+    kind = "code"
+    text: str
+
+
+@dataclass(frozen=True)
+class Facts(Part):
+    """Names and values, which may be tables of names and values; empty values are left out."""
+
+    kind = "facts"
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table.
+
+    Attributes:
+        text: The value.
+        note: Smaller text after it: an interval.
+        mark: CSS classes: "word" for text, "better", "worse".
+    """
+
+    text: str
+    note: str = ""
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Table(Part):
+    """A table; its first column heads the rows, and equal neighbours in it are one head.
+
+    Attributes:
+        caption: Title.
+        head: Titles of the columns.
+        rows: Cells.
+        note: Small text below.
+    """
+
+    kind = "table"
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    note: str = ""
+
+    def groups(self) -> Iterator[tuple[str, list[Sequence[Cell]]]]:
+        """Yields the heads of rows with the remaining cells of their rows."""
+        for head, rows in itertools.groupby(self.rows, key=lambda row: row[0].text):
+            yield head, [row[1:] for row in rows]
+
+    def is_word(self, column: int) -> bool:
+        """Whether a column holds text."""
+        return any("word" in row[column].mark for row in self.rows)
+
+
+def table(
+    caption: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[Cell | str]],
+    note: str = "",
+    summary: str = "",
+) -> Table:
+    """Makes a table of cells and plain texts; a long one is folded in any case."""
+    filled = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
+    if not summary and len(rows) > MOST_ROWS:
+        summary = f"{caption} ({len(rows)} rows)"
+    return Table(caption, head, filled, note, summary=summary)
+
+
+@dataclass(frozen=True)
+class Figure(Part):
+    """A figure; its files are figures/NAME.svg and figures/NAME.png.
 
     Attributes:
         name: Unique in a report.
-        title: Short.
-        caption: What is shown, in which unit, what whiskers are, how many runs.
-        drawing: SVG for a page that needs nothing else; "" where it was read from a folder.
+        title: Short title.
+        caption: Content, unit, kind of whiskers, number of runs.
+        drawing: <svg> element.
     """
 
+    kind = "figure"
     name: str
     title: str
     caption: str
-    drawing: str = field(default="", repr=False, compare=False)
+    drawing: str
 
 
 @dataclass(frozen=True)
-class Viewer:
-    """Pictures that can be flipped and subtracted in a browser; the window compares for itself."""
+class Viewer(Part):
+    """Images that can be flipped and subtracted; Markdown leaves it out.
 
-    html: str
+    Attributes:
+        title: Stage and frame.
+        images: Names and addresses.
+    """
 
-
-Part = Markup | Figure | Viewer
+    kind = "viewer"
+    title: str
+    images: Sequence[tuple[str, str]]
 
 
 @dataclass
 class Section:
-    """Parts under a heading.
+    """Parts under a heading."""
 
-    Attributes:
-        key: Of its address in the page; letters, digits and hyphens.
-        title: In words.
-        parts: In order.
-    """
-
-    key: str
     title: str
     parts: list[Part] = field(default_factory=list)
 
+    @property
+    def key(self) -> str:
+        """Its address in the page."""
+        return key_of(self.title)
 
-@dataclass
-class Report:
-    """All of it.
 
-    Attributes:
-        title: Of the page.
-        lead: HTML below the title.
-        warnings: Why the figures deserve care, lines of text.
-        sections: Those without parts are left out.
+class Writer:
+    """Collects sections and findings, and saves figures as they are made."""
+
+    def __init__(self, figures: Path) -> None:
+        self.figures = figures
+        self.sections: list[Section] = []
+        self.findings: list[str] = []
+
+    def begin(self, title: str) -> None:
+        """Starts a section."""
+        self.sections.append(Section(title))
+
+    def add(self, *parts: Part | None) -> None:
+        """Adds parts to the section, without those that are None."""
+        self.sections[-1].parts += [part for part in parts if part is not None]
+
+    def draw(self, drawn: Drawn | None) -> None:
+        """Adds a figure to the section, if there is one."""
+        if drawn is not None:
+            lay_out(drawn)
+            drawing = svg(drawn)
+            save(drawn, drawing, self.figures)
+            self.add(Figure(drawn.name, drawn.title, drawn.caption, drawing))
+
+
+def key_of(text: str) -> str:
+    """Returns an address in the page for any text.
+
+    >>> key_of("Wave size, 4 K")
+    'wave-size-4-k'
     """
-
-    title: str
-    lead: str
-    warnings: list[str]
-    sections: list[Section]
-
-    def __post_init__(self) -> None:
-        self.sections = [section for section in self.sections if section.parts]
-
-    def figures(self) -> list[Figure]:
-        """In the order of the page."""
-        return [
-            part for section in self.sections for part in section.parts if isinstance(part, Figure)
-        ]
-
-    def write(self, folder: Path) -> None:
-        """Keeps it in a result folder, whole or not at all; without drawings and viewers.
-
-        Raises:
-            OSError: It cannot be written.
-        """
-        document = {
-            "schema": SCHEMA,
-            "title": self.title,
-            "lead": self.lead,
-            "warnings": self.warnings,
-            "sections": [
-                {
-                    "key": section.key,
-                    "title": section.title,
-                    "parts": [_kept(one) for one in section.parts if not isinstance(one, Viewer)],
-                }
-                for section in self.sections
-            ],
-        }
-        with replacing(folder / FILE) as part:
-            part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
 
 
-def _kept(part: Part) -> dict[str, str]:
-    if isinstance(part, Figure):
-        return {"figure": part.name, "title": part.title, "caption": part.caption}
-    return {"html": part.html}
+def number(value: float, digits: int = 3) -> str:
+    """Formats a number with some significant digits; an en dash if it is unknown.
 
-
-def read_report(folder: Path) -> Report | None:
-    """The report that a folder keeps; None where there is none.
-
-    Raises:
-        WavecombError: It is damaged, or of another version; one line that says what to do.
+    >>> number(0.00123456), number(1234567.0), number(12.0), number(float("nan"))
+    ('0.00123', '1,230,000', '12.0', '–')
     """
-    path = folder / FILE
-    if not path.is_file():
-        return None
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        if document["schema"] != SCHEMA:
-            raise ValueError(f"its schema is {document['schema']!r}, not {SCHEMA!r}")
-        sections = [
-            Section(str(one["key"]), str(one["title"]), [_read(part) for part in one["parts"]])
-            for one in document["sections"]
-        ]
-        warnings = [str(line) for line in document["warnings"]]
-        return Report(str(document["title"]), str(document["lead"]), warnings, sections)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        why = reason(error) if isinstance(error, OSError) else str(error)
-        raise WavecombError(
-            f"{path}: cannot be read: {why}; `wavecomb bench report {folder}` makes it anew"
-        ) from error
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if size < -4:
+        return f"{value:.{digits - 1}e}"
+    rounded = round(value, digits - 1 - size)
+    return f"{rounded:,.{max(0, digits - 1 - size)}f}"
 
 
-def _read(part: dict[str, Any]) -> Part:
-    if "figure" in part:
-        name = str(part["figure"])
-        if Path(name).name != name:
-            raise ValueError(f"a figure is called {name!r}")
-        return Figure(name, str(part["title"]), str(part["caption"]))
-    return Markup(str(part["html"]))
+def interval(low: float, high: float, digits: int = 3) -> str:
+    """Formats an interval as [low, high]; "" if it is unknown."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return ""
+    return f"[{fixed(low, digits)}, {fixed(high, digits)}]"

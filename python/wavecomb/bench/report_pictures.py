@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from wavecomb.bench.analysis_data import in_order
 from wavecomb.bench.figures_style import Drawn
 from wavecomb.bench.figures_verdicts import difference_figure
-from wavecomb.bench.report_html import escape, key_of
+from wavecomb.bench.report_parts import Viewer, key_of
 from wavecomb.errors import WavecombError
 from wavecomb.picture.embedded import data_uri, smaller
-from wavecomb.picture.image import display
+from wavecomb.picture.image import display, read_image
 
 if TYPE_CHECKING:
     from wavecomb.bench.analysis_data import Results
@@ -85,20 +85,16 @@ def _titled(row: dict[str, Any], frames: Iterable[list[tuple[dict[str, Any], Pat
 
 
 def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[Kept]:
-    groups: dict[str, list[dict[str, Any]]] = {}
-    pixels: dict[str, NDArray[Any]] = {}
+    kept: list[tuple[NDArray[Any], list[dict[str, Any]]]] = []
     for row, path in pictures:
-        read = _read(path)
-        same = next(
-            (key for key, other in pixels.items() if np.array_equal(read, other, equal_nan=True)),
-            None,
-        )
-        if same is None:
-            same = row["run_id"]
-            pixels[same] = read
-        groups.setdefault(same, []).append(row)
-    kept = [Kept(_name(rows, pictures), pixels[key]) for key, rows in groups.items()]
-    return kept[:MOST_PICTURES]
+        pixels = _read(path)
+        same = (rows for other, rows in kept if np.array_equal(pixels, other, equal_nan=True))
+        rows = next(same, None)
+        if rows is None:
+            kept.append((pixels, [row]))
+        else:
+            rows.append(row)
+    return [Kept(_name(rows, pictures), pixels) for pixels, rows in kept[:MOST_PICTURES]]
 
 
 def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, Any], Path]]) -> str:
@@ -112,53 +108,23 @@ def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, A
     return ": ".join(part for part in parts if part) or str(rows[0].get("renderer"))
 
 
-def viewer(shot: Shot) -> str:
-    """Pictures that can be flipped and subtracted."""
+def viewer(shot: Shot) -> Viewer | None:
+    """Returns the images of a shot for flipping and subtraction; None if there is only one."""
     entries = [(kept.name, kept.pixels) for kept in shot.kept]
     if shot.golden is not None:
         entries.append(("golden (converged)", shot.golden))
-    if len(entries) < 2:
-        return ""
-    key = f"viewer-{key_of(shot.stage)}"
-    options = "".join(f"<option>{escape(name)}</option>" for name, _ in entries)
-    last = options[::-1].replace("<option>"[::-1], "<option selected>"[::-1], 1)[::-1]
-    sources = "".join(
-        f'<figure><img src="{_data_uri(pixels)}" alt="{escape(f"{shot.stage}: {name}")}">'
-        f"<figcaption>{escape(name)}</figcaption></figure>"
-        for name, pixels in entries
-    )
-    modes = "".join(
-        f'<label><input type="radio" name="{key}-mode" value="{value}"{checked}> {text}</label>'
-        for value, text, checked in (
-            ("a", "A", " checked"),
-            ("b", "B", ""),
-            ("difference", "difference", ""),
-        )
-    )
-    return (
-        f'<div class="viewer" role="group" aria-label="{escape(f"Pictures of {shot.stage}")}">'
-        f'<p class="title">{escape(shot.stage)}</p><div class="controls" hidden>'
-        f"<label>A <select>{options}</select></label><label>B <select>{last}</select></label>"
-        f"<fieldset><legend>Show</legend>{modes}</fieldset>"
-        '<label>Gain <input type="range" min="0" max="8" step="1" value="2"> '
-        "<output>×4</output></label></div>"
-        '<canvas hidden tabindex="0" role="img" width="8" height="8"></canvas>'
-        '<p class="shown" aria-live="polite"></p>'
-        '<p class="note" hidden>Click the picture, or press Space, to flip between A and B; '
-        "a, b and d choose. Differences are of the 8-bit picture as shown.</p>"
-        f'<div class="sources">{sources}</div></div>'
-    )
+    images = [(name, data_uri(display(smaller(pixels, LARGEST)))) for name, pixels in entries]
+    return Viewer(shot.stage, images) if len(images) > 1 else None
 
 
 def differences(shot: Shot) -> Drawn | None:
     """Maps of the differences to the golden picture."""
     if shot.golden is None or not shot.kept:
         return None
-    pictures = [(kept.name, kept.pixels) for kept in shot.kept]
     pictures = [
-        (name if len(name) < 34 else name[:31] + "…", p)
-        for name, p in pictures
-        if p.shape == shot.golden.shape
+        (kept.name if len(kept.name) < 34 else f"{kept.name[:31]}…", kept.pixels)
+        for kept in shot.kept
+        if kept.pixels.shape == shot.golden.shape
     ]
     if not pictures:
         return None
@@ -169,18 +135,9 @@ def differences(shot: Shot) -> Drawn | None:
 def _read(path: Path) -> NDArray[Any]:
     """Pixels of a .npy file or a picture, (height, width, 3)."""
     try:
-        if path.suffix == ".npy":
-            pixels = np.load(path, allow_pickle=False)
-        else:
-            from wavecomb.picture.image import read_image
-
-            pixels = read_image(path)
+        pixels = np.load(path, allow_pickle=False) if path.suffix == ".npy" else read_image(path)
     except (OSError, ValueError) as error:
         raise WavecombError(f"{path}: cannot be read as a picture: {error}") from error
     if pixels.ndim != 3 or pixels.shape[2] < 3:
         raise WavecombError(f"{path}: is no colour picture: its shape is {pixels.shape}")
     return np.asarray(pixels[:, :, :3], np.float32)
-
-
-def _data_uri(pixels: NDArray[Any]) -> str:
-    return data_uri(display(smaller(pixels, LARGEST)))

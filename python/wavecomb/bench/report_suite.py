@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the report says of a suite as a whole: roulette, effects, costs."""
+"""Sections about a suite as a whole: roulette, effects, costs."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wavecomb.bench import figures_runs, figures_verdicts
 from wavecomb.bench.analysis_costs import PREDICTIONS, calibration, material_costs
 from wavecomb.bench.analysis_factorial import effects, factors_of
-from wavecomb.bench.analysis_ratios import ratios
 from wavecomb.bench.figures_style import fixed
-from wavecomb.bench.report_html import folded, key_of, paragraph
+from wavecomb.bench.report_experiment import compared
+from wavecomb.bench.report_parts import Text, Writer, key_of
 from wavecomb.bench.report_tables import calibration_table, effects_table, ratio_table
-from wavecomb.bench.report_writer import Writer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def suite(out: Writer, results: Results) -> None:
-    """What goes across experiments: roulette, effects, costs."""
+    """Writes the sections that go across experiments."""
     ours = results.runs[results.runs["renderer"] == "wavecomb"]
     flat = ours[ours["factor"] == ""]
     if flat["roulette"].nunique() > 1:
@@ -29,51 +28,42 @@ def suite(out: Writer, results: Results) -> None:
     if len(factors_of(flat)) > 1:
         _effects(out, flat)
     costs = material_costs(results)
-    if not costs.empty:
-        lines = {column: calibration(costs, column) for column in PREDICTIONS}
-        if any(lines.values()):
-            out.begin("Predicted cost")
-            out.add(calibration_table(lines, PREDICTIONS))
-            out.draw(figures_verdicts.cost_figure(costs, lines, "costs"))
-            first = lines["calibrated_ns"] or lines["predicted_ns"]
-            out.findings.append(
-                f"Calibration predicts what materials cost with r² = {fixed(first['r2'], 2)} and "
-                f"slope {first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
-            )
+    lines = {column: calibration(costs, column) for column in PREDICTIONS}
+    if any(lines.values()):
+        out.begin("Predicted cost")
+        out.add(calibration_table(lines, PREDICTIONS))
+        out.draw(figures_verdicts.cost_figure(costs, lines, "costs"))
+        first = lines["calibrated_ns"] or lines["predicted_ns"]
+        out.findings.append(
+            f"Calibration predicts what materials cost with r² = {fixed(first['r2'], 2)} and "
+            f"slope {first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
+        )
 
 
 def _roulette(out: Writer, runs: pd.DataFrame) -> None:
-    across = ("experiment", "factor", "factor_value")
-    metrics: dict[str, Any] = {
-        text: ratios(runs, "roulette", column, ignore=across)
-        for text, column in (
-            ("rays", "rays"),
-            ("records", "records"),
-            ("relMSE", "rel_mse"),
-            ("efficiency", "efficiency"),
-            ("shade + order", "shade_and_order_s"),
-            ("render", "render_s"),
-        )
-        if runs[column].notna().any()
+    columns = {
+        **{"rays": "rays", "records": "records", "relMSE": "rel_mse", "efficiency": "efficiency"},
+        **{"shade + order": "shade_and_order_s", "render": "render_s"},
     }
-    main = metrics.get("render")
-    if main is None or main.empty:
+    across = ("experiment", "factor", "factor_value")
+    metrics = compared(runs, "roulette", columns, across)
+    if "render" not in metrics:
         return
+    title = "Roulette at the same policy, ratio of means to throughput"
     out.begin("Roulette apart from order")
     out.add(
-        paragraph(
+        Text(
             "Roulette changes how much is shaded, and with it the noise; order does not. So it is "
             "judged by efficiency, with the policy the same on both sides."
-        )
+        ),
+        ratio_table(
+            "Roulette at the same policy, ratio of means to throughput", metrics, "roulette"
+        ),
     )
-    title = "Roulette at the same policy, ratio of means to throughput"
-    out.rows(len(main), title, ratio_table(title, metrics, "roulette"))
     if "efficiency" in metrics:
-        words = "efficiency"
-        drawn = figures_runs.ratio_figure(
-            metrics["efficiency"], "roulette-efficiency", "Roulette: efficiency", words, "roulette"
-        )
-        out.draw(drawn)
+        name, title = "roulette-efficiency", "Roulette: efficiency"
+        table = metrics["efficiency"]
+        out.draw(figures_runs.ratio_figure(table, name, title, "efficiency", "roulette"))
 
 
 def _effects(out: Writer, runs: pd.DataFrame) -> None:
@@ -83,12 +73,7 @@ def _effects(out: Writer, runs: pd.DataFrame) -> None:
         ("shade_and_order_s", "shade + order time"),
         ("efficiency", "efficiency"),
     ):
-        if runs[metric].isna().all():
-            continue
         table = effects(runs, metric)
-        if table.empty:
-            continue
-        key = f"effects-{key_of(words)}"
-        out.draw(figures_verdicts.effects_figure(table, key, words))
-        title = f"Effects on {words}"
-        out.add(folded(f"{title}: all {len(table)}", effects_table(table, title)))
+        if not table.empty:
+            out.draw(figures_verdicts.effects_figure(table, f"effects-{key_of(words)}", words))
+            out.add(effects_table(table, f"Effects on {words}"))

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.bench.analysis_data import BOUNDS
 from wavecomb.bench.figures_runs import count_words
 from wavecomb.bench.figures_style import fixed
-from wavecomb.bench.report_html import Cell, interval, number, table
+from wavecomb.bench.report_parts import Cell, Table, interval, number, table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,65 +23,56 @@ HOLM = (
 
 def ratio_table(
     caption: str, metrics: Mapping[str, pd.DataFrame], level_words: str, note: str = HOLM
-) -> str:
-    """Ratios of several metrics side by side.
+) -> Table | None:
+    """Shows ratios of several metrics side by side.
 
     Args:
-        caption: Of the table.
-        metrics: Words -> table of ``ratios``; the last one's verdict is shown.
+        caption: Title of the table.
+        metrics: Titles and tables of ``ratios``; the verdict is that of the last one.
         level_words: Heading of the level column.
-        note: Below.
+        note: Text below.
     """
     found = {words: entry for words, entry in metrics.items() if not entry.empty}
     if not found:
-        return ""
-    main = next(reversed(found.values()))
-    by_place = {
-        words: {(row.cell, row.level): row for row in entry.itertuples()}
-        for words, entry in found.items()
-    }
+        return None
+    keyed = {words: entry.set_index(["cell", "level"]) for words, entry in found.items()}
     rows = []
-    for row in main.itertuples():
+    for row in next(reversed(found.values())).itertuples():
         cells: list[Cell | str] = [row.cell, Cell(level_text(row.level), mark="word")]
-        for words in found:
-            other = by_place[words].get((row.cell, row.level))
-            if other is None:
+        for entry in keyed.values():
+            if (row.cell, row.level) not in entry.index:
                 cells.append("–")
-            elif other.is_baseline:
-                cells.append(Cell("1", f"= {number(other.mean)}"))
-            else:
-                cells.append(Cell(f"{other.ratio:.3f}", interval(other.low, other.high)))
-        cells += [str(row.n), _verdict(row.verdict, row.level)]
-        rows.append(cells)
-    head = ["", level_words, *found, "n", "verdict"]
-    return table(caption, head, rows, note)
+                continue
+            other = entry.loc[(row.cell, row.level)]
+            cells.append(
+                Cell("1", f"= {number(other['mean'])}")
+                if other.is_baseline
+                else Cell(f"{other.ratio:.3f}", interval(other.low, other.high))
+            )
+        rows.append([*cells, str(row.n), _verdict(row.verdict, row.level)])
+    return table(caption, ["", level_words, *found, "n", "verdict"], rows, note)
 
 
-def order_table(found: pd.DataFrame, caption: str) -> str:
-    """The verdict on order."""
+def order_table(found: pd.DataFrame, caption: str) -> Table:
+    """Shows the verdict on order."""
     rows = []
     for row in found.itertuples():
-        share = (
-            Cell(f"{100 * row.share:.0f} %", _percents(row.share_low, row.share_high))
-            if row.gap_shown and row.policy != "none"
-            else Cell("–")
-        )
-        placebo = Cell(number(row.placebo_ratio), interval(row.placebo_low, row.placebo_high))
-        to_none = (
-            Cell("1")
-            if row.policy == "none"
-            else Cell(f"{row.ratio:.3f}", interval(row.low, row.high))
-        )
+        none = row.policy == "none"
+        share = placebo = Cell("–")
+        if row.gap_shown and not none:
+            share = Cell(f"{100 * row.share:.0f} %", _percents(row.share_low, row.share_high))
+        if row.placebo_ratio == row.placebo_ratio:
+            placebo = Cell(number(row.placebo_ratio), interval(row.placebo_low, row.placebo_high))
         rows.append(
             [
                 row.stratum,
                 Cell(row.policy, mark="word"),
-                to_none,
-                placebo if row.placebo_ratio == row.placebo_ratio else Cell("–"),
+                Cell("1") if none else Cell(f"{row.ratio:.3f}", interval(row.low, row.high)),
+                placebo,
                 share,
                 str(row.cells),
                 str(row.n),
-                _verdict("" if row.policy == "none" else row.verdict, row.policy),
+                _verdict("" if none else row.verdict, row.policy),
             ]
         )
     head = ["", "policy", "to none", "to placebo", "share won", "cells", "n", "verdict"]
@@ -94,9 +85,9 @@ def order_table(found: pd.DataFrame, caption: str) -> str:
     return table(caption, head, rows, note)
 
 
-def regret_table(found: pd.DataFrame, caption: str) -> str:
-    """Worst and mean regret of each policy over cells, then the cells of adaptive."""
-    rows: list[Sequence[Cell | str]] = []
+def regret_table(found: pd.DataFrame, caption: str) -> Table:
+    """Shows mean and worst regret of each policy over cells."""
+    rows: list[list[Cell | str]] = []
     for policy, part in found.groupby("policy", sort=False):
         worst = part.loc[part["regret"].idxmax()]
         rows.append(
@@ -109,16 +100,15 @@ def regret_table(found: pd.DataFrame, caption: str) -> str:
                 count_words(part["n"]),
             ]
         )
-    head = ["policy", "mean regret", "worst", "where", "cells", "n"]
     note = (
         "Render time above that of the best fixed policy of each cell. The best of noisy means "
         "looks a little better than it is, so regret is rather over- than understated."
     )
-    return table(caption, head, rows, note)
+    return table(caption, ["policy", "mean regret", "worst", "where", "cells", "n"], rows, note)
 
 
-def effects_table(found: pd.DataFrame, caption: str) -> str:
-    """All effects of a factorial."""
+def effects_table(found: pd.DataFrame, caption: str) -> Table:
+    """Shows all effects of a factorial, folded."""
     rows: list[list[Cell | str]] = [
         [
             str(row.kind),
@@ -132,15 +122,14 @@ def effects_table(found: pd.DataFrame, caption: str) -> str:
         for row in found.itertuples(index=False)
     ]
     head = ["", "effect", "ratio", "p (Holm)", "pairs", "n", "verdict"]
-    return table(
-        caption, head, rows, "An interaction is the factor by which one changes the other."
-    )
+    note = "An interaction is the factor by which one changes the other."
+    return table(caption, head, rows, note, f"{caption}: all {len(rows)}")
 
 
 def mean_table(
     found: pd.DataFrame, caption: str, level_words: str, columns: Mapping[str, str], note: str = ""
-) -> str:
-    """Plain means: words -> column; columns without a figure are left out."""
+) -> Table | None:
+    """Shows plain means, by title and column; columns without a value are left out."""
     kept = {words: name for words, name in columns.items() if found[name].notna().any()}
     rows = [
         [
@@ -149,29 +138,26 @@ def mean_table(
             *(number(float(row[name])) for name in kept.values()),
             str(row["n"]),
         ]
-        for _, row in found.iterrows()
+        for row in found.to_dict("records")
     ]
-    return table(caption, ["", level_words, *kept, "n"], rows, note) if kept else ""
+    return table(caption, ["", level_words, *kept, "n"], rows, note) if kept else None
 
 
-def calibration_table(lines: Mapping[str, Mapping[str, Any]], words: Mapping[str, str]) -> str:
-    """r2, slope and mean error of the predictions."""
-    rows: list[list[Cell | str]] = []
-    for column, line in lines.items():
-        if line:
-            rows.append(
-                [
-                    words[column],
-                    *(
-                        Cell(fixed(line[k], 2), interval(line[f"{k}_low"], line[f"{k}_high"], 2))
-                        for k in ("r2", "slope", "mean_error")
-                    ),
-                    str(line["materials"]),
-                    str(line["runs"]),
-                ]
-            )
-    if not rows:
-        return ""
+def calibration_table(lines: Mapping[str, Mapping[str, Any]], words: Mapping[str, str]) -> Table:
+    """Shows r2, slope and mean error of the predictions."""
+    rows: list[list[Cell | str]] = [
+        [
+            words[column],
+            *(
+                Cell(fixed(line[k], 2), interval(line[f"{k}_low"], line[f"{k}_high"], 2))
+                for k in ("r2", "slope", "mean_error")
+            ),
+            str(line["materials"]),
+            str(line["runs"]),
+        ]
+        for column, line in lines.items()
+        if line
+    ]
     head = ["prediction", "r²", "slope", "mean relative error", "materials", "runs"]
     note = (
         "Materials weighted by their timed records; intervals resample materials. Perfect: 1, 1, 0."
@@ -180,7 +166,7 @@ def calibration_table(lines: Mapping[str, Mapping[str, Any]], words: Mapping[str
 
 
 def level_text(level: Any) -> str:
-    """A level of a factor for people."""
+    """Formats a level of a factor."""
     return f"{level:g}" if isinstance(level, float) else str(level)
 
 
