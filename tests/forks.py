@@ -169,7 +169,14 @@ class Popen(_Popen):
 
 
 def _is_python(words: Sequence[str]) -> bool:
-    return len(words) > 2 and words[0] == sys.executable and words[1] in ("-m", "-c")
+    if len(words) < 3 or words[0] != sys.executable:
+        return False
+    return words[1] in ("-m", "-c") or _is_booted(words[1:])
+
+
+def _is_booted(words: Sequence[str]) -> bool:
+    """Whether this is a command of ``wavecomb.processes``, without more flags of Python."""
+    return words[0] == "-I" and words[1].endswith(os.path.join("wavecomb", "boot.py"))
 
 
 def _started() -> Server | None:
@@ -281,10 +288,17 @@ def _main(descriptor: int) -> None:
     os.environ.update(request["env"])
     way, what, *rest = request["words"]
     sys.argv[:] = [way, *rest]
-    sys.path.insert(0, "" if way == "-c" else request["cwd"])
+    if way != "-I":
+        sys.path.insert(0, "" if way == "-c" else request["cwd"])
     code: object = 0
     try:
-        if way == "-m":
+        if way == "-I":
+            from wavecomb import boot
+
+            # Its parent is the process that waits for it.
+            alive = f"--parent={os.getppid()}"
+            boot.main([alive if one.startswith("--parent=") else one for one in rest])
+        elif way == "-m":
             runpy.run_module(what, run_name="__main__", alter_sys=True)
         else:
             module = type(sys)("__main__")

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping
 from typing import IO, TYPE_CHECKING, Any
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.load_options import rows
 from wavecomb.options import settings
@@ -103,18 +103,17 @@ def view(
     path: Any = getattr(stage, "stage_path", stage)
     if path is not None and not os.path.exists(path):
         raise WavecombError(f"{os.fspath(path)}: no such file")
-    command = [sys.executable, "-m", "wavecomb", "view"]
+    words: list[str] = []
     if size is not None:
-        command += ["--size", *map(str, size)]
+        words += ["--size", *map(str, size)]
     if spp is not None:
-        command += ["--spp", str(spp)]
-    command += ["--denoise"] * denoise + arguments(options)
-    command += [] if path is None else ["--", os.fspath(path)]
+        words += ["--spp", str(spp)]
+    words += ["--denoise"] * denoise + arguments(options)
+    words += [] if path is None else ["--", os.fspath(path)]
     # It outlives this program, and a Ctrl-C that is meant for this one.
     said = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115
-    process = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stderr=said, start_new_session=True
-    )
+    command = processes.command("wavecomb", "view", *words)
+    process = processes.popen(command, stdin=subprocess.DEVNULL, stderr=said)
     window = Window(process, said)
     if wait:
         window.wait()

@@ -13,6 +13,8 @@ import forks
 import pytest
 from parts import only_where
 
+from wavecomb import processes
+
 pytest.importorskip("wavecomb._core")
 pytestmark = only_where(sys.platform == "linux", "elsewhere nothing is forked")
 
@@ -86,3 +88,11 @@ def test_what_is_read_at_import_makes_a_fresh_process(variable: str) -> None:
     assert fresh.wait(60) == 0 and fresh._told is None
     other = forks.Popen(["true"])
     assert other.wait(60) == 0 and other._told is None
+
+
+def test_processes_that_the_package_starts_are_forked() -> None:
+    code = "import sys; print(sys.argv, '' in sys.path)"
+    words = processes.command("-c", code, "a", parent=os.getpid())
+    process = forks.Popen(words, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    assert process._told is not None
+    assert process.communicate(timeout=60)[0] == "['-c', 'a'] False\n" and process.returncode == 0

@@ -222,8 +222,10 @@ def test_window_is_started_with_what_was_said(
         purposes=["proxy"], variants={"lod": "high"}, frame=None, roulette="off",
     )  # fmt: skip
     command, how = started[0]
-    assert command[1:] == [
-        "-m", "wavecomb", "view", "--size", "64", "32", "--spp", "4", "--denoise",
+    start = command.index("wavecomb")
+    assert command[1] == "-I" and not any(word.startswith("--parent") for word in command[:start])
+    assert command[start:] == [
+        "wavecomb", "view", "--size", "64", "32", "--spp", "4", "--denoise",
         "--camera", "/Cam", "--purpose", "proxy", "--variant", "lod=high", "--roulette", "off",
         "--", str(stage),
     ]  # fmt: skip

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.bench.plan import Config
 from wavecomb.bench.process import Outcome, run_lines
 from wavecomb.errors import WavecombError
@@ -53,15 +54,14 @@ def record(stage: Path) -> Path:
         "import sys; from pathlib import Path; from recording import record; "
         "record(Path(sys.argv[1])).save(Path(sys.argv[2]))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(stage.resolve()), str(folder.resolve())],
-        cwd=TOOLS,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode != 0:
-        said = done.stderr.strip().splitlines()[-1:] or ["no message"]
+    words = ("-c", code, str(stage.resolve()), str(folder.resolve()))
+    process = processes.popen(
+        processes.command(*words, parent=os.getpid(), path=[str(TOOLS)]),
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    _, err = process.communicate()
+    if process.returncode != 0:
+        said = err.strip().splitlines()[-1:] or ["no message"]
         raise WavecombError(f"{stage}: cannot be given to the peers: {said[0]}")
     return folder
 
@@ -75,12 +75,15 @@ def run_peer(
         raise WavecombError(f"{config.name}: peers render square pictures only; change its size")
     kind, options = _KINDS[config.renderer]
     depth = config.settings.get("max_depth", 8)
-    command = [
-        *(str(CYCLES_PYTHON) if kind == "cycles" else sys.executable, "-W", "ignore"),
-        *(str(WORKER), kind, "--options", json.dumps(options)),
+    command = processes.command(
+        *(WORKER.stem, kind, "--options", json.dumps(options)),
         *("--stage", str(stage.resolve()), "--recorded", str(record(stage).resolve())),
         *("--size", str(width), "--threads", str(threads), "--max-depth", str(depth)),
-    ]
+        parent=os.getpid(),
+        path=[str(TOOLS)],
+        python=str(CYCLES_PYTHON) if kind == "cycles" else None,
+        flags=["-W", "ignore"],
+    )
     times = 2 if config.renderer in _COMPILES else 1
     jobs = [
         {"spp": spp, "seed": seed + 1000 * k, "image": str(image.resolve()) if k == 0 else None}

@@ -9,13 +9,13 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.bench import machine
 from wavecomb.bench.counters import Session
 
@@ -43,10 +43,10 @@ class Outcome:
 
 def run_worker(job: dict[str, Any], events: dict[str, str], scratch: Path) -> Outcome:
     """Runs ``wavecomb.bench.worker``, under perf where there are events to count."""
-    command = [sys.executable, "-m", "wavecomb.bench.worker"]
     if not events:
-        return run_process(command, job)
+        return run_process(processes.command("wavecomb.bench.worker", parent=os.getpid()), job)
     session = Session(events, scratch / f".perf-{os.getpid()}.csv")
+    command = processes.command("wavecomb.bench.worker", parent=0, keep=session.fds)  # perf's child
     outcome = run_process(
         [*session.command, *command], {**job, "perf": session.job}, fds=session.fds
     )
@@ -78,14 +78,13 @@ def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -
     """Runs a command on a text; reads the JSON lines of its stdout."""
     load, started = machine.load_average()[0], machine.now()
     busy, own, clock = machine.busy_seconds(), _own_seconds(), time.perf_counter()
-    process = subprocess.Popen(
+    process = processes.popen(
         command,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         pass_fds=fds,
-        start_new_session=True,  # Ctrl-C is the runner's
     )
     try:
         out, err = process.communicate(text)

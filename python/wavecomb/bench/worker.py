@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One render in a process of its own: ``python -m wavecomb.bench.worker``.
+"""One render in a process of its own, which ``bench.process`` starts.
 
 Reads a job as JSON from its standard input and writes one JSON line with what came of it. The job:
 

@@ -64,10 +64,10 @@ def worker_command(
     Starts as many as there are machines. Ctrl-C and SIGTERM keep what was done of the task at hand
     in a checkpoint, with which another worker goes on.
     """
+    from wavecomb.boot import end_with_parent
     from wavecomb.farm.folder import Folder, say
     from wavecomb.farm.maps import parse_maps, set_own
     from wavecomb.farm.worker import Worker
-    from wavecomb.run.parents import end_with_parent
 
     def tell(line: str) -> None:
         if not (quiet or as_json):
@@ -79,7 +79,7 @@ def worker_command(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: worker.stop(number))
     if tied:
-        end_with_parent()
+        end_with_parent(0)
         threading.Thread(target=_end_with_stdin, args=(worker,), daemon=True).start()
     done = worker.run()
     if as_json:

@@ -7,11 +7,11 @@ import hashlib
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 
 _MOST_NAMED = 3
@@ -60,20 +60,22 @@ def ask_assets(stage: str, options: Sequence[str]) -> dict[str, Any]:
     Raises:
         WavecombError: The stage cannot be opened.
     """
-    words = [sys.executable, "-m", "wavecomb", "farm", "assets", stage, "--json", *options]
+    process = processes.start(
+        "wavecomb", "farm", "assets", stage, "--json", *options,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
     try:
-        done = subprocess.run(
-            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_LIST_S
-        )
+        out, said = process.communicate(timeout=_LIST_S)
     except subprocess.TimeoutExpired:
+        process.kill()
         raise WavecombError(
             f"{stage}: its files were not listed within {_LIST_S / 3600:.0f} hours (--no-strict "
             "goes on without)"
         ) from None
-    if done.returncode:
-        said = done.stderr.strip().splitlines()
-        raise WavecombError((said[-1] if said else "no word").removeprefix("error: "))
-    found: dict[str, Any] = json.loads(done.stdout)
+    if process.returncode:
+        lines = said.strip().splitlines()
+        raise WavecombError((lines[-1] if lines else "no word").removeprefix("error: "))
+    found: dict[str, Any] = json.loads(out)
     return found
 
 

@@ -19,14 +19,11 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from wavecomb.run.parents import end_with_parent
-
 _SHOW_S = 0.5
 
 
 def main(words: list[str]) -> None:
     """``words``: the job's folder, threads (0: as the job says), and the worker's name."""
-    end_with_parent()
     channel = _take_stdout()
     told = _Told()
     signal.signal(signal.SIGTERM, lambda number, frame: told.stop.set())

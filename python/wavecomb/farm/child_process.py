@@ -9,11 +9,11 @@ import os
 import selectors
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Mapping
 from typing import IO, Any
 
+from wavecomb import processes
 from wavecomb.farm.folder import Folder
 
 _DIE_S = 10.0
@@ -37,13 +37,15 @@ class Child:
         environment = dict(os.environ)
         if isa is not None:
             environment["WAVECOMB_ISA"] = isa
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "wavecomb.farm.child", str(folder.path), str(threads), worker],
+        self._process = processes.start(
+            "wavecomb.farm.child",
+            str(folder.path),
+            str(threads),
+            worker,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
             env=environment,
-            start_new_session=True,
         )
         assert self._process.stdin is not None and self._process.stdout is not None
         self._in, self._out = self._process.stdin, self._process.stdout

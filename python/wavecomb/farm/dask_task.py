@@ -10,9 +10,10 @@ from __future__ import annotations
 import contextlib
 import json
 import subprocess
-import sys
 import tempfile
 import time
+
+from wavecomb import processes
 
 _POLL_S = 0.25
 _LOOK_S = 5.0
@@ -36,13 +37,11 @@ def work(text: str) -> str:
         JSON: ``code``, and ``said``, the last line of standard error.
     """
     told = json.loads(text)
-    words = [sys.executable, "-m", "wavecomb", "farm", "worker", str(told["job"])]
-    words += ["--tied", "--quiet", *map(str, told["options"])]
+    words = ["farm", "worker", str(told["job"]), "--tied", "--quiet", *map(str, told["options"])]
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said,
-            start_new_session=True,
-        )  # fmt: skip
+        process = processes.start(
+            "wavecomb", *words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
+        )
         try:
             look, over = time.monotonic() + _LOOK_S, 0
             while process.poll() is None and over < _MOST_LOOKS:

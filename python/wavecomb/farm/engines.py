@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.farm.dask_engine import Dask, Tls, parse_address
 from wavecomb.farm.folder import Folder
@@ -73,8 +74,10 @@ class Engine:
             folder: The job's.
             threads: Of each; 0: on this machine its share of the cores, elsewhere all.
         """
-        words = [sys.executable, "-m", "wavecomb", "farm", "worker", str(folder.path)]
-        words += ["--tied", "--quiet", "--threads"]
+        words = processes.command(
+            "wavecomb", "farm", "worker", str(folder.path), "--tied", "--quiet", "--threads",
+            parent=None if self.kind == "ssh" else os.getpid(),
+        )  # fmt: skip
         if self.kind == "ssh":
             remote = shlex.join([*words, str(threads)])
             return [["ssh", "-o", "BatchMode=yes", host, remote] for host in self.hosts]

@@ -10,16 +10,16 @@ from __future__ import annotations
 import json
 import os
 import shlex
-import sys
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.farm.folder import Folder
 from wavecomb.picture.files import replacing
 
 
 def worker_words(folder: Folder) -> list[str]:
     """The command of a worker, for any machine that has this Python and the folder."""
-    return [sys.executable, "-m", "wavecomb", "farm", "worker", str(folder.path)]
+    return processes.command("wavecomb", "farm", "worker", str(folder.path))
 
 
 def openjd(folder: Folder, workers: int) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def openjd(folder: Folder, workers: int) -> dict[str, Any]:
     """
     command, *arguments = worker_words(folder)
     name = f"Wavecomb {os.path.basename(folder.spec.stage)}"[:64]
-    check = [*arguments[:3], "resume", str(folder.path), "--on", "local:1"]
+    finish = processes.command("wavecomb", "farm", "resume", str(folder.path), "--on", "local:1")
     return {
         "specificationVersion": "jobtemplate-2023-09",
         "name": name,
@@ -55,7 +55,7 @@ def openjd(folder: Folder, workers: int) -> dict[str, Any]:
             {
                 "name": "Finish",
                 "dependencies": [{"dependsOn": "Render"}],
-                "script": {"actions": {"onRun": {"command": command, "args": check}}},
+                "script": {"actions": {"onRun": {"command": finish[0], "args": finish[1:]}}},
             },
         ],
     }  # fmt: skip

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import IO
 
+from wavecomb import processes
 from wavecomb.farm.checking import repair
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.leases import take_back
@@ -101,13 +102,11 @@ class Local:
             self._starts[index] += 1
             # A file: a pipe would stand still when it is full, and stay open with whoever has it.
             said = self._said[index] = tempfile.TemporaryFile()  # noqa: SIM115
-            self._running[index] = subprocess.Popen(
+            self._running[index] = processes.popen(
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=said,
-                # A signal of the terminal comes to this process alone.
-                start_new_session=True,
             )
 
     def _may_start(self, index: int) -> bool:

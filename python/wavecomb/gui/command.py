@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import contextlib
 import json
-import sys
+import os
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, QTimer, Signal
+from PySide6.QtCore import QObject, QProcess, QTimer, Signal
+
+from wavecomb import processes
 
 KILL_MS = 8000
 """After a stop: what has not ended by then is killed."""
@@ -45,10 +47,6 @@ class Command(QObject):
         """Runs ``wavecomb`` with these arguments."""
         assert self._process is None, "one at a time"
         process = QProcess(self)
-        environment = QProcessEnvironment.systemEnvironment()
-        environment.insert("PYTHONUNBUFFERED", "1")
-        environment.insert("PYTHONIOENCODING", "utf-8")
-        process.setProcessEnvironment(environment)
         process.readyReadStandardOutput.connect(self._read_out)
         process.readyReadStandardError.connect(self._read_err)
         process.finished.connect(self._end)
@@ -56,7 +54,10 @@ class Command(QObject):
         self._process = process
         self._out = self._err = self._text = self._last = ""
         self._stopping = False
-        process.start(sys.executable, ["-m", "wavecomb", *arguments])
+        # Qt starts it from this thread, which is the main one and stays.
+        flags = ["-u", "-X", "utf8"]
+        words = processes.command("wavecomb", *arguments, parent=os.getpid(), flags=flags)
+        process.start(words[0], words[1:])
         process.closeWriteChannel()
 
     def stop(self) -> None:
@@ -133,7 +134,7 @@ class Command(QObject):
 
     def _fail(self, error: QProcess.ProcessError) -> None:
         if error == QProcess.ProcessError.FailedToStart and self._process is not None:
-            message = self._process.errorString()
+            message, program = self._process.errorString(), self._process.program()
             self._process.deleteLater()
             self._process = None
-            self.finished.emit(127, "", f"{sys.executable}: cannot be started: {message}")
+            self.finished.emit(127, "", f"{program}: cannot be started: {message}")

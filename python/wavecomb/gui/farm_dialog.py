@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import html
 import json
-import sys
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.gui.widgets import named
 
@@ -119,14 +120,15 @@ class FarmDialog(QDialog):
             options.pop("frame", None)
         self.folder, self._page = None, ""
         self.say("reading the stage \u2026")
-        process = self._start(["-m", "wavecomb.farm.from_json"], self._written)
+        process = self._start(["wavecomb.farm.from_json"], self._written)
         process.write(json.dumps(self._wanted).encode())
         process.closeWriteChannel()
 
     def _start(self, words: list[str], ended: Callable[[], None]) -> QProcess:
         process = QProcess(self)
         process.finished.connect(lambda code, how: ended())
-        process.start(sys.executable, words)
+        started = processes.command(*words, parent=os.getpid())
+        process.start(started[0], started[1:])
         self._process = process
         self.send.setEnabled(False)
         self.stop.setEnabled(True)
@@ -145,7 +147,7 @@ class FarmDialog(QDialog):
             return
         self.folder = Path(told["job"])
         engine = self.engine.text() or "local"
-        words = ["-m", "wavecomb", "farm", "resume", told["job"], "--on", engine, "--json"]
+        words = ["wavecomb", "farm", "resume", told["job"], "--on", engine, "--json"]
         self._start(words if engine == "none" else [*words, "--page"], self._ended)
         self._timer.start()
 

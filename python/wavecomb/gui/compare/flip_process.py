@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """FLIP in a process of its own: the library holds Python's lock for seconds, a window would stall.
 
-``python -m wavecomb.gui.compare.flip_process`` reads a job as one .npz from stdin and answers
-with one.
+Run as a module, this file reads a job as one .npz from stdin and answers with one.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 
 
@@ -40,8 +40,8 @@ class FlipProcess:
         with self._lock:
             if self._closed:
                 raise WavecombError("FLIP was stopped")
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "wavecomb.gui.compare.flip_process"],
+            self._process = processes.start(
+                "wavecomb.gui.compare.flip_process",
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,

@@ -16,10 +16,10 @@ import sys
 import threading
 from typing import Any
 
+from wavecomb.boot import end_with_parent
 from wavecomb.run.isolate import box, trail
 from wavecomb.run.isolate.broker import Broker, Client
 from wavecomb.run.isolate.memory import limit_of
-from wavecomb.run.parents import end_with_parent
 
 _PASSED_ON = (
     signal.SIGINT,
@@ -95,9 +95,7 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
     os.setpgid(0, 0)
     # Of a group that is not the terminal's: writing there must not stop it.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    end_with_parent()
-    if os.getppid() != parent:
-        os._exit(2)
+    end_with_parent(parent)
     trail.follow(page)
     sys.excepthook = _print_exception
     # What is said in Python goes where it always went; what libraries write is kept for later.

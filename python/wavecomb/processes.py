@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Starts Python processes: the only module that does.
+
+A Python that is started with ``-c`` or ``-m`` has the working folder on its ``sys.path``, so that a
+file ``json.py`` beside a shot would be executed. The processes started here are isolated
+(``python -I``): ``wavecomb.boot`` builds their ``sys.path`` of the standard library, site-packages,
+and the folders that ``folders`` names. They inherit no descriptors but those they are given, have
+their own process group, and end with the process that started them.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import site
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import Future
+from importlib.machinery import PathFinder
+from pathlib import Path
+from typing import Any
+
+from wavecomb import boot
+from wavecomb.errors import WavecombError
+
+_DEPENDENCIES = ("pxr", "numpy", "OpenImageIO", "MaterialX", "click", "rich", "tomli")
+
+
+def interpreter() -> str:
+    """This Python's program, also where another program embeds Python.
+
+    Raises:
+        WavecombError: It is not found.
+    """
+    version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
+    for name in (sys.executable, str(Path(sys.base_exec_prefix, "bin", version))):
+        if name and Path(name).name.startswith(("python", "pypy")) and os.access(name, os.X_OK):
+            return name
+    raise WavecombError(
+        f"no Python was found to start a process with: neither this program ({sys.executable}) nor "
+        f"{sys.base_exec_prefix}/bin/{version} is one"
+    )
+
+
+def folders() -> tuple[list[str], list[str]]:
+    """Folders that a process needs on its ``sys.path`` beside its own standard and site folders.
+
+    Returns:
+        Those of PYTHONPATH, which come before site-packages. Then the user's site folder, the
+        folder of this package, and folders of dependencies that are in none of these, as in a
+        program that set ``sys.path`` itself. All are absolute; the working folder and the folder of
+        the program's script are not among them.
+    """
+    ignores = sys.flags.ignore_environment
+    first = [] if ignores else os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    first = [place for place in first if _is_fit(place)]
+    last = [os.path.dirname(boot.PACKAGE)]
+    if site.ENABLE_USER_SITE:
+        last.insert(0, site.getusersitepackages())
+    known = [*first, *last, *site.getsitepackages()]
+    others = [place for place in sys.path if _is_fit(place) and not _holds_script(place)]
+    for name in _DEPENDENCIES:
+        if PathFinder.find_spec(name, known) is None:
+            found = PathFinder.find_spec(name, others)
+            places = [] if found is None else found.submodule_search_locations or []
+            last += [os.path.dirname(place) for place in places]
+    return first, [place for place in dict.fromkeys(last) if _is_fit(place)]
+
+
+def _is_fit(place: str) -> bool:
+    if not os.path.isabs(place) or os.pathsep in place:
+        return False
+    try:
+        return os.path.realpath(place) != os.path.realpath(os.getcwd())
+    except OSError:  # the working folder was removed
+        return True
+
+
+def _holds_script(place: str) -> bool:
+    script = getattr(sys.modules.get("__main__"), "__file__", None)
+    return script is not None and os.path.dirname(os.path.realpath(script)) == place
+
+
+def command(
+    target: str,
+    *arguments: str,
+    parent: int | None = None,
+    keep: Sequence[int] = (),
+    path: Sequence[str] = (),
+    python: str | None = None,
+    flags: Sequence[str] = (),
+) -> list[str]:
+    """The command that runs a module in an isolated Python.
+
+    Args:
+        target: Module, or "-c", whose first argument is code.
+        arguments: Arguments of the module.
+        parent: Process that the new one ends with and whose group it leaves. 0: whichever process
+            starts it. None: it is independent, as on another machine.
+        keep: Descriptors that it inherits beside the standard streams.
+        path: Folders of Wavecomb's own that are added to its ``sys.path``; absolute.
+        python: Program to run; None: this Python's.
+        flags: More flags of Python.
+
+    Raises:
+        WavecombError: No Python was found.
+    """
+    first, last = folders() if python is None else ([], [])
+    words = [python or interpreter(), "-I"]
+    words += ["-B"] * bool(sys.dont_write_bytecode) + ["-X", "utf8"] * bool(sys.flags.utf8_mode)
+    words += [*flags, os.path.join(boot.PACKAGE, "boot.py")]
+    words += [] if parent is None else [f"--parent={parent}"]
+    for name, values in (
+        ("keep", [str(one) for one in keep]), ("first", first), ("last", last), ("path", path),
+    ):  # fmt: skip
+        if values:
+            words.append(f"--{name}=" + ("," if name == "keep" else os.pathsep).join(values))
+    return [*words, target, *arguments]
+
+
+def start(
+    target: str,
+    *arguments: str,
+    keep: Sequence[int] = (),
+    flags: Sequence[str] = (),
+    **options: Any,
+) -> subprocess.Popen[Any]:
+    """Starts a module in an isolated Python that ends with this process.
+
+    Args:
+        target: As for ``command``.
+        arguments: As for ``command``.
+        keep: As for ``command``.
+        flags: As for ``command``.
+        **options: Arguments of ``subprocess.Popen``.
+
+    Raises:
+        WavecombError: No Python was found.
+        OSError: The process could not be started.
+    """
+    words = command(target, *arguments, parent=os.getpid(), keep=keep, flags=flags)
+    return popen(words, pass_fds=tuple(keep), **options)
+
+
+def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
+    """Starts what ``command`` gave, in a session of its own, from a thread that does not end.
+
+    The kernel kills a process when the thread that started it ends, not only when the whole parent
+    does. Therefore other threads than the main one leave the start to a thread that stays.
+    """
+    options = {"start_new_session": True, **options}
+    if threading.current_thread() is threading.main_thread():
+        return subprocess.Popen(words, **options)
+    done: Future[subprocess.Popen[Any]] = Future()
+    _Starter.current().jobs.put((words, options, done))
+    return done.result()
+
+
+class _Starter:
+    """A thread that starts processes for others.
+
+    Attributes:
+        jobs: What is to be started: a command, options, and a future.
+    """
+
+    _lock = threading.Lock()
+    _current: _Starter | None = None
+
+    def __init__(self) -> None:
+        self.jobs: queue.SimpleQueue[tuple[Sequence[str], dict[str, Any], Future[Any]]]
+        self.jobs = queue.SimpleQueue()
+        self._process = os.getpid()
+        threading.Thread(target=self._run, name="process starter", daemon=True).start()
+
+    @classmethod
+    def current(cls) -> _Starter:
+        """The one of this process; a fork does not have its parent's threads."""
+        with cls._lock:
+            if cls._current is None or cls._current._process != os.getpid():
+                cls._current = cls()
+            return cls._current
+
+    def _run(self) -> None:
+        while True:
+            words, options, done = self.jobs.get()
+            try:
+                done.set_result(subprocess.Popen(words, **options))
+            except BaseException as error:
+                done.set_exception(error)
+            del words, options, done
+
+
+def isolate_multiprocessing() -> None:
+    """Makes ``multiprocessing`` start isolated processes, by "spawn" and by "forkserver".
+
+    Its children are ``python -c``, and are sent this process's ``sys.path``. A command of Wavecomb
+    calls this before it uses ``multiprocessing``, also through a library.
+    """
+    from multiprocessing import spawn, util
+
+    flags: Any = getattr(util, "_args_from_interpreter_flags")  # noqa: B009
+    if getattr(flags, "isolates", False):
+        return
+    prepare = spawn.get_preparation_data
+
+    def isolated_flags() -> list[str]:
+        return ["-I", *(flag for flag in flags() if flag not in ("-I", "-E", "-s", "-P"))]
+
+    def prepared(name: str) -> dict[str, Any]:
+        data = prepare(name)
+        first, last = folders()
+        roots = {os.path.realpath(one) for one in (sys.prefix, sys.base_prefix, sys.exec_prefix)}
+        own = [
+            place
+            for place in sys.path
+            if _is_fit(place)
+            and not _holds_script(place)
+            and any(_is_within(place, root) for root in roots)
+        ]
+        data["sys_path"] = boot.extended(own, first, last)
+        return data
+
+    isolated_flags.isolates = True  # type: ignore[attr-defined]
+    setattr(util, "_args_from_interpreter_flags", isolated_flags)  # noqa: B010
+    spawn.get_preparation_data = prepared
+
+
+def _is_within(place: str, root: str) -> bool:
+    return os.path.commonpath([os.path.realpath(place), root]) == root
