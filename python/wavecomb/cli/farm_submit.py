@@ -139,6 +139,7 @@ def submit_command(
         if isa not in ISAS:
             raise WavecombError(f"--isa {isa}: there are {', '.join(ISAS)}")
     prepared = prepare(asked)
+    asked = prepared.asked
     spec = _spec(
         prepared, asked, every=every or 120.0, tries=tries, lease_s=lease, hang_s=hang,
         slow=slow, strict=strict, assets=assets, maps=parse_maps(maps), isa=isa,

@@ -36,7 +36,7 @@ def frame_options(command: F) -> F:
             "--frames",
             metavar="RANGE",
             help="Frames: 1-48, 1-48x2, 1,5,9. Names of files say where the frame goes: "
-            "shot.####.exr, shot.%04d.exr or shot.<frame>.exr.",
+            "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
         ),
     ):
         command = option(command)

@@ -18,6 +18,7 @@ from wavecomb.cli.reporting import Reporter, make_reporter
 from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.run import aovs as aov_names
+from wavecomb.run.frame_names import fill, has_place
 from wavecomb.run.learned import BEFORE, ENDING, Learning, check_taught, learned_of
 
 if TYPE_CHECKING:
@@ -95,6 +96,11 @@ class Asked:
         chosen = {name: value for name, value in options.items() if value is not None}
         return cls(source=source, purpose=purpose, layers=layers, chosen=chosen, **own)
 
+    def named(self) -> list[str]:
+        """Files that options name, but for the stage."""
+        names = (*self.written(), self.learn_from, self.purpose.resume)
+        return [name for name in names if name is not None]
+
     @property
     def costs_file(self) -> str | None:
         """A file of costs that is read and written; None: there is none."""
@@ -105,6 +111,18 @@ class Asked:
         """Files that are written, with places for the frame."""
         own = (self.output, self.png, self.deep, self.stats_file, self.costs_file, self.learn_to)
         return (*own, self.purpose.preview, self.purpose.checkpoint_file)
+
+    def at(self, frame: float) -> Asked:
+        """The same with the frame in all names of files that have a place for it."""
+
+        def filled(name: str | None) -> str | None:
+            return None if name is None else fill(name, frame)
+
+        names = ("output", "png", "deep", "stats_file", "learn_from", "learn_to")
+        changes: dict[str, Any] = {name: filled(getattr(self, name)) for name in names}
+        purpose = replace(purpose_at(self.purpose, frame), resume=filled(self.purpose.resume))
+        costs = self.costs if self.costs_file is None else filled(self.costs)
+        return replace(self, purpose=purpose, costs=costs, **changes)
 
     @property
     def whole(self) -> str:
@@ -154,6 +172,7 @@ class Prepared:
     """What is to be rendered.
 
     Attributes:
+        asked: What was asked for, with the frame of a single image in the names of its files.
         source: Options of the stage, those of a checkpoint included.
         resumed: The checkpoint to go on from.
         jobs: A plan, its frames and its job for each product.
@@ -162,6 +181,7 @@ class Prepared:
         reporter: Of all jobs.
     """
 
+    asked: Asked
     source: StageOptions
     resumed: Checkpoint | None
     jobs: list[tuple[Plan, tuple[float, ...] | None, Job]]
@@ -179,6 +199,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     from wavecomb.run.bands import band_rows
     from wavecomb.run.settings import keeps_error
 
+    asked = _with_frame(asked, peek)
     purpose, layers, source = asked.purpose, asked.layers, asked.source
 
     def checked(names: Names, plan: Plan | None = None) -> tuple[float, ...] | None:
@@ -218,6 +239,9 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     before = None if resumed is None else resumed.aovs
     choices, opened = peek(source, asked.stage)
     plans = plan_products(choices, asked.output, beside, purpose, asked.frames, asked.output_dir)
+    if asked.frames is None:
+        frame = choices[0].first_frame if source.frame is None else source.frame
+        plans = [replace(plan, names=plan.names.at(frame)) for plan in plans]
     reporter = make_reporter(purpose.progress, asked.quiet)
 
     def fits(settings: Any, aovs: Any) -> None:
@@ -248,7 +272,25 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         (plan, numbers, job_of(plan, numbers))
         for plan, numbers in zip(plans, all_numbers, strict=True)
     ]
-    return Prepared(source, resumed, jobs, learning, opened, reporter)
+    return Prepared(asked, source, resumed, jobs, learning, opened, reporter)
+
+
+def _with_frame(asked: Asked, peek: Peek) -> Asked:
+    """Fills places for the frame in the names of a single image's files.
+
+    The frame is that of --frame, else that of the checkpoint that is resumed, else the one at which
+    the stage begins.
+    """
+    if asked.frames is not None or not any(map(has_place, asked.named())):
+        return asked
+    frame, resume = asked.source.frame, asked.purpose.resume
+    if frame is None and resume is not None and not has_place(resume):
+        resumed = asked.purpose.load()
+        assert resumed is not None
+        frame = asked.source.completed(resumed.source).frame
+    if frame is None:
+        frame = peek(asked.source, asked.stage)[0][0].first_frame
+    return asked.at(frame)
 
 
 def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:

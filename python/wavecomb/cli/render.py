@@ -152,12 +152,13 @@ def render_command(**options: Any) -> None:
     all. docs/render.md and docs/aovs.md say more.
     """
     asked = Asked.take(options)
-    purpose, costs_file, stage = asked.purpose, asked.costs_file, asked.stage
     enter_to_render(
-        asked.written(), asked.output, asked.output_dir, asked.frames, split=asked.layers.split,
-        gpu=purpose.denoise,
+        asked.written(), asked.output, asked.output_dir, asked.frames, asked.source.frame,
+        split=asked.layers.split, gpu=asked.purpose.denoise,
     )  # fmt: skip
     prepared = prepare(asked)
+    asked = prepared.asked
+    purpose, costs_file, stage = asked.purpose, asked.costs_file, asked.stage
     jobs, source, resumed, reporter = (
         prepared.jobs, prepared.source, prepared.resumed, prepared.reporter,
     )  # fmt: skip

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 
-from wavecomb.run.frame_names import fill, parse_frames
+from wavecomb.run.frame_names import fill, has_place, parse_frames
 
 MOST_NAMES = 100_000
 """Beyond that the folder of a sequence is allowed, not each name."""
@@ -17,6 +17,7 @@ def enter_to_render(
     output: str | None,
     folder: str | None,
     frames: str | None,
+    frame: float | None = None,
     *,
     split: bool,
     gpu: bool,
@@ -28,6 +29,7 @@ def enter_to_render(
         output: The picture among them; None: the stage says.
         folder: Where pictures go that the stage names; None: the working folder.
         frames: As ``--frames`` takes them.
+        frame: The frame of a single image; None: the stage says.
         split: Whether there is a picture for each layer.
         gpu: Whether denoising may use devices.
     """
@@ -35,9 +37,11 @@ def enter_to_render(
     from wavecomb.run.isolate.broker import Outputs
 
     given = [name for name in names if name is not None]
-    numbers = [] if frames is None else parse_frames(frames)
+    single = () if frame is None else (frame,)
+    numbers = single if frames is None else parse_frames(frames)
     trees: list[tuple[str, str]] = []
-    if len(numbers) * len(given) > MOST_NAMES:
+    is_open = not numbers and any(map(has_place, given))
+    if is_open or len(numbers) * len(given) > MOST_NAMES:
         trees = [(os.path.dirname(os.path.abspath(n)), os.path.splitext(n)[1]) for n in given]
         filled = []
     elif numbers:

@@ -14,8 +14,10 @@ MAX_FRAMES = 1_000_000
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _RANGE = re.compile(rf"({_NUMBER})(?:-({_NUMBER}))?(?:x({_NUMBER}))?")
-_PRINTF = re.compile(r"%(0?)(\d*)d")
-_HASHES = re.compile(r"#+")
+_PLACE = re.compile(
+    r"<frame>|(?P<hashes>#+)|%(?P<zero>0?)(?P<width>\d*)d"
+    r"|\$F(?P<houdini>\d*)(?![A-Za-z\d])|\$\{F(?P<braced>\d*)\}"
+)
 
 
 def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
@@ -83,8 +85,7 @@ def frame_text(frame: float) -> str:
 
 def has_place(pattern: str) -> bool:
     """Whether a file name says where its frame goes."""
-    name = os.path.basename(pattern)
-    return "<frame>" in name or bool(_HASHES.search(name) or _PRINTF.search(name))
+    return _PLACE.search(os.path.basename(pattern)) is not None
 
 
 def matching(pattern: str) -> dict[float, str]:
@@ -96,9 +97,11 @@ def matching(pattern: str) -> dict[float, str]:
         OSError: The folder cannot be read.
     """
     folder, name = os.path.split(pattern)
-    parts = re.split(r"(<frame>|#+|%0?\d*d)", name)
-    text = "".join(r"([+-]?\d+(?:\.\d+)?)" if k % 2 else re.escape(p) for k, p in enumerate(parts))
-    shape = re.compile(text)
+    text, end = "", 0
+    for place in _PLACE.finditer(name):
+        text += re.escape(name[end : place.start()]) + r"([+-]?\d+(?:\.\d+)?)"
+        end = place.end()
+    shape = re.compile(text + re.escape(name[end:]))
     found: dict[float, str] = {}
     for file in sorted(os.listdir(folder or os.curdir)):
         match = shape.fullmatch(file)
@@ -114,23 +117,27 @@ def fill(pattern: str, frame: float) -> str:
     """The name of the file of a frame.
 
     In the last part of the name, ``####`` is the frame with at least so many digits, ``%04d`` with
-    at least so many characters, ``<frame>`` without zeros before it. What is not whole has its
-    decimals behind it.
+    at least so many characters, ``<frame>`` without zeros before it; ``$F4``, ``${F4}`` and ``$F``
+    are Houdini's names of ``####`` and ``<frame>``. A frame that is not whole has its decimals at
+    its end.
 
     >>> fill("out/a.####.exr", 7), fill("a%04d.png", -7), fill("a_<frame>.exr", 1.5)
     ('out/a.0007.exr', 'a-007.png', 'a_1.5.exr')
+    >>> fill("a.$F4.exr", 7), fill("a_${F}b.exr", 7)
+    ('a.0007.exr', 'a_7b.exr')
     """
     folder, name = os.path.split(pattern)
     whole, point, decimals = frame_text(abs(frame)).partition(".")
     sign = "-" if frame < 0 else ""
 
-    def hashes(match: re.Match[str]) -> str:
-        return sign + whole.zfill(len(match[0])) + point + decimals
+    def text_of(place: re.Match[str]) -> str:
+        if place["width"] is not None:
+            width = int(place["width"] or 0)
+            signed = sign + whole
+            return (
+                (signed.zfill(width) if place["zero"] else signed.rjust(width)) + point + decimals
+            )
+        digits = len(place["hashes"] or "") or int(place["houdini"] or place["braced"] or 0)
+        return sign + whole.zfill(digits) + point + decimals
 
-    def printf(match: re.Match[str]) -> str:
-        width = int(match[2] or 0)
-        padded = (sign + whole).zfill(width) if match[1] else (sign + whole).rjust(width)
-        return padded + point + decimals
-
-    name = _PRINTF.sub(printf, _HASHES.sub(hashes, name))
-    return os.path.join(folder, name.replace("<frame>", sign + whole + point + decimals))
+    return os.path.join(folder, _PLACE.sub(text_of, name))

@@ -36,6 +36,7 @@ class RenderChoice:
         depth_of_field: Likewise.
         aovs: Layers, as ``--aov`` takes them.
         output: Name of the file.
+        start: Start time code of the stage.
     """
 
     settings: str | None = None
@@ -51,6 +52,12 @@ class RenderChoice:
     depth_of_field: bool = True
     aovs: tuple[str, ...] | None = None
     output: str | None = None
+    start: float | None = None
+
+    @property
+    def first_frame(self) -> float:
+        """The frame that is rendered unless another is chosen; 1 where the stage names none."""
+        return 1.0 if self.start is None else self.start
 
     def region(self, width: int, height: int) -> tuple[int, int, int, int] | None:
         """Pixels whose centres are in the data window: x0, y0, x1, y1, y down, the end excluded.

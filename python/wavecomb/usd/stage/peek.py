@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from pxr import Usd
@@ -12,6 +13,7 @@ from wavecomb.usd.stage.diagnostics import captured
 from wavecomb.usd.stage.opening import open_render_settings
 from wavecomb.usd.stage.render_settings import read_choices
 from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.times import frame_number, time_code
 
 
 def peek_products(
@@ -38,4 +40,6 @@ def peek_products(
     with captured(unread):
         layer = None if session_layer is None else Path(session_layer)
         stage = open_render_settings(Path(file), render_settings, layer)
-        return read_choices(stage, render_settings, product, unread), stage
+        choices = read_choices(stage, render_settings, product, unread)
+        start = frame_number(time_code(stage, None))
+        return [replace(choice, start=start) for choice in choices], stage
