@@ -104,12 +104,10 @@ def test_fallback_by_a_primvar(tmp_path):
     assert scene.material_of("Bare")["emission"] == (0.125, 0.25, 0.5)
 
 
-@pytest.mark.parametrize(
-    "primvar", ['string primvars:how = "mirror"', 'token primvars:how = "mirror"']
-)
-def test_wrap_modes_by_a_primvar(tmp_path, primvar):
+@pytest.mark.parametrize("kind", ["string", "token"])
+def test_wrap_modes_by_a_primvar(tmp_path, kind):
     nodes = reader("string", "how", '"clamp"')
-    meshes = {"Q": primvar, "Bare": ""}
+    meshes = {"Q": f'{kind} primvars:how = "mirror"', "Bare": ""}
     scene, loaded = load(tmp_path, stage(f"token inputs:wrapS{FROM_P}", nodes, meshes=meshes))
     assert scene.textures[use_of(scene, "Q")["texture"]]["wrap"] == ("mirror", "black")
     assert scene.textures[use_of(scene, "Bare")["texture"]]["wrap"] == ("clamp", "black")
@@ -159,7 +157,8 @@ def test_constant_nodes_count_too(tmp_path):
 
 
 def test_what_varies_is_listed_once_for_each_input(tmp_path):
-    varying = 'float4[] primvars:tint = [(0,0,0,0), (0,0,0,0), (0,0,0,0), (4,4,4,4)] (\ninterpolation = "vertex"\n)'
+    values = "[(0,0,0,0), (0,0,0,0), (0,0,0,0), (4,4,4,4)]"
+    varying = f'float4[] primvars:tint = {values} (\ninterpolation = "vertex"\n)'
     nodes = (
         reader("float4", "tint")
         + """def Shader "U" { uniform token info:id = "UsdUVTexture"
