@@ -216,8 +216,9 @@ def _asked_for(
     choice = peek_products(os.fspath(path), **asked)[0][0]
     chosen = size or choice.resolution or DEFAULT_SIZE
     region = choice.region(*chosen)
-    if region is not None:
-        settings.setdefault("region", region)
+    if region is not None and "region" not in settings:
+        settings["region"] = region
+        settings.setdefault("crop", True)  # the data window of files is that of the stage
     return chosen, choice.aovs if aovs is None else aovs
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from click.testing import CliRunner
 from pxr import Sdf, Usd, UsdRender
@@ -208,7 +209,10 @@ def test_all_products_are_rendered_of_one_scene(tmp_path):
     assert run("render", stage, "--spp", 2, "--output-dir", tmp_path) == (0, "")
     one, two = (read_layers(tmp_path / f"{name}.exr") for name in ("one", "two"))
     assert list(one) == ["beauty", "depth"] and one["beauty"].shape == (20, 30, 3)
-    assert two["beauty"].shape == (10, 20, 3)
+    spec = oiio.ImageInput.open(str(tmp_path / "two.exr")).spec()  # its data window alone
+    assert (spec.x, spec.y, spec.width, spec.height) == (0, 0, 10, 5)
+    assert (spec.full_x, spec.full_y, spec.full_width, spec.full_height) == (0, 0, 20, 10)
+    assert two["beauty"].shape == (5, 10, 3) and (two["beauty"] > 0).all()
     assert (two["samples"][:5, :10] == 2).all() and two["samples"].sum() == 100
     assert read_metadata(tmp_path / "two.exr")["wavecomb:camera"] == "/B"
     for name, whole in (("One", one), ("Two", two)):
@@ -236,8 +240,11 @@ def test_render_from_python_takes_the_first_product(tmp_path):
     window = "uniform float4 dataWindowNDC = (0, 0, 0.5, 1)\nrel orderedVars"
     stage = write(tmp_path, stage_text(settings.replace("rel orderedVars", window, 1)))
     picture = wavecomb.render(stage, spp=1)
-    assert picture.beauty.shape == (20, 30, 3) and picture.chosen == ("beauty", "depth")
+    assert picture.beauty.shape == (20, 15, 3) and picture.chosen == ("beauty", "depth")
     assert picture.samples.sum() == 300
+    picture.save(tmp_path / "saved.exr")
+    spec = oiio.ImageInput.open(str(tmp_path / "saved.exr")).spec()
+    assert (spec.x, spec.width, spec.full_width) == (0, 15, 30)
     assert wavecomb.render(stage, spp=1, size=(8, 4), aovs=["uv"]).chosen == ("beauty", "uv")
 
 

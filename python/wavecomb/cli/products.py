@@ -82,6 +82,7 @@ class Plan:
         size = chosen.pop("width", width), chosen.pop("height", height)
         if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
             chosen["region"] = region
+            chosen["crop"] = True  # the data window of files is that of the stage
         try:
             return make_settings(size, chosen.pop("spp"), aovs=aovs, fits=fits, **chosen)
         except WavecombError as error:
