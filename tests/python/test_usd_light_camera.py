@@ -439,6 +439,27 @@ def test_camera(tmp_path):
     assert camera["transform"][3, :3] == pytest.approx([1, 2, 3])
 
 
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize(
+    "odd",
+    [
+        "float horizontalApertureOffset = 1e30",
+        "float verticalApertureOffset = -1e38",
+        "float horizontalAperture = 1e-45",
+    ],
+)
+def test_apertures_that_show_nothing(tmp_path, projection, odd):
+    text = f"""def Camera "Cam" {{ token projection = "{projection}"
+        {odd}
+    }}
+    def Sphere "Ball" {{ }}"""
+    options = {"texture_limit": 1.0, "strand_pixels": 1.0}
+    _, loaded = load(tmp_path, text, **options)
+    what = "camera left out: its aperture is too small beside its offset and focal length: /Cam"
+    assert said(loaded).count(what) == 1
+    assert loaded.camera_path is None and "no camera: framed what is drawn" in said(loaded)
+
+
 def test_which_camera(tmp_path):
     text = 'def Camera "First" {}\ndef Camera "Second" {}\n'
     assert load(tmp_path, text)[1].camera_path == "/First"

@@ -29,6 +29,12 @@ Matrix = NDArray[np.float64]
 _TENTH = 0.1
 """Focal length and aperture are in tenths of a scene unit."""
 
+_MAX_WINDOW = 1e30
+"""Largest coordinate of a camera's window."""
+
+_LEAST_OF_WINDOW = 2.0**-16
+"""Least size of a camera's window, of its largest coordinate: 128 steps of 32-bit numbers."""
+
 ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
 """Window of a latlong camera: all directions."""
 
@@ -176,13 +182,17 @@ def read_camera(
     if projection not in PROJECTIONS:
         report.warn(f"camera has the projection {projection}: drawn in perspective", path)
         projection = PROJECTIONS[0]
-    options: dict[str, Any] = {"window": tuple(v / focal for v in edges)}
+    by_focal = _TENTH if projection == "orthographic" else 1.0 / focal
+    window = tuple(by_focal * v for v in edges)
+    if projection != "latlong" and not _is_window(window):
+        what = "camera left out: its aperture is too small beside its offset and focal length"
+        report.warn(what, path)
+        return None
+    options: dict[str, Any] = {"window": window}
     options |= lens.options(prim, time, report)
     if projection != PROJECTIONS[0]:
         options["projection"] = projection
-    if projection == "orthographic":
-        options["window"] = tuple(_TENTH * v for v in edges)
-    elif projection == "latlong":
+    if projection == "latlong":
         options["window"] = ALL_ROUND
     if lens.exposure and (scale := _exposure_scale(camera, time, report)) != 1.0:
         options["exposure"] = scale
@@ -200,6 +210,13 @@ def read_camera(
     elif stop > 0:
         report.warn("camera has fStop but no focusDistance: drawn without depth of field", path)
     return View(frame, options)
+
+
+def _is_window(window: tuple[float, ...]) -> bool:
+    """Whether 32-bit numbers hold what a camera sees of a plane, at a pixel or so."""
+    x0, x1, y0, y1 = window
+    largest, smallest = max(map(abs, window)), min(x1 - x0, y1 - y0)
+    return largest <= _MAX_WINDOW and smallest >= max(_LEAST_OF_WINDOW * largest, 1.0 / _MAX_WINDOW)
 
 
 def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport) -> float:
