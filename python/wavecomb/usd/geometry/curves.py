@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
+from wavecomb.usd.geometry.bad_points import WHY, bad_points, steadied
 from wavecomb.usd.geometry.deforming import points_at, points_now, step_times
-from wavecomb.usd.geometry.mesh import find_primvar
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
@@ -23,7 +23,13 @@ from wavecomb.usd.geometry.mesh_arrays import (
     extent,
 )
 from wavecomb.usd.geometry.nurbs_curves import hermite_strands, nurbs_strands
-from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, as_array, read_primvar
+from wavecomb.usd.geometry.primvar import (
+    Primvar,
+    PrimvarError,
+    as_array,
+    find_primvar,
+    read_primvar,
+)
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.strand_detail import StrandDetail
 from wavecomb.usd.geometry.strands import Strands, lay_out
@@ -112,6 +118,9 @@ class CurveReader:
         strands = self._layout(prim, counts[:, 0].astype(np.intp), len(points))
         if strands is None:
             return None
+        bad = bad_points(points)
+        if bad.any():
+            strands = self._without(bad, strands, prim)
         widths, kind = read_widths(prim, strands, self.time, self.report)
         wider = None
         if detail is not None:
@@ -135,6 +144,16 @@ class CurveReader:
         return CurveArrays(
             shape, positions, strands.segment_words(), radii, normals, uvs, bounds, strands
         )
+
+    def _without(self, bad: NDArray[np.bool_], strands: Strands, prim: Usd.Prim) -> Strands:
+        """The curves that use no bad point."""
+        kept = strands.over_each(np.maximum, bad) == 0
+        if not kept.any():
+            raise MeshError("their points are not finite or absurdly far away")
+        if not kept.all():
+            what = f"{int((~kept).sum())} of {len(kept)} curves left out: {WHY}"
+            self.report.warn(what, prim.GetPath())
+        return strands.only(kept)
 
     def _layout(self, prim: Usd.Prim, counts: NDArray[np.intp], points: int) -> Strands | None:
         if (counts < 0).any() or int(counts.sum()) != points:
@@ -224,6 +243,7 @@ def over_shutter(
     layout = shape.topology
     if found is None or len(found[0]) != layout.sizes["vertex"]:
         return shape
+    found = steadied(found)
     if all(np.array_equal(points, found[0]) for points in found):
         return shape
     steps, normals = [], []

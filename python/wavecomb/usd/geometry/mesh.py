@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
+from wavecomb.usd.geometry.bad_points import bad_points, steadied, without_bad
 from wavecomb.usd.geometry.cage import SCHEMES, Cage, crease_pairs, read_rules
 from wavecomb.usd.geometry.deforming import matrix_at, points_at, points_now, step_times
 from wavecomb.usd.geometry.faces import TETRAHEDRA, read_faces
@@ -33,6 +34,7 @@ from wavecomb.usd.geometry.primvar import (
     as_array,
     as_integers,
     authored_names,
+    find_primvar,
     from_attribute,
     read_primvar,
     spread,
@@ -141,7 +143,13 @@ class MeshReader:
         placed = None
         if not flip and holes is None:
             placed = plain(points, counts, indices, matrix)
+        has_bad = False
         if placed is None:
+            has_bad = bool(bad_points(points, matrix).any())
+            if has_bad:
+                points, holes, what = without_bad(points, matrix, counts, indices, holes)
+                if what:
+                    self.report.warn(f"mesh without {what}", prim.GetPath())
             placed = self._placed(prim, points, counts, indices, holes, flip, matrix)
         positions, bounds, topology = placed
         scheme = _scheme(prim, names, time)
@@ -154,6 +162,8 @@ class MeshReader:
         cage = None
         if subdivided or displaced:
             rules = read_rules(prim, time, self.report) if subdivided else {}
+            if has_bad:
+                rules["holes"] = holes
             kind = str(scheme) if subdivided else "none"
             cage = Cage(
                 points, counts, indices, matrix, flip, kind, rules, primvar, topology,
@@ -209,6 +219,7 @@ class MeshReader:
         shapes = points_at(prim, skin, times, motion.frame, self.report)
         if shapes is None or len(shapes[0]) != len(mesh.positions):
             return mesh
+        shapes = steadied(shapes)
         matrices = [matrix_at(track, matrix, time) for time in times]
         if track is None and all(np.array_equal(shape, shapes[0]) for shape in shapes):
             return mesh
@@ -389,19 +400,6 @@ class MeshReader:
                 if found is not None:
                     return found
         return None
-
-
-def find_primvar(
-    prim: Usd.Prim, name: str, inherited: Sequence[Any], time: Usd.TimeCode
-) -> Primvar | None:
-    """A primvar of a prim, else the constant one that it inherits."""
-    own = read_primvar(prim, name, time)
-    if own is not None or not inherited:
-        return own
-    for primvar in inherited:
-        if primvar.GetPrimvarName() == name:
-            return from_attribute(primvar.GetAttr(), name, time)
-    return None
 
 
 def _reverse(values: Any) -> Any:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pxr import Gf, Usd
 
 from wavecomb.usd.geometry.deforming import points_at, points_now, step_times
-from wavecomb.usd.geometry.mesh import find_primvar
 from wavecomb.usd.geometry.mesh_arrays import (
     UV_NAMES,
     Array,
@@ -24,7 +23,7 @@ from wavecomb.usd.geometry.mesh_arrays import (
 )
 from wavecomb.usd.geometry.normals import smooth_normals
 from wavecomb.usd.geometry.nurbs import Floats, Spline
-from wavecomb.usd.geometry.primvar import PrimvarError, as_array
+from wavecomb.usd.geometry.primvar import PrimvarError, as_array, find_primvar
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.geometry.triangulate import MeshError, Topology
 from wavecomb.usd.looks.network import number, word

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Usd
 
+from wavecomb.usd.geometry.bad_points import bad_points
 from wavecomb.usd.geometry.curves import (
     CurveArrays,
     read_points,
@@ -19,6 +20,7 @@ from wavecomb.usd.geometry.curves import (
 )
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
 from wavecomb.usd.geometry.strands import lay_out_points
+from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
 
@@ -45,12 +47,21 @@ class PointReader:
         if positions is None:
             return None
         layout = lay_out_points(len(positions))
+        bad = bad_points(positions)
+        if bad.all():
+            raise MeshError("their places are not finite or absurdly far away")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
         widths, _ = read_widths(prim, layout, self.time, self.report)
         radii = np.asarray(widths[:, 0] * (0.5 * (uniform_scale(matrix) or 1.0)), np.float32)
         if len(radii) == 1:
             radii = np.repeat(radii, len(positions))
+        if bad.any():
+            what = f"{int(bad.sum())} of {len(bad)} points left out"
+            where = prim.GetPath()
+            self.report.warn(f"{what}: they are not finite or absurdly far away", where)
+            positions, radii = positions.copy(), radii.copy()
+            positions[bad], radii[bad] = positions[np.flatnonzero(~bad)[0]], 0.0
         bounds = thick_extent(positions, radii)
         uvs = None
         if uv_names:

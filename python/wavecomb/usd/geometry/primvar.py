@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -113,6 +114,19 @@ def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | Non
     if not attribute or not attribute.HasAuthoredValue():
         return None
     return from_attribute(attribute, name, time)
+
+
+def find_primvar(
+    prim: Usd.Prim, name: str, inherited: Sequence[Any], time: Usd.TimeCode
+) -> Primvar | None:
+    """A primvar of a prim, else the constant one that it inherits."""
+    own = read_primvar(prim, name, time)
+    if own is not None or not inherited:
+        return own
+    for primvar in inherited:
+        if primvar.GetPrimvarName() == name:
+            return from_attribute(primvar.GetAttr(), name, time)
+    return None
 
 
 def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:

@@ -13,9 +13,8 @@ from pxr import Gf, Sdf, Usd, UsdShade, Vt
 
 from wavecomb.usd.geometry.attributes import MAX_WIDTH, Wanted, check_fit
 from wavecomb.usd.geometry.curves import CurveArrays
-from wavecomb.usd.geometry.mesh import find_primvar
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
-from wavecomb.usd.geometry.primvar import PrimvarError, as_integers, in_linear
+from wavecomb.usd.geometry.primvar import PrimvarError, as_integers, find_primvar, in_linear
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
 from wavecomb.usd.graphs.bind import asks_for, at_other_sets, bound

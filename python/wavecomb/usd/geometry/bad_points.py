@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Points that are not finite or absurdly far away: what uses them is left out, no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf
+
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, LIMIT, Array, bake
+from wavecomb.usd.geometry.triangulate import MeshError
+
+Ints = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+
+WHY = "points of theirs are not finite or absurdly far away"
+
+
+def bad_points(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
+    """(n,) Which points (n, 3), under a transform, cannot be drawn."""
+    there = points if matrix == IDENTITY else bake(points, matrix)
+    return np.asarray(~(np.abs(there) < LIMIT).all(axis=1))
+
+
+def without_bad(
+    points: Array, matrix: Gf.Matrix4d, counts: Ints, indices: Ints, holes: Ints | None
+) -> tuple[Array, Ints, str]:
+    """A mesh without the faces that use bad points.
+
+    Args:
+        points: (n, 3), some of which are bad under ``matrix``.
+        matrix: From the mesh to its group.
+        counts: (faces,) corners of each face.
+        indices: (corners,) points.
+        holes: Faces that are not drawn.
+
+    Returns:
+        Points without bad ones, faces that are not drawn, and words for what is left out; "" where
+        no face uses a bad point.
+
+    Raises:
+        MeshError: No face is left, or counts and indices do not fit together.
+    """
+    bad = bad_points(points, matrix)
+    faces = faces_with(bad, counts, indices)
+    points = filled(points, bad, counts, indices)
+    words = f"{len(faces)} of {len(counts)} faces: {WHY}" if len(faces) else ""
+    return points, faces if holes is None else np.concatenate([holes, faces]), words
+
+
+def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
+    """The faces of at least 3 corners that use a bad point.
+
+    Raises:
+        MeshError: These are all faces, or counts and indices do not fit together.
+    """
+    if len(counts) and counts.min() < 0:
+        raise MeshError("a face has a negative number of corners")
+    if int(counts.sum(dtype=np.int64)) != len(indices):
+        raise MeshError("the face counts do not add up to the number of face indices")
+    if len(indices) and int(indices.view(np.uint32).max()) >= len(bad):
+        raise MeshError("a face index is out of range")
+    owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    hit = np.zeros(len(counts), bool)
+    hit[owner[bad[indices]]] = True
+    drawn = counts >= 3
+    if (hit | ~drawn).all():
+        raise MeshError("its points are not finite or absurdly far away")
+    return np.flatnonzero(hit & drawn).astype(np.int32)
+
+
+def filled(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
+    """Points with each bad one in the middle of the good ones of its faces.
+
+    There it pulls least at the faces beside, where these are subdivided.
+    """
+    out = points.copy()
+    good = np.flatnonzero(~bad)
+    out[bad] = points[good[0]]
+    owner = np.repeat(np.arange(len(counts)), counts)
+    corner_good = ~bad[indices]
+    number = np.bincount(owner[corner_good], minlength=len(counts))
+    sums = np.stack(
+        [
+            np.bincount(
+                owner[corner_good], points[indices[corner_good], axis], minlength=len(counts)
+            )
+            for axis in range(3)
+        ],
+        axis=1,
+    )
+    corners = np.flatnonzero(~corner_good & (number[owner] > 0))
+    middles = sums[owner[corners]] / number[owner[corners]][:, None]
+    out[indices[corners]] = middles.astype(np.float32)
+    return out
+
+
+def steadied(shapes: Sequence[Array]) -> list[Array]:
+    """Points at steps of the shutter, bad ones where they are at the nearest step that is good.
+
+    Those that are good at no step are at the first good point. Equal shapes stay the same objects.
+    """
+    masks = [bad_points(shape) for shape in shapes]
+    if not any(mask.any() for mask in masks):
+        return list(shapes)
+    out = []
+    for at, (shape, bad) in enumerate(zip(shapes, masks, strict=True)):
+        made, left = shape.copy(), bad.copy()
+        for other in sorted(range(len(shapes)), key=lambda k: abs(k - at)):
+            found = left & ~masks[other]
+            made[found] = shapes[other][found]
+            left &= ~found
+        if left.all():
+            raise MeshError("its points are not finite or absurdly far away")
+        made[left] = made[np.flatnonzero(~left)[0]]
+        out.append(made)
+    return out
