@@ -8,7 +8,6 @@
 
 #include "wavecomb/scene/scene.h"
 
-void bind_threads(nanobind::module_& m);
 void bind_scene(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_volumes(nanobind::module_& m);

@@ -15,7 +15,6 @@ NB_MODULE(_core, m) {
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_volumes(m);
   bind_scene(m);
-  bind_threads(m);
   bind_geometry(m);
   bind_lights(m);
   bind_camera(m);

@@ -14,6 +14,10 @@ from typing import Any
 import parts
 import pytest
 
+# A command in the sandbox is a fresh Python, which hundreds of tests would wait for. Tests of the
+# sandbox give --sandbox on.
+os.environ.setdefault("WAVECOMB_SANDBOX", "off")
+
 # Hundreds of processes: none of them has to compile the package. What is in a sandbox could not
 # keep what it compiled.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):

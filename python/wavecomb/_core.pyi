@@ -944,10 +944,6 @@ def lane_widths() -> list[int]: ...
 def policies() -> list[str]:
     """Names for Settings.policy."""
 
-def restrict_threads(ruleset: int) -> int:
-    """Makes every thread of this process keep to a Landlock ruleset, by its descriptor; gives their
-    number. They must have no_new_privs. Raises Error where one cannot."""
-
 def give_back_memory() -> None:
     """Returns freed memory to the system where the C library keeps it."""
 

@@ -255,6 +255,8 @@ def _machine() -> list[Check]:
     except Exception as error:
         return [Check("machine", BROKEN, _why(error), False, _rebuild())]
     rows = [(name, text) for name, text in machine_rows(info) if name != "native"]
-    found = [Check(name, OK, text, False) for name, text in rows]
-    found += [Check("sandbox", MISSING, line, False) for line in info["sandbox"]["lacks"]]
-    return found
+    why_not = info["sandbox"]["obstacle"]
+    return [
+        Check(name, MISSING if name == "sandbox" and why_not else OK, text, False)
+        for name, text in rows
+    ]

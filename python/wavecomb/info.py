@@ -67,7 +67,7 @@ def machine_info() -> dict[str, Any]:
     from wavecomb import _core, vdb
     from wavecomb.isa import library_info
     from wavecomb.machine import memory_bytes, usable_cores
-    from wavecomb.run.isolate import box
+    from wavecomb.run.isolate import sandbox
     from wavecomb.run.isolate.memory import machine_limit
 
     return {
@@ -78,7 +78,7 @@ def machine_info() -> dict[str, Any]:
         "texture_store": {"obstacle": _core.TextureStore.obstacle() or None},
         "openvdb": vdb.version(),
         "nanovdb": vdb.nano_version(),
-        "sandbox": box.describe(),
+        "sandbox": sandbox.describe(),
     }
 
 
@@ -87,13 +87,6 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
     from wavecomb.isa import library_text
 
     memory, limit = info["memory_bytes"], info["memory_limit_bytes"]
-    sandbox = info["sandbox"]
-    if sandbox["landlock"]:
-        files = f"Landlock {sandbox['landlock']}: writes outputs, reads what the stage names"
-        files += "; no TCP" if sandbox["tcp"] else ""
-    else:
-        files = "files are not kept"
-    calls = "no sockets, no programs" if sandbox["seccomp"] else "system calls are not kept"
     has, may = (memory or 0) / 1e9, (limit or 0) / 1e9
     return [
         ("cores", str(info["cores"])),
@@ -102,14 +95,13 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
         ("texture limit", info["texture_store"]["obstacle"] or "by a store"),
         ("openvdb", info["openvdb"] or "none: volumes are left out"),
         ("nanovdb", str(info["nanovdb"] or "none: .nvdb files are not read")),
-        ("sandbox", f"{files}; {calls}"),
+        ("sandbox", info["sandbox"]["obstacle"] or "bubblewrap"),
     ]
 
 
 def machine_lines(info: dict[str, Any]) -> list[str]:
     """The same as lines."""
-    lines = [f"{name:13}  {text}" for name, text in machine_rows(info)]
-    return lines + [f"  not there    {line}" for line in info["sandbox"]["lacks"]]
+    return [f"{name:13}  {text}" for name, text in machine_rows(info)]
 
 
 def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> None:

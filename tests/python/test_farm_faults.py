@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import forks
-import numpy as np
 import pytest
 from farm_jobs import cornell_in, left_behind, processes_of, same, wait_for, work
 from parts import needs, not_here
@@ -27,8 +26,6 @@ from wavecomb.farm.folder import BUSY, DONE, TODO, Folder, ShareLost
 from wavecomb.farm.leases import Beat
 from wavecomb.farm.patience import Patience
 from wavecomb.farm.rendering import Renderer, Stopped
-from wavecomb.farm.sweeping import owner_of, sweep
-from wavecomb.picture import files
 
 pytestmark = needs("wavecomb._core")
 
@@ -350,26 +347,6 @@ def test_a_disk_that_is_full(stage: Path, tmp_path: Path) -> None:
         not_here("file systems cannot be mounted in a namespace")
     assert done.returncode == 0 and "WAITED" in done.stdout, done.stdout + done.stderr
     same(out, one_process(stage, tmp_path, (96, 96), 300))
-
-
-def test_leftovers(stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of workers that are no more go; those of others stay."""
-    folder = farm.submit(stage, tmp_path / "a.exr", size=(8, 8), spp=1, strict=False)
-    gone, here = Beat(folder, {}), Beat(folder, {})
-    gone.end("it was killed")
-    for beat in (gone, here):
-        monkeypatch.setattr(files, "owner", owner_of(beat.name))
-        for target in (tmp_path / "a.exr", folder.part(folder.spec.tasks()[0])):
-            files._part(target).touch()
-    monkeypatch.setattr(files, "owner", "")
-    assert len(left_behind(tmp_path)) == 4
-    assert len(sweep(folder)) == 2
-    left = left_behind(tmp_path)
-    assert len(left) == 2 and all(here.name in file.name for file in left)
-    files.remove_leftovers(tmp_path / "a.exr")
-    assert left_behind(tmp_path) == left, "another machine's may be at work"
-    work(folder)
-    assert np.isfinite(os.path.getsize(tmp_path / "a.exr"))
 
 
 def test_patience(stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import time
 import tracemalloc
 from pathlib import Path
 
@@ -11,6 +14,7 @@ import pytest
 
 from wavecomb.picture import image
 from wavecomb.picture.files import check_writable, replacing
+from wavecomb.picture.private_folder import remove_abandoned
 
 
 @pytest.fixture
@@ -192,11 +196,41 @@ def test_links_are_followed(tmp_path: Path) -> None:
     assert (tmp_path / "real" / "a.txt").read_text() == "new"
 
 
-def test_what_another_process_of_this_number_left_is_no_obstacle(tmp_path: Path) -> None:
-    """In a container each process may have the number of the one that was killed before."""
-    (tmp_path / f".a.{os.getpid()}.part.exr").write_text("cut off")
-    check_writable(tmp_path / "a.exr")
-    assert not list(tmp_path.iterdir())
+def test_an_abandoned_folder_is_removed(tmp_path: Path) -> None:
+    """A process that was killed holds no lock any more, whatever its id was."""
+    code = (
+        "import os, sys; from pathlib import Path; from wavecomb.picture.files import replacing\n"
+        "with replacing(sys.argv[1]) as part:\n"
+        "    part.write_text('cut off'); os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "b.txt")], check=False)
+    (left,) = os.listdir(tmp_path)
+    assert left.startswith(".wavecomb-") and left.endswith(".part")
+    with replacing(tmp_path / "a.txt") as part:
+        part.write_text("new")
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_folder_in_use_stays(tmp_path: Path) -> None:
+    """Also where its process id is that of nobody here: the other may be in another container."""
+    with replacing(tmp_path / "a.txt") as part:
+        part.write_text("first")
+        with replacing(tmp_path / "b.txt") as other:
+            other.write_text("second")
+        remove_abandoned(tmp_path)
+        assert part.read_text() == "first"
+    assert sorted(os.listdir(tmp_path)) == ["a.txt", "b.txt"]
+
+
+def test_a_folder_that_is_not_locked_yet_stays_for_a_minute(tmp_path: Path) -> None:
+    folder = tmp_path / ".wavecomb-00.part"
+    folder.mkdir()
+    remove_abandoned(tmp_path)
+    assert folder.is_dir()
+    old = time.time() - 120
+    os.utime(folder, (old, old))
+    remove_abandoned(tmp_path)
+    assert not folder.exists()
 
 
 @pytest.mark.parametrize("stem", ["n" * 251, "\u9375" * 80])

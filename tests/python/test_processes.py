@@ -367,6 +367,7 @@ PROGRAMS = {
     "bench/counters.py": "perf",
     "bench/machine.py": "git",
     "farm/slurm_engine.py": "Slurm's commands",
+    "run/isolate/sandbox.py": "bwrap",
 }
 """Files that start other programs than Python."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from typing import Any
 
 import click
@@ -130,8 +129,7 @@ def compare_command(
     from wavecomb.picture.collect import is_many
 
     many = is_many(a) or is_many(b)
-    reads = [os.path.dirname(p) or "." if many and not os.path.isdir(p) else p for p in (a, b)]
-    enter_to_read((*reads, variance_a, variance_b), (heatmap, page, wipe))
+    enter_to_read((heatmap, page, wipe))
     from wavecomb.errors import WavecombError
     from wavecomb.picture.compare import compare
     from wavecomb.picture.files import check_writable

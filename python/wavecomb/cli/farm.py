@@ -278,11 +278,11 @@ def assets_command(
     """
     from wavecomb.farm.assets import list_assets
     from wavecomb.load_options import selections
-    from wavecomb.run.isolate import box
-    from wavecomb.run.isolate.broker import Outputs
+    from wavecomb.run.isolate.outputs import Outputs
+    from wavecomb.run.isolate.supervisor import enter
 
     chosen = selections(variants) if variants else None
-    box.enter(Outputs())
+    enter(Outputs())
     found = list_assets(stage, chosen, session_layer)
     if as_json:
         click.echo(json.dumps(found))

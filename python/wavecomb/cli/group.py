@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from wavecomb.run.faults import describe
+from wavecomb.run.isolate import supervisor
 from wavecomb.run.progress import keep_interrupts
 
 ERROR = 2
@@ -77,6 +78,7 @@ class Commands(click.Group):
         if not sys.warnoptions and not os.environ.get("WAVECOMB_DEBUG"):
             warnings.simplefilter("ignore")  # Python's own are for developers
         keep_interrupts()
+        supervisor.choices.words = tuple(sys.argv[1:] if args is None else args)
         try:
             code = super().main(args, prog_name, complete_var, False, **extra)
         except click.exceptions.NoArgsIsHelpError as error:

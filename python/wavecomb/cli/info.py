@@ -40,11 +40,11 @@ def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any
     if stage is None:
         raise click.UsageError("Missing argument 'STAGE'.")
     from wavecomb.info import print_info, stage_info
-    from wavecomb.run.isolate import box
-    from wavecomb.run.isolate.broker import Outputs
+    from wavecomb.run.isolate.outputs import Outputs
+    from wavecomb.run.isolate.supervisor import enter
 
     source = StageOptions.take(options)
-    box.enter(Outputs())
+    enter(Outputs())
     loaded = source.load(stage)
     info = stage_info(loaded, stage)
     if as_json:

@@ -48,7 +48,7 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
     from wavecomb.picture.working_space import to_rec709
 
     layers = AovOptions.take(options)
-    enter_to_read(pictures, (output, png), split=output if layers.split else None)
+    enter_to_read((output, png), split=output if layers.split else None)
     seen = {os.path.realpath(name) for name in pictures}
     for name, option, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):
         if name is None:

@@ -25,13 +25,9 @@ def examples(*lines: str) -> str:
 
 
 def _isolate(context: click.Context, parameter: click.Parameter, value: str) -> None:
-    """Goes on in a child, as early as can be: little is in memory yet."""
     from wavecomb.run.isolate import supervisor
 
-    if not context.resilient_parsing and (
-        value == "on" or (value == "auto" and supervisor.is_wise())
-    ):
-        supervisor.supervise()
+    supervisor.choices.isolate = value
 
 
 def _set_load_limit(
@@ -46,25 +42,42 @@ def _limit_memory(context: click.Context, parameter: click.Parameter, value: flo
     from wavecomb.run.isolate import memory
 
     if not context.resilient_parsing:
-        memory.limit(value)
+        memory.ask(value)
 
 
 def _ask_sandbox(context: click.Context, parameter: click.Parameter, value: str) -> None:
-    from wavecomb.run.isolate import box
+    from wavecomb.run.isolate import supervisor
 
-    box.ask(mode=value)
+    supervisor.choices.sandbox = value
+
+
+def _ask_reads(context: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> None:
+    from wavecomb.run.isolate import supervisor
+
+    supervisor.choices.reads = value
 
 
 def isolate_option(command: F) -> F:
-    """--isolate, --sandbox and --memory-limit, for commands that read what others wrote."""
+    """--isolate, --sandbox, --sandbox-read and --memory-limit, for commands that read files."""
+    command = click.option(
+        "--sandbox-read",
+        type=click.Path(exists=True, file_okay=False),
+        multiple=True,
+        metavar="DIR",
+        expose_value=False,
+        callback=_ask_reads,
+        help="Let the sandbox read only DIR (repeatable), named files and libraries.  "
+        "[default: everything that you may read]",
+    )(command)
     command = click.option(
         "--sandbox",
         type=click.Choice(["auto", "on", "off"]),
         default="auto",
+        envvar="WAVECOMB_SANDBOX",
         expose_value=False,
         callback=_ask_sandbox,
-        help="What the child may do: read what the stage names, write its outputs; no network, no "
-        "programs.  [default: auto: as far as this system can; on: all of it, or an error]",
+        help="Run the child in bubblewrap: no network, nothing can be written but the outputs.  "
+        "[default: auto: where this system can; on: or fail]",
     )(command)
     command = click.option(
         "--memory-limit",
@@ -79,7 +92,6 @@ def isolate_option(command: F) -> F:
         type=click.Choice(["auto", "on", "off"]),
         default="auto",
         expose_value=False,
-        is_eager=True,
         callback=_isolate,
         help="Work in a child process, so that a crash is one line.  "
         "[default: auto: unless called from within a program]",

@@ -33,8 +33,8 @@ def enter_to_render(
         split: Whether there is a picture for each layer.
         gpu: Whether denoising may use devices.
     """
-    from wavecomb.run.isolate import box
-    from wavecomb.run.isolate.broker import Outputs
+    from wavecomb.run.isolate.outputs import Outputs
+    from wavecomb.run.isolate.supervisor import enter
 
     given = [name for name in names if name is not None]
     single = () if frame is None else (frame,)
@@ -57,28 +57,22 @@ def enter_to_render(
             parts.append((where, f"{stem}.", ending))
     if output is None:
         trees.append((os.path.abspath(folder or os.curdir), ".exr"))
-    box.enter(Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees)), gpu=gpu)
+    enter(Outputs(tuple(filled), tuple(dict.fromkeys(parts)), tuple(trees)), gpu=gpu)
 
 
-def enter_to_read(
-    inputs: Iterable[str | None], outputs: Iterable[str | None], *, split: str | None = None
-) -> None:
+def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:
     """Puts a command into the sandbox whose files are all known.
 
     Args:
-        inputs: That it reads.
         outputs: That it writes.
         split: One of these, of which there may be one for each layer.
     """
-    from wavecomb.run.isolate import box
-    from wavecomb.run.isolate.broker import Outputs
+    from wavecomb.run.isolate.outputs import Outputs
+    from wavecomb.run.isolate.supervisor import enter
 
     parts: tuple[tuple[str, str, str], ...] = ()
     if split is not None:
         where, base = os.path.split(os.path.realpath(split))
         stem, ending = os.path.splitext(base)
         parts = ((where, f"{stem}.", ending),)
-    box.enter(
-        Outputs(tuple(name for name in outputs if name is not None), parts),
-        reads=[os.path.realpath(name) for name in inputs if name is not None],
-    )
+    enter(Outputs(tuple(name for name in outputs if name is not None), parts))

@@ -50,12 +50,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
 
     A page (.html) has all pictures in itself and plays them; it needs no other file.
     """
-    from wavecomb.picture.collect import is_many
-
-    reads = [
-        p if os.path.isdir(p) or not is_many(p) else os.path.dirname(p) or "." for p in pictures
-    ]
-    enter_to_read(reads, (output,))
+    enter_to_read((output,))
     from wavecomb.errors import WavecombError
     from wavecomb.picture.collect import collect
     from wavecomb.picture.files import check_writable

@@ -30,11 +30,8 @@ def main(words: list[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=told.listen, daemon=True).start()
     from wavecomb.errors import WavecombError
-    from wavecomb.farm.sweeping import owner_of
-    from wavecomb.picture import files
     from wavecomb.run.faults import describe
 
-    files.owner = owner_of(words[2])
     try:
         worker = _Worker(words[0], int(words[1]), channel, told)
     except (OSError, WavecombError) as error:

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
 import os
 import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
+
+from wavecomb.picture.private_folder import PrivateFolder, remove_abandoned
 
 
 class Publisher(Protocol):
@@ -30,18 +31,10 @@ class Publisher(Protocol):
 
 
 publisher: Publisher | None = None
-owner: str = ""
-"""Of temporary names, beside the number of the process, where processes of several machines write
-to one folder: ``remove_leftovers`` leaves such files alone."""
 
 
 def _publisher_of(target: Path) -> Publisher | None:
     return None if publisher is None or publisher.is_own(target) else publisher
-
-
-def private_name(pid: int) -> str:
-    """Folder beside its outputs that a process in a sandbox writes to."""
-    return f".wavecomb.{pid}.part"
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
@@ -58,17 +51,6 @@ def _target(path: str | os.PathLike[str]) -> Path:
     if not target.parent.is_dir():
         raise NotADirectoryError(f"{os.fspath(path)}: {target.parent} is not a folder")
     return target
-
-
-def _prefix(target: Path) -> str:
-    """What temporary names begin with. Names stay short, and those of two files differ."""
-    stem = os.fsencode(target.stem)
-    return f".{target.stem if len(stem) <= 100 else hashlib.sha256(stem).hexdigest()[:32]}."
-
-
-def _part(target: Path) -> Path:
-    """The temporary name: hidden, in the same folder, with the same ending, of this process."""
-    return target.with_name(f"{_prefix(target)}{owner}{os.getpid()}.part{target.suffix}")
 
 
 def reason(error: OSError) -> str:
@@ -96,7 +78,7 @@ def problem_of(library: Any) -> str:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raises OSError, in one line that names the file, unless it could be written now.
 
-    To be called before long work: writes and removes an empty temporary file.
+    To be called before long work: makes and removes a private folder beside the file.
     """
     target = _target(path)
     other = _publisher_of(target)
@@ -104,49 +86,12 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         if other is not None:
             other.check(target)
             return
-        part = _part(target)
-        # There may be one: in a container each process can have the number of one that was killed.
-        part.open("wb").close()
-        part.unlink()
+        PrivateFolder(target.parent).close()
     except OSError as error:
         why = reason(error)
         if other is not None and "cannot be written: " in why:
             raise OSError(why.replace(os.fspath(target), os.fspath(path))) from error
         raise OSError(f"{os.fspath(path)}: cannot be written: {why}") from error
-
-
-def remove_leftovers(target: Path) -> None:
-    """Removes temporary files of ``target`` whose process is no more: it was killed."""
-    ends = [(_prefix(target), f".part{target.suffix}"), (".wavecomb.", ".part")]
-    for other in target.parent.iterdir():
-        for start, end in ends:
-            pid = other.name[len(start) : -len(end)]
-            if other.name.startswith(start) and other.name.endswith(end) and pid.isdecimal():
-                break
-        else:
-            continue
-        if _is_running(int(pid)):
-            continue
-        with contextlib.suppress(OSError):
-            if end == ".part" and other.is_dir() and not other.is_symlink():
-                shutil.rmtree(other)
-            else:
-                other.unlink()
-
-
-def _is_running(pid: int) -> bool:
-    """Whether a process has this number; one that was killed but not yet waited for has not."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True  # it lives, and is another user's
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
-    except OSError:
-        return True  # no Linux
-    return state[:1] not in (["Z"], ["X"])
 
 
 def _sync(path: Path) -> None:
@@ -167,51 +112,52 @@ def publish(part: Path, target: Path, *, durable: bool = False) -> None:
     except OSError as error:
         if error.errno != errno.EXDEV:
             raise
-        beside = _part(target)
-        try:
+        with PrivateFolder(target.parent) as folder:
+            beside = folder.path / target.name
             shutil.copyfile(part, beside)
             if durable:
                 _sync(beside)
             os.replace(beside, target)
-        finally:
-            with contextlib.suppress(OSError):
-                beside.unlink()
     if durable:
         _sync(target.parent)
 
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
-    """Gives a temporary name beside ``path``; renames it to ``path`` if all went well.
+    """Yields a temporary file name; renames that file to ``path`` if all went well.
 
-    On any exception the temporary file is removed and ``path`` is as it was. A process that is
-    killed leaves ``path`` as it was, too; what it left beside it goes with the next call.
+    The temporary file is in a private folder beside ``path``. On any exception it is removed and
+    ``path`` stays as it was. After a kill ``path`` is as it was, too, and the next call for a file
+    in that folder removes the private folder.
 
     Args:
         path: The file.
-        durable: Also where the machine fails: the file is on the disk before it gets its name.
+        durable: Write the file to the disk before it gets its name, for power failures.
 
     >>> with replacing("/tmp/answer.txt") as part:
     ...     _ = part.write_text("42")
     """
     target = _target(path)
     other = _publisher_of(target)
-    part = _part(target) if other is None else other.part_of(target)
     try:
-        if other is None:
-            remove_leftovers(target)
-        yield part
-        if other is None:
+        if other is not None:
+            part = other.part_of(target)
+            try:
+                yield part
+                other.publish(part, target, durable=durable)
+            finally:
+                with contextlib.suppress(OSError):
+                    part.unlink()
+            return
+        remove_abandoned(target.parent)
+        with PrivateFolder(target.parent) as folder:
+            part = folder.path / target.name
+            yield part
             publish(part, target, durable=durable)
-        else:
-            other.publish(part, target, durable=durable)
     except OSError as error:
         if error.errno is None:
             raise
         raise OSError(f"{os.fspath(path)}: cannot be written: {reason(error)}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
 
 
 @contextlib.contextmanager

@@ -8,8 +8,10 @@ limit of the size of the machine never hits a sound scene: docs/decisions/sandbo
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import resource
+import secrets
 from collections.abc import Callable
 from pathlib import Path
 
@@ -32,22 +34,10 @@ def machine_limit() -> int | None:
 def _of_group() -> int | None:
     """The least limit of the control groups that hold this process; None: there is none."""
     limits: list[int] = []
-    try:
-        lines = Path("/proc/self/cgroup").read_text().splitlines()
-    except OSError:
-        return None
-    for line in lines:
-        number, kinds, path = line.split(":", 2)
-        if number == "0":
-            folder, name = _CGROUP, "memory.max"
-        elif "memory" in kinds.split(","):
-            folder, name = _CGROUP / "memory", "memory.limit_in_bytes"
-        else:
-            continue
-        place = folder / path.lstrip("/")
+    for place, name in _groups():
         # Within a container the path is that of outside: its own group is at the root.
         for group in (place, *place.parents):
-            if not group.is_relative_to(folder):
+            if not group.is_relative_to(_CGROUP):
                 break
             try:
                 text = (group / name).read_text().strip()
@@ -58,25 +48,57 @@ def _of_group() -> int | None:
     return min(limits, default=None)
 
 
-def limit(megabytes: float | None = None) -> None:
-    """Limits the memory of this process, which is expendable, and tells its parent.
+def _groups() -> list[tuple[Path, str]]:
+    """Folders of the control groups of this process, and the name of the file with the limit."""
+    found = []
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+    except OSError:
+        return []
+    for line in lines:
+        number, kinds, path = line.split(":", 2)
+        if number == "0":
+            found.append((_CGROUP / path.lstrip("/"), "memory.max"))
+        elif "memory" in kinds.split(","):
+            found.append((_CGROUP / "memory" / path.lstrip("/"), "memory.limit_in_bytes"))
+    return found
 
-    Args:
-        megabytes: 10^6 bytes; None: what the machine has.
+
+asked_mb: float | None = None
+"""``--memory-limit`` in megabytes (10^6 bytes); None: what the machine has."""
+
+
+def ask(megabytes: float | None) -> None:
+    """Notes the limit that ``limit`` sets later.
 
     Raises:
-        WavecombError: Nothing could be done with so little, or no process is there to be limited.
+        WavecombError: Nothing could be done with so little.
     """
+    global asked_mb
     if megabytes is not None and megabytes < LEAST_MB:
         raise WavecombError(f"memory limit {megabytes:g} MB: give at least {LEAST_MB} MB")
+    asked_mb = megabytes
+
+
+def wanted() -> int | None:
+    """The limit in bytes; None: there is none."""
+    return machine_limit() if asked_mb is None else int(asked_mb * MEGABYTE)
+
+
+def limit() -> None:
+    """Limits the memory of this process, a supervised child, and notes the limit for its parent.
+
+    Raises:
+        WavecombError: A limit was asked for, and there is no child process.
+    """
     if not trail.is_expendable():
-        if megabytes is None:
+        if asked_mb is None:
             return
         raise WavecombError(
-            f"memory limit {megabytes:g} MB: is that of the child process, and there is none; "
+            f"memory limit {asked_mb:g} MB: is that of the child process, and there is none; "
             "leave --isolate off out"
         )
-    bytes_ = machine_limit() if megabytes is None else int(megabytes * MEGABYTE)
+    bytes_ = wanted()
     if bytes_ is None:
         return
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
@@ -84,6 +106,47 @@ def limit(megabytes: float | None = None) -> None:
         bytes_ = min(bytes_, hard)
     resource.setrlimit(resource.RLIMIT_DATA, (bytes_, bytes_))
     trail.note(f"{bytes_ / MEGABYTE:.0f}", slot="limit")
+
+
+class Group:
+    """Control group that limits all memory of a process, shared mappings too."""
+
+    def __init__(self, path: Path) -> None:
+        """Takes the folder of the group."""
+        self._path = path
+
+    @classmethod
+    def make(cls, bytes_: int | None) -> Group | None:
+        """Makes a group within that of this process; None where that is not permitted.
+
+        Args:
+            bytes_: Its limit; None: none, and no group.
+        """
+        if bytes_ is None:
+            return None
+        for own, name in _groups():
+            path = own / f"wavecomb-{secrets.token_hex(6)}"
+            try:
+                path.mkdir()
+                try:
+                    (path / name).write_text(str(bytes_))
+                except OSError:
+                    path.rmdir()
+                    raise
+            except OSError:
+                continue
+            return cls(path)
+        return None
+
+    def add(self, pid: int) -> None:
+        """Moves a process into the group."""
+        with contextlib.suppress(OSError):
+            (self._path / "cgroup.procs").write_text(str(pid))
+
+    def close(self) -> None:
+        """Removes the group, whose processes have ended."""
+        with contextlib.suppress(OSError):
+            self._path.rmdir()
 
 
 def limit_of(page: mmap.mmap) -> str:

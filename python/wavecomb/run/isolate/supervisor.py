@@ -1,25 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A command in a child process: whatever kills it, the shell gets one line and exit code 2.
+"""A command in a child process: whatever ends the child, the shell gets one line and exit code 2.
 
-The parent forks before anything large is loaded, and then only waits: it hands signals on, and the
-exit code back. The child has a process group of its own, so that a signal of the terminal, which
-goes to a whole group, comes to it once.
+The parent only waits: it passes signals on and the exit code back. The child runs in the sandbox
+where there is one: then it is a new Python that reads the same command line again. Otherwise it is
+a fork, made before anything large is loaded. Either child has a process group of its own, so that a
+signal of the terminal, which goes to a whole group, reaches it once.
 """
 
 from __future__ import annotations
 
+import contextlib
 import io
+import json
 import os
 import signal
 import socket
+import struct
+import subprocess
 import sys
 import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.boot import end_with_parent
-from wavecomb.run.isolate import box, trail
-from wavecomb.run.isolate.broker import Broker, Client
-from wavecomb.run.isolate.memory import limit_of
+from wavecomb.errors import WavecombError
+from wavecomb.picture import files
+from wavecomb.picture.private_folder import PrivateFolder, remove_abandoned
+from wavecomb.run.isolate import memory, sandbox, trail
+from wavecomb.run.isolate.outputs import Client, Mover, Outputs
 
 _PASSED_ON = (
     signal.SIGINT,
@@ -41,8 +52,38 @@ _NO_VALUE = "No to_python (by-value) converter"
 """What Boost.Python prints of a value that USD could not read."""
 
 
+COMMAND = "from wavecomb.cli import main; main(prog_name='wavecomb')"
+"""What the child in the sandbox runs."""
+
+_CHILD = """import sys
+from wavecomb.run.isolate.supervisor import become_child
+become_child(sys.argv.pop(1))
+"""
+
+
+@dataclass
+class Choices:
+    """Options about the child process.
+
+    Attributes:
+        isolate: ``--isolate``: "auto", "on" or "off".
+        sandbox: ``--sandbox``, of ``sandbox.MODES``.
+        reads: Folders of ``--sandbox-read``.
+        words: Arguments of the command line.
+    """
+
+    isolate: str = "off"
+    sandbox: str = "auto"
+    reads: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
+
+
+choices = Choices()
+_is_child = False
+
+
 def is_wise() -> bool:
-    """Whether a fork is safe and seen by no one: Linux, one thread, streams that are the process's.
+    """Whether a child is safe and invisible to others: Linux, one thread, standard streams.
 
     A program that calls the command line within itself is left as it is, and so is a developer
     (``WAVECOMB_DEBUG``), who wants to see a crash where it happens.
@@ -57,38 +98,189 @@ def is_wise() -> bool:
     )
 
 
+def enter(outputs: Outputs, *, gpu: bool = False) -> None:
+    """Continues the command in a child process, before any file of others is read.
+
+    In the parent this function ends the process when the child has ended. In the child, or where
+    there is to be none, it returns.
+
+    Args:
+        outputs: Files that the command may write.
+        gpu: Whether the command uses GPU devices.
+
+    Raises:
+        WavecombError: ``--sandbox on`` or ``--memory-limit`` cannot be obeyed.
+    """
+    if not _is_child:
+        with_child = choices.isolate == "on" or (choices.isolate == "auto" and is_wise())
+        if not with_child and choices.sandbox == "on":
+            raise WavecombError("--sandbox on: there is no child process; leave --isolate off out")
+        if with_child and choices.sandbox != "off":
+            why_not = sandbox.obstacle()
+            if why_not is None:
+                run_in_sandbox(outputs, gpu=gpu)
+            if choices.sandbox == "on":
+                raise WavecombError(f"--sandbox on: {why_not}")
+        if with_child:
+            supervise()
+    memory.limit()
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+
+
 def supervise() -> None:
-    """Goes on in a child; the parent stays behind until that ends, and ends as it did.
+    """Continues in a fork; the parent waits for it and ends as it did.
 
     Contract: one thread. Returns in the child only.
     """
-    for stream in (sys.stdout, sys.stderr):
-        stream.flush()
-    page, words = trail.new_page(), os.memfd_create("wavecomb-stderr", os.MFD_CLOEXEC)
-    mine, its = socket.socketpair()
+    global _is_child
+    _flush()
+    page, words = trail.new_page(), _memory_file("stderr")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _WATCHED)
     chld = signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     parent = os.getpid()
     child = os.fork()
     if child == 0:
-        mine.close()
-        box.ask(client=Client(its))
+        _is_child = True
         _become_expendable(parent, page, words)
         signal.signal(signal.SIGCHLD, chld)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return
-    its.close()
-    broker = Broker(child)
-    threading.Thread(target=broker.serve, args=(mine,), daemon=True).start()
     try:
-        status, sent = _wait(child)
+        status, sent = _wait(child, lambda: child)
     except BaseException:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         raise
+    _end(os.waitstatus_to_exitcode(status), sent, page, words)
+
+
+def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAND) -> None:
+    """Runs the command line in the sandbox and ends this process as the child ended.
+
+    Args:
+        outputs: Files that the child may have moved to their names.
+        gpu: Whether it uses GPU devices.
+        program: Python code that the child runs.
+    """
+    _flush()
+    page, words = trail.new_page(), _memory_file("stderr")
+    mine, its = socket.socketpair()
+    mine.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+    signal.pthread_sigmask(signal.SIG_BLOCK, _WATCHED)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    folder = _private_folder(outputs)
+    group = memory.Group.make(memory.wanted())
+    child = _Child(mine, Mover(outputs, folder.path), group)
+    stderr = os.dup(2)
+    given = {
+        "channel": its.fileno(), "page": page, "stderr": stderr, "private": str(folder.path),
+        "words": list(choices.words),
+    }  # fmt: skip
+    kept = (its.fileno(), page, stderr)
+    line = sandbox.command(
+        processes.command("-c", _CHILD + program, json.dumps(given), *choices.words, keep=kept),
+        private=folder.path, inputs=sandbox.inputs_of([*choices.words, os.getcwd()]),
+        reads=choices.reads, gpu=gpu,
+    )  # fmt: skip
+    process = processes.popen(
+        line, stdin=subprocess.DEVNULL, stderr=words, pass_fds=kept, env=_variables()
+    )
+    its.close()
+    os.close(stderr)
+    child.listen()
+    try:
+        status, sent = _wait(process.pid, child.pid)
+    except BaseException:
+        process.kill()
+        process.wait()
+        raise
     finally:
-        broker.clean()
-    _end(status, sent, page, words)
+        folder.close()
+        if group is not None:
+            group.close()
+    code = os.waitstatus_to_exitcode(status)
+    # bubblewrap reports a signal as 128 and its number; our own exit codes above that are 130, 143.
+    if code > 128 and code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
+        code = 128 - code
+    _end(code, sent, page, words)
+
+
+def _variables() -> dict[str, str]:
+    """Environment of the child; what selects Python modules is left out."""
+    return {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+
+
+def _memory_file(name: str) -> int:
+    return os.memfd_create(f"wavecomb-{name}", os.MFD_CLOEXEC)
+
+
+def _private_folder(outputs: Outputs) -> PrivateFolder:
+    """The folder that the child writes to: beside the first output, if that can be."""
+    from wavecomb.machine import temporary_folder
+
+    for folder in outputs.resolved().folders():
+        with contextlib.suppress(OSError):
+            remove_abandoned(Path(folder))
+            return PrivateFolder(Path(folder))
+    return PrivateFolder(Path(temporary_folder()))
+
+
+class _Child:
+    """What the parent knows of the process in the sandbox."""
+
+    def __init__(self, channel: socket.socket, mover: Mover, group: memory.Group | None) -> None:
+        self._channel, self._mover, self._group = channel, mover, group
+        self._pid = 0
+        self._is_there = threading.Event()
+
+    def listen(self) -> None:
+        """Answers the child's requests, on a thread of its own."""
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        space = socket.CMSG_SPACE(struct.calcsize("3i"))
+        with contextlib.suppress(OSError):
+            _, ancillary, *_ = self._channel.recvmsg(1, space)
+            for level, kind, data in ancillary:
+                if (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
+                    self._pid = struct.unpack("3i", data)[0]
+            if self._group is not None and self._pid:
+                self._group.add(self._pid)
+            self._is_there.set()
+            self._channel.sendall(b"g")
+            self._mover.serve(self._channel)
+
+    def pid(self) -> int:
+        """The id of the Python process, for signals; 0 if it never said so."""
+        self._is_there.wait(5.0)
+        return self._pid
+
+
+def become_child(given: str) -> None:
+    """Makes this process, in the sandbox, the child of its parent.
+
+    Args:
+        given: What ``run_in_sandbox`` passes on, as JSON.
+    """
+    global _is_child
+    _is_child = True
+    found = json.loads(given)
+    channel = socket.socket(fileno=found["channel"])
+    channel.sendall(b"h")  # the kernel adds the process id as the parent sees it
+    channel.recv(1)  # the parent has put this process into its control group
+    private = Path(found["private"])
+    files.publisher = Client(channel, private)
+    choices.words = tuple(found["words"])
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _WATCHED)
+    trail.follow(found["page"])
+    sys.excepthook = _print_exception
+    _say_on(found["stderr"])
 
 
 def _become_expendable(parent: int, page: int, words: int) -> None:
@@ -98,12 +290,16 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
     end_with_parent(parent)
     trail.follow(page)
     sys.excepthook = _print_exception
-    # What is said in Python goes where it always went; what libraries write is kept for later.
-    stderr = sys.stderr
     own = os.dup(2)
     os.dup2(words, 2)
+    _say_on(own)
+
+
+def _say_on(descriptor: int) -> None:
+    """Sends what Python prints to stderr there; what libraries write to descriptor 2 is kept."""
+    stderr = sys.stderr
     sys.stderr = io.TextIOWrapper(
-        os.fdopen(own, "wb", 0),
+        os.fdopen(descriptor, "wb", 0),
         encoding=stderr.encoding,
         errors=stderr.errors,
         line_buffering=True,
@@ -116,34 +312,52 @@ def _print_exception(kind: type[BaseException], error: BaseException, trace: Any
         sys.__excepthook__(kind, error, trace)
 
 
-def _wait(child: int) -> tuple[int, set[int]]:
-    """(exit status, signals that were passed on)."""
+def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
+    """Waits for a process and passes signals on.
+
+    Args:
+        process: The process to wait for.
+        child: Gives the process that signals go to; 0 if there is none.
+
+    Returns:
+        Exit status, and the signals that were passed on.
+    """
     sent: set[int] = set()
     while True:
-        pid, status = os.waitpid(child, os.WNOHANG)
+        pid, status = os.waitpid(process, os.WNOHANG)
         if pid:
             return status, sent
         number = signal.sigwaitinfo(_WATCHED).si_signo
-        if number == signal.SIGTSTP:  # Ctrl-Z: stop both, and go on together
-            os.kill(child, signal.SIGSTOP)
-            os.kill(os.getpid(), signal.SIGSTOP)
-        elif number != signal.SIGCHLD:
-            if number in _PASSED_ON:
-                sent.add(number)
-            os.kill(child, number)
+        if number == signal.SIGCHLD:
+            continue
+        target = child() or process
+        with contextlib.suppress(ProcessLookupError):
+            if number == signal.SIGTSTP:  # Ctrl-Z stops both; SIGCONT continues both
+                os.kill(target, signal.SIGSTOP)
+                os.kill(os.getpid(), signal.SIGSTOP)
+            else:
+                if number in _PASSED_ON:
+                    sent.add(number)
+                os.kill(target, number)
 
 
-def _end(status: int, sent: set[int], page: int, words: int) -> None:
-    """Ends this process as the child ended, or with a line and code 2 where it crashed."""
+def _end(code: int, sent: set[int], page: int, words: int) -> None:
+    """Ends this process as the child ended, or with a line and code 2 where it crashed.
+
+    Args:
+        code: Exit code of the child, negative for a signal.
+        sent: Signals that were passed on.
+        page: Descriptor of the page with notes.
+        words: Descriptor of what libraries wrote to stderr.
+    """
     text = os.pread(words, 1 << 20, 0).decode(errors="replace")
-    code = os.waitstatus_to_exitcode(status)
     if code < 0 and -code in sent:
         signal.signal(-code, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _WATCHED)
         os.kill(os.getpid(), -code)
     if code < 0:
         seen = trail.open_page(page)
-        line = trail.obituary(-code, trail.read(seen), text, limit_of(seen))
+        line = trail.obituary(-code, trail.read(seen), text, memory.limit_of(seen))
         os.write(2, f"error: {' '.join(line.split())}\n".encode(errors="replace"))
         os._exit(2)
     rest = [line for line in text.splitlines(keepends=True) if not line.startswith(CHATTER)]

@@ -50,7 +50,6 @@ from wavecomb.usd.stage.group import Group, changes_size, placed_lights
 from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.loaded import LoadedStage
-from wavecomb.usd.stage.named_files import keep_to
 from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
 from wavecomb.usd.stage.payloads import tell_unloaded
 from wavecomb.usd.stage.ray_visibility import RayVisibility
@@ -242,7 +241,6 @@ def _fill(
 ) -> _Filled:
     """Fills the builder. A stage that was opened here is closed then."""
     stage = choice.opened()
-    keep_to(stage)
     if cache is None:
         mtlx.tell(stage, report)
     tell_unloaded(stage, report)
