@@ -59,11 +59,13 @@ class Kind:
         stage: The fixture that writes it.
         options: Of the command.
         frames: Of a sequence; without, a checkpoint goes on.
+        sandbox: Whether the child runs in the sandbox.
     """
 
     stage: str
     options: tuple[str, ...]
     frames: tuple[int, ...] = ()
+    sandbox: str = "off"
 
     def outputs(self, name: str) -> list[str]:
         """Files that it writes under a name."""
@@ -73,9 +75,9 @@ class Kind:
 LIMITED = ("--texture-limit", "2")
 KINDS = {
     "noise": Kind("box", ("--noise", "0.01", "--max-spp", "1024")),
-    "adaptive": Kind("box", ("--adaptive", "0.02", "--max-spp", "1024")),
+    "adaptive": Kind("box", ("--adaptive", "0.02", "--max-spp", "1024"), sandbox="auto"),
     "texture limit": Kind("pictures", ("--spp", "256", *LIMITED)),
-    "sequence": Kind("pictures", ("--spp", "32", *LIMITED), (1, 2, 3)),
+    "sequence": Kind("pictures", ("--spp", "32", *LIMITED), (1, 2, 3), sandbox="auto"),
 }
 
 
@@ -123,7 +125,11 @@ class Killer:
             [sys.executable, "-m", "wavecomb", "render", *words, "--quiet"],
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"TMPDIR": str(self.temporary)},
+            env=os.environ
+            | {
+                "TMPDIR": str(self.temporary),
+                "WAVECOMB_SANDBOX": self.kind.sandbox,
+            },
         )
 
     def kill(self, times: int) -> int:
