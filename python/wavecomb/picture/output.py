@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from wavecomb._core import Scene
 
 
-def scene_metadata(scene: Scene, width: int, height: int) -> dict[str, Any]:
+def scene_metadata(
+    scene: Scene, width: int, height: int, origin: Sequence[float] = (0.0, 0.0, 0.0)
+) -> dict[str, Any]:
     """Attributes that a picture of a scene has, whatever its settings: the camera's matrices.
 
     What is as always is left out: "PixelAspectRatio" of square pixels, "wavecomb:exposure" of 1,
@@ -29,12 +31,13 @@ def scene_metadata(scene: Scene, width: int, height: int) -> dict[str, Any]:
 
     Both are for row vectors, p' = p M. "worldToCamera" leads to a camera that looks along -z with
     y up; "worldToNDC" from there to x, y in [-1, 1] across the picture, y up, after division by w,
-    and z in [-1, 1] between the clipping planes.
+    and z in [-1, 1] between the clipping planes. ``origin``: world position of the scene's origin.
     """
     camera = getattr(scene, "camera", None)
     if camera is None:
         return {}
     to_world = np.array(camera["to_world"], np.float64)
+    to_world[3, :3] += origin
     to_camera = np.linalg.inv(to_world)
     out: dict[str, Any] = {"worldToCamera": to_camera, "wavecomb:scene": scene_digest(scene)}
     shape = pixel_aspect(camera, width, height)

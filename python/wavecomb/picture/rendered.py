@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from wavecomb.picture.exr import Compression
     from wavecomb.picture.image import Transfer
 
+NOWHERE = (0.0, 0.0, 0.0)
+"""Origin of scenes in world coordinates."""
+
 
 @dataclass(frozen=True, repr=False)
 class Picture:
@@ -285,12 +288,28 @@ def picture_of(
         cancelled=result.cancelled,
         costs=result.costs,
         learned=result.learned,
-        aovs=result.aovs,
+        aovs=in_world(result.aovs, stats.get("origin", NOWHERE)),
         manifests=result.manifests,
         deep=deep_of(result.deep),
-        metadata={} if scene is None else scene_metadata(scene, width, height),
+        metadata={}
+        if scene is None
+        else scene_metadata(scene, width, height, stats.get("origin", NOWHERE)),
         chosen=tuple(aovs),
     )
+
+
+def in_world(
+    aovs: dict[str, NDArray[np.float32]], origin: Sequence[float]
+) -> dict[str, NDArray[np.float32]]:
+    """AOVs whose positions are in the world, as precise as floats are.
+
+    Pixels without a hit keep 0: no surface is at 0, 0, 0 of a scene that has another origin.
+    """
+    if "position" not in aovs or not any(origin):
+        return aovs
+    found = aovs["position"]
+    moved = (found.astype(np.float64) + np.asarray(origin)).astype(np.float32)
+    return {**aovs, "position": np.where(found.any(axis=-1, keepdims=True), moved, found)}
 
 
 def window_of(settings: Mapping[str, Any]) -> tuple[int, int, int, int] | None:

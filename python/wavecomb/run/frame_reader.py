@@ -20,6 +20,7 @@ from wavecomb.usd.stage.diagnostics import captured
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.load import load_stage
 from wavecomb.usd.stage.opening import open_stage
+from wavecomb.usd.stage.origin import find_origin, moved_to
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number, time_code
 from wavecomb.usd.stage.view_options import check_view, seen_on
@@ -114,7 +115,11 @@ class FrameReader:
             if not is_same or before.render != seen.choice:
                 return None
             return Seen(None, before.camera_path, before.shutter, before.render, number)
+        origin = find_origin(self._stage, when, seen.camera, seen.purposes)
+        if origin != before.origin:
+            return None  # the scene is built around another point
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))
+        to_world = moved_to(to_world, origin)
         view = read_camera(seen.camera, to_world, when, told, seen.lens)
         motion = find_motion(seen.camera, when, seen.blur, told)
         shutter = None if motion is None else motion.shutter
@@ -124,6 +129,6 @@ class FrameReader:
             return None
         if not self._cache.has_same_levels(view, options.size):
             return None
-        moves = camera_motion(seen.camera, motion)
+        moves = camera_motion(seen.camera, motion, origin)
         camera = {"transform": view.transform, **camera_defaults(), **view.options, "motion": moves}
         return Seen(camera, str(seen.camera.GetPath()), shutter, seen.choice, number)

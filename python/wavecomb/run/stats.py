@@ -73,6 +73,7 @@ def make_stats(
         "stage": stage,
         "camera": loaded.camera_path if loaded is not None else None,
         "working_space": loaded.working_space if loaded is not None else "rec709",
+        "origin": list(loaded.origin) if loaded is not None else [0.0, 0.0, 0.0],
         "cancelled": bool(result.cancelled),
         "settings": core.pop("settings", {}),
         "seconds": {

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from wavecomb.gui import theme
 from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session
+from wavecomb.picture.rendered import NOWHERE, in_world
 
 _LATER_MS = 30
 _SEEN = (
@@ -50,21 +52,30 @@ def value_text(value: Any) -> str:
     return "  ".join(f"{float(n):.4g}" for n in numbers)
 
 
-def pixel_rows(frame: Frame, x: int, y: int) -> list[tuple[str, str]]:
-    """Names and values of all layers of a frame at a pixel of the full-size picture."""
+def pixel_rows(
+    frame: Frame, x: int, y: int, origin: Sequence[float] = NOWHERE
+) -> list[tuple[str, str]]:
+    """Names and values of all layers of a frame at a pixel of the full-size picture.
+
+    ``origin``: world position of the scene's.
+    """
     column, row = frame.pixel(x, y)
     rows = []
     for name in frame.names():
         array = frame.layer(name)
         if array is not None:
-            rows.append((name, value_text(array[row, column])))
+            value = array[row, column]
+            value = in_world({name: value}, origin)[name]
+            rows.append((name, value_text(value)))
     return rows
 
 
-def seen_rows(hit: dict[str, Any] | None) -> list[tuple[str, str]]:
-    """Names and values of what ``Session.pick`` gave."""
+def seen_rows(hit: dict[str, Any] | None, origin: Sequence[float]) -> list[tuple[str, str]]:
+    """Names and values of what ``Session.pick`` gave; ``origin``: world position of the scene's."""
     if hit is None:
         return [("prim", "nothing")]
+    if hit.get("position") is not None:
+        hit = {**hit, "position": np.add(hit["position"], origin)}
     return [(label, value_text(hit[key])) for key, label in _SEEN if hit.get(key) is not None]
 
 
@@ -113,9 +124,11 @@ class Inspector(CursorPanel):
         setup = frame.setup
         x, y = min(self._pixel[0], setup.width - 1), min(self._pixel[1], setup.height - 1)
         hit = self._session.pick(x + 0.5, y + 0.5)
+        stage = self._session.stage
+        origin = NOWHERE if stage is None else stage.origin
         groups = [
-            (f"pixel {x}, {y}", pixel_rows(frame, x, y)),
-            ("seen there", seen_rows(hit)),
+            (f"pixel {x}, {y}", pixel_rows(frame, x, y, origin)),
+            ("seen there", seen_rows(hit, origin)),
         ]
         if self.tree.topLevelItemCount() != len(groups):
             self.tree.clear()

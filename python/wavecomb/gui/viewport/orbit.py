@@ -6,7 +6,7 @@ Transforms are in USD's row-vector convention: rows are right, up, back and posi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -61,9 +61,17 @@ class Pose:
         """The window as a picture of this size shows it."""
         return camera_window(self.options(), width, height)
 
+    def around(self, before: Sequence[float], now: Sequence[float]) -> Pose:
+        """The same place in the world for a scene that is built around another origin."""
+        if tuple(before) == tuple(now):
+            return self
+        to_world = self.to_world.copy()
+        to_world[3, :3] += np.subtract(before, now)
+        return replace(self, to_world=to_world)
+
     @property
     def position(self) -> Vector:
-        """In world space."""
+        """In the scene's space."""
         return self.to_world[3, :3]
 
     @property

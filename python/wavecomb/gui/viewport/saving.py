@@ -13,7 +13,7 @@ from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.picture.image import Transfer, write_png_codes
 from wavecomb.picture.output import scene_metadata
-from wavecomb.picture.rendered import Picture
+from wavecomb.picture.rendered import NOWHERE, Picture, in_world
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene
@@ -33,7 +33,8 @@ def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> 
     }
     if loaded is not None:
         stats |= {"stage": str(loaded.stage_path), "camera": loaded.camera_path}
-    layers = dict(frame.layers)
+    origin = NOWHERE if loaded is None else loaded.origin
+    layers = in_world(dict(frame.layers), origin)
     named: dict[str, Any] = {name: layers.pop(name, None) for name in _NAMED}
     return Picture(
         beauty=frame.beauty,
@@ -41,7 +42,7 @@ def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> 
         stats=stats,
         cancelled=True,
         aovs=layers,
-        metadata=scene_metadata(scene, frame.width, frame.height),
+        metadata=scene_metadata(scene, frame.width, frame.height, origin),
         chosen=frame.setup.aovs,
         **named,
     )

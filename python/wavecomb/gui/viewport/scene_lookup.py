@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.orbit import Pose, pose_of
+from wavecomb.usd.stage.origin import WORLD, Origin, moved_to
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -19,13 +20,16 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 
-def camera_pose(usd: Usd.Stage, path: str, time: float | None) -> Pose | None:
+def camera_pose(
+    usd: Usd.Stage, path: str, time: float | None, origin: Origin = WORLD
+) -> Pose | None:
     """Where a camera prim looks from; None where there is none that can be looked through.
 
     Args:
         usd: The stage.
         path: Of the prim.
         time: Time code; None: the stage's start.
+        origin: World position that the scene is built around.
     """
     from pxr import Sdf, UsdGeom
 
@@ -40,7 +44,7 @@ def camera_pose(usd: Usd.Stage, path: str, time: float | None) -> Pose | None:
         return None
     code: Usd.TimeCode = time_code(usd, time)
     to_world = np.array(UsdGeom.XformCache(code).GetLocalToWorldTransform(prim))
-    view = read_camera(prim, to_world, code, LoadReport())
+    view = read_camera(prim, moved_to(to_world, origin), code, LoadReport())
     return None if view is None else pose_of(view.transform, view.options, path)
 
 
@@ -93,7 +97,9 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
         if light == plain or light.startswith(f"{plain}/"):
             prim = usd.GetPrimAtPath(light)
             if prim:
-                found.UnionWith(boxes.ComputeWorldBound(prim).ComputeAlignedRange())
+                box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
+                shift = Gf.Vec3d(*loaded.origin)
+                found.UnionWith(Gf.Range3d(box.GetMin() - shift, box.GetMax() - shift))
     if found.IsEmpty():
         return None
     return np.array([found.GetMin(), found.GetMax()], np.float64)

@@ -38,6 +38,7 @@ from wavecomb.gui.viewport.scene_lookup import (
 )
 from wavecomb.gui.viewport.tasks import Tasks
 from wavecomb.gui.worker import Worker
+from wavecomb.usd.stage.origin import WORLD
 
 if TYPE_CHECKING:
     from wavecomb._core import Scene
@@ -217,6 +218,8 @@ class Session(QObject):
         if not again or request.fresh:
             self.material_edits.clear()
             self.light_edits.clear()
+        if again and self.pose is not None and self.stage is not None:
+            self.pose = self.pose.around(self.stage.origin, loaded.origin)
         self._request, self.usd, self.stage = request, usd, loaded
         if not again:
             self.select(None)
@@ -298,7 +301,8 @@ class Session(QObject):
     def _pose_of(self, path: str) -> Pose | None:
         if self.usd is None or self._request is None:
             return None
-        return camera_pose(self.usd, path, self._request.source.time)
+        origin = WORLD if self.stage is None else self.stage.origin
+        return camera_pose(self.usd, path, self._request.source.time, origin)
 
     def edit_material(self, material: int, *, moving: bool = False, **values: Any) -> None:
         """Changes parameters of a material by number: keyword arguments of ``add_material``."""
@@ -338,7 +342,7 @@ class Session(QObject):
             self.selected.emit(path)
 
     def selected_bounds(self) -> NDArray[np.float64] | None:
-        """Least and greatest corner of the selected prim in world space, (2, 3), or None."""
+        """Least and greatest corner of the selected prim in the scene, (2, 3), or None."""
         if self.selection is None or self.stage is None or self.usd is None:
             return None
         return prim_bounds(self.usd, self.stage, self.selection)

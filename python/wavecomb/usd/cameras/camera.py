@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
@@ -256,14 +256,20 @@ def _clip_planes(
     return found[:MAX_CLIP_PLANES]
 
 
-def camera_motion(prim: Usd.Prim, motion: Motion | None) -> Matrix | None:
-    """Transforms (s, 4, 4) of a camera at equal steps over the shutter; None: it stands still."""
+def camera_motion(
+    prim: Usd.Prim, motion: Motion | None, origin: Sequence[float] = (0.0, 0.0, 0.0)
+) -> Matrix | None:
+    """Transforms (s, 4, 4) of a camera at equal steps over the shutter; None: it stands still.
+
+    ``origin``: world position that the scene is built around.
+    """
     if motion is None:
         return None
     frames: list[Matrix | None] = []
 
     def frame(time: float) -> Matrix:
         world = np.array(motion.xforms(time).GetLocalToWorldTransform(prim))
+        world[3, :3] -= origin
         frames.append(_rigid(world))
         return world if frames[-1] is None else frames[-1]
 

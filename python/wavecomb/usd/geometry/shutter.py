@@ -117,19 +117,14 @@ class Motion:
             cache = self._caches[time] = UsdGeom.XformCache(Usd.TimeCode(time))
         return cache
 
-    def follow(
-        self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d, resets: bool
-    ) -> Track | None:
+    def follow(self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d) -> Track | None:
         """The track of a prim under one that has one or has not; None: it stands still.
 
         Args:
             prim: With a transform.
-            parent: Track of what is above it.
+            parent: Track of what is above it; None also where the prim resets its transform.
             above: Transform of what is above it where that stands still.
-            resets: Whether what is above does not count.
         """
-        if resets:
-            parent, above = None, Gf.Matrix4d(1.0)
         if parent is None and not UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
             return None
         return Track(self, prim, parent, above)

@@ -161,10 +161,11 @@ class TextureTable:
 
         ``working``: the space that colours are converted to, of ``WORKING_SPACES``. ``store``: that
         of the builder. ``drops`` may be set to say how many of its finest levels a texture leaves
-        out.
+        out, and ``origin`` to the world position that the scene is built around, for graphs.
         """
         self.store = store
         self.working = working
+        self.origin = (0.0, 0.0, 0.0)
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
         self._builder = builder

@@ -33,7 +33,9 @@ from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.instance_looks import InstanceLooks, Look
 from wavecomb.usd.stage.instance_materials import InstanceMaterials
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
+from wavecomb.usd.stage.origin import around
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of
+from wavecomb.usd.stage.precision import problem_of
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.room import Room
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
@@ -123,7 +125,8 @@ class GroupBuilder:
     def world(self) -> Group:
         """Reads the whole stage into group 0."""
         group = Group("world", number=0)
-        self._fill(group, list(self.stage.GetPseudoRoot().GetChildren()), Scope(), "default")
+        roots = list(self.stage.GetPseudoRoot().GetChildren())
+        self._fill(group, roots, Scope(), "default", base=around(self.traversal.origin))
         return group
 
     def _fill(
@@ -133,9 +136,10 @@ class GroupBuilder:
         scope: Scope,
         purpose: str,
         predicate: Any = None,
+        base: Gf.Matrix4d = IDENTITY,
     ) -> None:
-        """Reads prims and all below them into a group."""
-        found = self.traversal.walk(roots, purpose, predicate, scope.brings)
+        """Reads prims and all below them into a group, whose space ``base`` leads to."""
+        found = self.traversal.walk(roots, purpose, predicate, scope.brings, base)
         group.lights += found.lights
         self.room.check(found.draws)
         self._bind(found, scope)
@@ -241,6 +245,9 @@ class GroupBuilder:
             what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
             self.report.note(what, path)
             return
+        coarse = problem_of(shape.bounds, draw.matrix, in_world=group.number == 0)
+        if coarse is not None:
+            self.report.warn(coarse, path)
         if lamp is not None and lamp.material is not None:
             worn = Worn(lamp.material)
         elif kind == "splats":

@@ -13,6 +13,7 @@ from pxr import Usd, UsdGeom
 from wavecomb.usd.geometry.primvar import as_array, as_integers
 from wavecomb.usd.geometry.shutter import Motion, Track
 from wavecomb.usd.geometry.triangulate import cross
+from wavecomb.usd.stage.precision import POSITIONS, positions_are_coarse
 from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]
@@ -87,6 +88,8 @@ def read_instances(
         keep &= ~outside
     linear = _linear(instancer, time, count, report)
     kept = np.flatnonzero(keep)
+    if positions_are_coarse(positions[kept]):
+        report.warn(POSITIONS, path)
     transforms = np.zeros((len(kept), 4, 4))
     transforms[:, :3, :3] = linear if linear.ndim == 2 else linear[kept]
     transforms[:, 3, :3] = positions[kept]

@@ -51,6 +51,7 @@ from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.loaded import LoadedStage
 from wavecomb.usd.stage.opening import Survey, open_stage, select_variants, survey
+from wavecomb.usd.stage.origin import Origin, find_origin, moved_to
 from wavecomb.usd.stage.payloads import tell_unloaded
 from wavecomb.usd.stage.ray_visibility import RayVisibility
 from wavecomb.usd.stage.report import LoadReport
@@ -83,6 +84,7 @@ class _Filled:
     outline: NDArray[np.float64] | None
     volumes: tuple[VolumeFacts, ...]
     catchers: tuple[str, ...]
+    origin: Origin
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,7 @@ def load_stage(
         filled.outline,
         filled.volumes,
         filled.catchers,
+        filled.origin,
     )
 
 
@@ -248,6 +251,7 @@ def _fill(
     found = survey(stage)
     materials = MaterialTable(builder, textures, time, report, apart=choice.editable)
     seen = seen_on(stage, choice.options, report)
+    origin = textures.origin = find_origin(stage, time, seen.camera, seen.purposes)
     chosen, lights, shutter, outline, volumes, catchers = _read(
         stage,
         time,
@@ -265,7 +269,7 @@ def _fill(
     used = frame_number(time)
     return _Filled(
         chosen, found, materials.paths(), lights, used, shutter, seen.choice, outline, volumes,
-        catchers,
+        catchers, origin,
     )  # fmt: skip
 
 
@@ -303,13 +307,14 @@ def _read(
     rays = RayVisibility(builder, report, IGNORED[choice.options.catch])
     traversal = Traversal(
         time, seen.purposes, lights, report, motion, seen.binding_purposes,
-        rays,
+        rays, textures.origin,
     )  # fmt: skip
     if choice.options.texture_limit is not None and textures.store is None:
         _limit_textures(stage, traversal, seen, choice, textures, report)
     view = None
     if view_prim is not None:
         to_world = np.array(traversal.xforms.GetLocalToWorldTransform(view_prim))
+        to_world = moved_to(to_world, textures.origin)
         view = read_camera(view_prim, to_world, time, report, seen.lens)
     outline = None
     planes = frame_planes(up_axis, seen.lens, choice.size)
@@ -325,7 +330,7 @@ def _read(
     _hold_out(stage, choice.options.holdouts, builder)
     catchers = set_catchers(stage, choice.options, rays.catchers, builder)
     light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
-    volumes = add_volumes(world, builder, report)
+    volumes = add_volumes(world, builder, report, textures.origin)
     say_room(volumes, choice.options.texture_limit, report)
     say_cloudy(volumes, materials.cloudy, report)
     if not any(report.counts.get(kind) for kind in DRAWN_COUNTS):
@@ -336,7 +341,7 @@ def _read(
         outline = joined(world.outlines, planes)
         view = frame_points(outline, up_axis, seen.lens, choice.size)
     elif view_prim is not None:
-        moves = camera_motion(view_prim, motion)
+        moves = camera_motion(view_prim, motion, textures.origin)
         if moves is not None:
             view.options["motion"] = moves
     surfaces.finish(world, view)

@@ -43,10 +43,12 @@ class LoadedStage:
         working_space: What its colours are in: of ``WORKING_SPACES``.
         textures: What the next read of the stage can share; None unless it was read ``editable``.
         leaves_out_levels: Whether textures have only the mip levels that its view needs.
-        outline: Points (n, 3) in the world where what is drawn reaches farthest; None unless a view
+        outline: Points (n, 3) of the scene where what is drawn reaches farthest; None unless a view
             was framed for it.
         volumes: What there is to say of each.
         catchers: Prims of which only the shadows show.
+        origin: World position that the scene is built around: the scene's coordinates are the
+            world's less these. It is 0 unless the stage is seen from far away (docs/stages.md).
     """
 
     scene: _core.Scene
@@ -67,6 +69,7 @@ class LoadedStage:
     outline: NDArray[np.float64] | None = None
     volumes: tuple[VolumeFacts, ...] = ()
     catchers: tuple[str, ...] = ()
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     _kept: list[_core.Renderer] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @contextlib.contextmanager

@@ -26,6 +26,7 @@ from wavecomb.usd.looks.network import word
 from wavecomb.usd.stage.draw_modes import DrawModes
 from wavecomb.usd.stage.group import Place
 from wavecomb.usd.stage.instancing import sound
+from wavecomb.usd.stage.origin import WORLD, Origin
 from wavecomb.usd.stage.ray_visibility import NAMES as RAY_NAMES
 from wavecomb.usd.stage.ray_visibility import RayVisibility
 from wavecomb.usd.stage.report import LoadReport
@@ -75,8 +76,12 @@ class Traversal:
         motion: Motion | None = None,
         binding_purposes: Sequence[str] = BINDING_PURPOSES,
         rays: RayVisibility | None = None,
+        origin: Origin = WORLD,
     ) -> None:
-        """``motion``: what is followed while the shutter is open. ``rays``: who is told of them."""
+        """``motion``: what is followed while the shutter is open. ``rays``: who is told of them.
+
+        ``origin``: world position that the scene is built around.
+        """
         self.time = time
         self.binding_purposes = tuple(binding_purposes)
         self.purposes = frozenset(purposes)
@@ -84,6 +89,7 @@ class Traversal:
         self.report = report
         self.motion = motion
         self.rays = rays
+        self.origin = origin
         self.skeletons = Skeletons(report)
         self.xforms = UsdGeom.XformCache(time)
         self.modes = DrawModes(time, report)
@@ -131,6 +137,7 @@ class Traversal:
         purpose: str = "default",
         predicate: Any = None,
         inherited: Sequence[Any] = (),
+        base: Gf.Matrix4d = IDENTITY,
     ) -> Gathered:
         """Finds what is at and below some prims, in stage order.
 
@@ -139,6 +146,7 @@ class Traversal:
             purpose: Of their parents.
             predicate: Of the children to visit; None: USD's default.
             inherited: Constant primvars that they inherit.
+            base: Transform of their parents, and of prims that reset their transform.
         """
         found = Gathered()
         time, local = self.time, self.xforms.GetLocalTransformation
@@ -151,7 +159,7 @@ class Traversal:
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]
         stack = [
-            (prim, IDENTITY, None, purpose, inherited, predicate, None, "default")
+            (prim, base, None, purpose, inherited, predicate, None, "default")
             for prim in reversed(roots)
         ]
         kinds, has_instances = self._kinds, bool(roots and roots[0].GetStage().GetPrototypes())
@@ -181,9 +189,10 @@ class Traversal:
                 if kind != "scope" and "xformOpOrder" in names:
                     own, resets = local(prim)
                     if self.motion is not None:
-                        track = self.motion.follow(prim, track, matrix, resets)
+                        above = base if resets else matrix
+                        track = self.motion.follow(prim, None if resets else track, above)
                     if resets:
-                        matrix = own
+                        matrix = own if base is IDENTITY else own * base
                     elif own != IDENTITY:
                         matrix = own * matrix
                 if "model:drawMode" in names:

@@ -12,6 +12,7 @@ from wavecomb.usd.looks.assign import Draw
 from wavecomb.usd.looks.texture_store import MEGABYTE
 from wavecomb.usd.stage.group import Group, Scope, placed_volumes
 from wavecomb.usd.stage.instancing import sound
+from wavecomb.usd.stage.origin import Origin
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import GridFacts, VolumeFacts
 from wavecomb.usd.volumes.volume import VolumeReader
@@ -65,9 +66,12 @@ class VolumePlacer:
 
 
 def add_volumes(
-    world: Group, builder: _core.SceneBuilder, report: LoadReport
+    world: Group, builder: _core.SceneBuilder, report: LoadReport, origin: Origin
 ) -> tuple[VolumeFacts, ...]:
-    """Adds all volumes; says what each is, once for all its places."""
+    """Adds all volumes; says what each is, once for all its places.
+
+    ``origin``: world position that the scene is built around.
+    """
     volumes = placed_volumes(world, MAX_VOLUMES + 1)
     if len(volumes) > MAX_VOLUMES:
         report.warn(f"more than {MAX_VOLUMES} volumes: the rest is left out")
@@ -81,7 +85,7 @@ def add_volumes(
             continue
         builder.add_volume(**volume.options, to_world=transform)
         corners = volume.corners @ transform[:3, :3] + transform[3, :3]
-        places.setdefault(name, []).append(corners)
+        places.setdefault(name, []).append(corners + origin)
         grids[name] = volume.grids
     return tuple(_facts(name, corners, grids[name]) for name, corners in places.items())
 

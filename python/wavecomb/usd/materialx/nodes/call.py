@@ -151,7 +151,12 @@ class NodeCall:
             return numbers(0.0, 0.0, 1.0)
         if space != "world" and kind in ("position", "normal"):
             return make.input(f"local_{kind}")
-        return make.input(kind)
+        return self.world_position() if kind == "position" else make.input(kind)
+
+    def world_position(self) -> Value:
+        """The position of the surface in the world, which the scene's may differ from."""
+        position, origin = self.make.input("position"), self.networks.textures.origin
+        return self.make.op("add", position, numbers(*origin)) if any(origin) else position
 
 
 Handler = Callable[[NodeCall], Value | None]

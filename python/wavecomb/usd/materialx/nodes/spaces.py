@@ -93,7 +93,7 @@ def _transform_point(n: NodeCall) -> Value:
     p = _given(n, (0.0, 0.0, 0.0))
     if starts == ends:
         return p
-    world, local = m.input("position"), m.input("local_position")
+    world, local = n.world_position(), m.input("local_position")
     if starts:
         return m.op("add", world, _sum(m, _columns(m), m.op("subtract", p, local)))
     return m.op("add", local, _dots(m, _rows(m), m.op("subtract", p, world)))

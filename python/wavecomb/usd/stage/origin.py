@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The world position that a scene is built around.
+
+The core computes in single precision: a million units from the origin coordinates have steps of
+1/16 unit. So the scene of a stage whose camera is far away is built around a point near the camera.
+Transforms are double precision until they have been moved there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Tf, Usd, UsdGeom
+
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY
+from wavecomb.usd.stage.diagnostics import captured
+from wavecomb.usd.stage.report import LoadReport
+
+Origin = tuple[float, float, float]
+
+NEAR = 2.0**14
+"""Coordinates up to this have steps of 1/1024 unit or less in single precision."""
+
+CELL = 2.0**12
+"""Origins are multiples of it, so that most frames of a moving camera have the same one."""
+
+WORLD: Origin = (0.0, 0.0, 0.0)
+"""The world's origin: of all stages that are seen from nearby."""
+
+
+def find_origin(
+    stage: Usd.Stage, time: Usd.TimeCode, camera: Usd.Prim | None, purposes: Sequence[str]
+) -> Origin:
+    """The origin of a scene: near the camera, or near the center of the bounds without one.
+
+    It depends on the stage, frame and camera alone, so that all regions, tiles and machines that
+    render one image agree.
+
+    Args:
+        stage: The stage.
+        time: Frame that is rendered.
+        camera: Camera prim; None: the bounds are framed.
+        purposes: Purposes of the geometry that is drawn.
+    """
+    if camera is not None:
+        matrix = UsdGeom.XformCache(time).GetLocalToWorldTransform(camera)
+        return _snapped(np.array(matrix.ExtractTranslation()))
+    cache = UsdGeom.BBoxCache(time, list(purposes), True)
+    try:
+        with captured(LoadReport()):  # whoever reads the prims reports what is wrong with them
+            whole = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+    except Tf.ErrorException:
+        return WORLD
+    if whole.IsEmpty():
+        return WORLD
+    return _snapped(np.array(whole.GetMidpoint()))
+
+
+def _snapped(place: NDArray[np.float64]) -> Origin:
+    """The nearest origin to a position; the world's if the position is near it or not finite."""
+    if not np.isfinite(place).all() or np.abs(place).max() < NEAR:
+        return WORLD
+    x, y, z = np.round(place / CELL) * CELL + 0.0
+    return float(x), float(y), float(z)
+
+
+def around(origin: Origin) -> Gf.Matrix4d:
+    """The transform from the world to a scene with this origin; ``IDENTITY`` itself for WORLD."""
+    if origin == WORLD:
+        return IDENTITY
+    return Gf.Matrix4d(1.0).SetTranslate(-Gf.Vec3d(*origin))
+
+
+def moved_to(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float64]:
+    """Transforms (..., 4, 4) to the world as transforms to a scene with this origin."""
+    if origin == WORLD:
+        return matrices
+    out = np.array(matrices, np.float64)
+    out[..., 3, :3] -= np.asarray(origin)
+    return out

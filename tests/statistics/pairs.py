@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random stages by every pair of settings that must agree in expectation.
+
+    .venv/bin/python tests/statistics/pairs.py 17                    # one seed, with its images
+    .venv/bin/python tests/statistics/pairs.py --from 0 --count 500  # many; exit code 1 on a fault
+
+A stage is rendered with plain settings and with each of ``variants``: light paths, guiding, cosine
+sampling, roulettes, the choice of lights, hidden lights, and random combinations of all of them.
+Both renders are sets of batches that have different seeds. ``judge`` compares block means and the
+image mean by Welch's t. A comparison with |z| of 3.3 or more is repeated with 12 and then with 60
+times as many samples and other seeds. It is a fault if |z| is too large each time, at the level
+that Sidak's correction leaves of 1 % for all comparisons of a run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "statistics")]
+
+from agreement import Array  # noqa: E402
+from naive import BATCHES, BLOCK, MORE, SIZE, SUSPICION, Comparison, judge  # noqa: E402
+from random_scenes import RandomScene, make_scene  # noqa: E402
+
+SPP = 64
+"""Samples per pixel of a batch."""
+TRAINING_SPP = 1024
+"""Samples of the render that trains the guiding field: fewer train nothing at this size."""
+PLAIN: dict[str, Any] = {
+    "transport": "path",
+    "guiding": "off",
+    "cosine_sampling": False,
+    "roulette": "off",
+    "roulette_depth": 1,
+    "light_selection": "auto",
+    "light_weights": "calibrated",
+    "sampler": "sobol",
+    # A single texel has another mean where shading is not linear.
+    "texture_filter": "whole",
+    "filter": "box",
+    "filter_width": 1.0,
+    "costs": "model",
+}
+SINGLE: dict[str, dict[str, Any]] = {
+    "guiding": {"guiding": "on"},
+    "cosine": {"cosine_sampling": True},
+    "guiding cosine": {"guiding": "on", "cosine_sampling": True},
+    "power": {"light_selection": "power"},
+    "tree, power weights": {"light_selection": "tree", "light_weights": "power"},
+    "roulette": {"roulette": "throughput"},
+    "efficient": {"roulette": "efficient"},
+    "light": {"transport": "light"},
+    "bdpt": {"transport": "bdpt"},
+    "merged": {"transport": "light", "merge_radius": 0.25},
+}
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "roulette": ("off", "throughput", "cost-aware", "efficient"),
+    "light_selection": ("auto", "tree", "power"),
+    "light_weights": ("calibrated", "power"),
+    "sampler": ("sobol", "independent"),
+}
+MERGED_TOLERANCE = 0.03
+"""Relative difference that a blurred caustic may make to the image mean, by loss at edges."""
+SMOOTH_TOLERANCE = 0.0
+"""Relative difference that light paths may make on smooth coarse meshes (docs/light-paths.md)."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Settings to compare with the plain ones.
+
+    Attributes:
+        name: Short name for messages.
+        settings: Settings that differ from ``PLAIN``.
+        load: Load options that differ from the scene's.
+    """
+
+    name: str
+    settings: dict[str, Any]
+    load: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcome of one comparison.
+
+    Attributes:
+        variant: The variant that was compared.
+        found: The comparison; None if the renderer refuses the settings for this stage.
+        refusal: The renderer's message in that case.
+        tries: Number of comparisons made, with growing numbers of samples.
+    """
+
+    variant: Variant
+    found: Comparison | None
+    refusal: str = ""
+    tries: int = 1
+
+    def is_fault(self, tests: int) -> bool:
+        """Whether it is too far for chance, as one of so many comparisons."""
+        return self.found is not None and self.found.is_fault(tests)
+
+
+def variants(scene: RandomScene, seed: int) -> list[Variant]:
+    """All variants of a stage: single changes, two random combinations, hidden lights."""
+    found = [Variant(name, settings, {}) for name, settings in SINGLE.items()]
+    random = np.random.default_rng((54, seed))
+    for k in range(2):
+        mixed = {
+            name: values[int(random.integers(len(values)))] for name, values in CHOICES.items()
+        }
+        way = int(random.integers(5))
+        if way < 2:
+            mixed["transport"] = ("light", "bdpt")[way]
+            mixed["light_aim"] = ("on", "off")[int(random.integers(2))]
+        else:
+            mixed["guiding"] = ("off", "on")[int(random.integers(2))]
+            mixed["cosine_sampling"] = bool(random.integers(2))
+        found.append(Variant(f"mixed {k}", mixed, {}))
+    if scene.single_light:
+        other = "visible" if scene.load.get("lights") == "hidden" else "hidden"
+        found.append(Variant(f"lights {other}", {}, {"lights": other}))
+    return found
+
+
+class Renders:
+    """Renders batches of one scene and keeps its loaded stages and plain batches."""
+
+    def __init__(self, scene: RandomScene) -> None:
+        self.scene = scene
+        self.stages: dict[str, Any] = {}
+        self.plain: dict[int, Array] = {}
+        self.trained: dict[str, Any] = {}
+
+    def stage(self, load: dict[str, Any]) -> Any:
+        """The stage, loaded with these options beside the scene's."""
+        import wavecomb
+
+        key = str(sorted(load.items()))
+        if key not in self.stages:
+            self.stages[key] = wavecomb.load(self.scene.stage, **(self.scene.load | load))
+        return self.stages[key]
+
+    def settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """All settings of a render but samples and seed."""
+        fresnel = "schlick" if self.scene.schlick else "exact"
+        common = {"size": (SIZE, SIZE), "threads": 1, "max_depth": self.scene.depth}
+        return {**PLAIN, **common, "fresnel": fresnel, **changes}
+
+    def batches(self, variant: Variant | None, more: int, first: int) -> Array:
+        """``BATCHES`` renders of a variant, or with plain settings, (n, height, width, 3)."""
+        import wavecomb
+
+        if variant is None and more in self.plain:
+            return self.plain[more]
+        stage = self.stage(variant.load if variant else {})
+        settings = self.settings(variant.settings if variant else {})
+        if settings["guiding"] == "on":
+            settings["learn_from"] = self.field(stage, settings)
+        # Light selection and roulettes learn from pilot renders whose size depends on the samples.
+        renders = [
+            wavecomb.render(stage, spp=SPP * more, seed=seed, **settings).beauty
+            for seed in range(first, first + BATCHES)
+        ]
+        batches = np.stack([np.asarray(one, np.float64) for one in renders])
+        if variant is None:
+            self.plain[more] = batches
+        return batches
+
+    def field(self, stage: Any, settings: dict[str, Any]) -> Any:
+        """A render that has trained a guiding field with these settings."""
+        import wavecomb
+
+        key = str(settings["cosine_sampling"])
+        if key not in self.trained:
+            self.trained[key] = wavecomb.render(stage, spp=TRAINING_SPP, seed=99_999, **settings)
+        return self.trained[key]
+
+    def sees_lights(self) -> bool:
+        """Whether the camera sees the shape of a light, or light that passes through a cut-out."""
+        import wavecomb
+
+        stage = self.stage({"lights": "visible"})
+        image = wavecomb.render(stage, spp=256, aovs=["emission"], **self.settings({}))
+        return bool(image.aovs["emission"].any())
+
+    def tolerance(self, variant: Variant) -> float:
+        """Relative difference of means that the documentation admits."""
+        if variant.settings.get("transport", "path") == "path":
+            return 0.0
+        if "merge_radius" in variant.settings:
+            return MERGED_TOLERANCE
+        smooth = {"smooth ball", "smooth shell", "gprim", "points", "cage"}
+        return SMOOTH_TOLERANCE if smooth & set(self.scene.features) else 0.0
+
+    def compare(self, variant: Variant, turn: int) -> Comparison:
+        """Compares a variant with plain settings; later turns have more samples, other seeds."""
+        more = (1, *MORE)[turn]
+        found = judge(
+            self.batches(variant, more, 1000 * turn + 500),
+            self.batches(None, more, 1000 * turn),
+            tolerance=self.tolerance(variant),
+        )
+        # Merging blurs what mirrors show: of the image, only the mean stays.
+        return found.of_mean() if "merge_radius" in variant.settings else found
+
+
+def examine(scene: RandomScene, seed: int) -> Iterator[Result]:
+    """Compares all variants of a scene, suspicious ones again with more samples."""
+    from wavecomb import _core
+
+    renders = Renders(scene)
+    for variant in variants(scene, seed):
+        if variant.load and renders.sees_lights():
+            continue
+        try:
+            found = renders.compare(variant, 0)
+            turn = 0
+            while found.worst >= SUSPICION and turn < len(MORE):
+                turn += 1
+                found = renders.compare(variant, turn)
+        except _core.Error as error:
+            if variant.settings.get("transport", "path") == "path":
+                raise
+            yield Result(variant, None, str(error))
+            continue
+        yield Result(variant, found, tries=turn + 1)
+
+
+def save(result: Result, folder: Path) -> None:
+    """Writes the variant's image, the plain one and z side by side."""
+    from agreement import picture_of
+
+    assert result.found is not None
+    count = (SIZE // BLOCK) ** 2
+    z = result.found.z
+    z = z[: 3 * count] if z.size > 3 else np.tile(z, count)
+    z = z.reshape(SIZE // BLOCK, SIZE // BLOCK, 3)
+    z = np.repeat(np.repeat(z, BLOCK, axis=0), BLOCK, axis=1)
+    name = result.variant.name.replace(" ", "-").replace(",", "")
+    picture_of(folder / f"{name}.png", result.found.ours, result.found.naive, z)
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("seed", nargs="?", type=int, help="of one stage")
+    parser.add_argument("--from", dest="first", type=int, default=0, metavar="SEED")
+    parser.add_argument("--count", type=int, default=30, help="stages, where no seed is given")
+    parser.add_argument("--minutes", type=float, help="start no stage after so many minutes")
+    parser.add_argument("-o", "--out", type=Path, default=ROOT / "out" / "pairs")
+    options = parser.parse_args()
+    one = options.seed is not None
+    seeds = [options.seed] if one else range(options.first, options.first + options.count)
+    faults = stages = refused = compared = 0
+    begin = time.monotonic()
+    for seed in seeds:
+        if options.minutes and time.monotonic() - begin > 60 * options.minutes:
+            break
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = options.out / str(seed) if one else Path(temporary)
+            folder.mkdir(parents=True, exist_ok=True)
+            for old in folder.iterdir():
+                old.unlink()
+            scene = make_scene(seed, folder, enclosure=True)
+            bad = False
+            for result in examine(scene, seed):
+                compared += 1
+                refused += result.found is None
+                fault = result.is_fault(len(SINGLE) * len(seeds))
+                faults += fault
+                bad = bad or fault
+                if fault or one:
+                    words = f"FAULT: {result.found}" if fault else result.found or result.refusal
+                    print(f"{seed}: {result.variant.name}: {words}", flush=True)
+                if one and result.found is not None:
+                    save(result, folder)
+            stages += 1
+            if bad or one:
+                print(f"    {', '.join(scene.features)}; depth {scene.depth}", flush=True)
+    place = f"; {options.out / str(seeds[0])}" if one else ""
+    print(f"{stages} stages, {compared} comparisons, {refused} refused, {faults} faults{place}")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
