@@ -214,13 +214,6 @@ def test_parts_of_an_image(tmp_path: Path) -> None:
     assert (whole.beauty[8:24, 8:40] == part.beauty).all()
 
 
-def test_in_a_sandbox_or_not(tmp_path: Path) -> None:
-    path = stage(tmp_path, FAR)
-    here, there = (render(path, isolate=isolate) for isolate in (False, True))
-    assert here.stats["origin"] == there.stats["origin"]
-    assert (here.beauty == there.beauty).all()
-
-
 def test_frames_are_what_they_are_alone(tmp_path: Path) -> None:
     """A camera that flies: its stage is read again where it is built around another origin."""
     flight = f"0: ({CELL * 6}, 2, 9), 1: ({CELL * 6 + 1}, 2, 9), 2: ({CELL * 8}, 2, 9)"
@@ -403,7 +396,7 @@ def test_what_floats_cannot_hold_is_said(
 ) -> None:
     path = tmp_path / "stage.usda"
     path.write_text("#usda 1.0\n" + re.sub(r" \}", "\n}", body))
-    loaded = wavecomb.load(path, isolate=False)
+    loaded = wavecomb.load(path)
     found = [one for one in loaded.report.warnings if "single precision" in one.what]
     if warning is None:
         assert not found

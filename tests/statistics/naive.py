@@ -19,7 +19,7 @@ import importlib
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -86,6 +86,10 @@ class Comparison:
         """The largest magnitude of z."""
         return float(np.abs(self.z).max())
 
+    def of_mean(self) -> Comparison:
+        """The comparison of the whole pictures alone."""
+        return replace(self, z=self.z[-3:])
+
     def is_fault(self, scenes: int) -> bool:
         """Whether it is too far for chance, being one of so many scenes."""
         return self.worst > limit(self.z.size * scenes)
@@ -101,8 +105,8 @@ def limit(tests: int) -> float:
     return float(stats.norm.isf((1.0 - (1.0 - LEVEL) ** (1.0 / tests)) / 2.0))
 
 
-def judge(ours: Array, naive: Array) -> Comparison:
-    """Compares two pictures given as batches."""
+def judge(ours: Array, naive: Array, *, tolerance: float = 0.0) -> Comparison:
+    """Compares two pictures given as batches; ``tolerance``: relative difference that is none."""
 
     def tested(x: Array) -> Array:
         n, height, width, _ = x.shape
@@ -114,10 +118,12 @@ def judge(ours: Array, naive: Array) -> Comparison:
     level = np.maximum(np.maximum(np.abs(a.mean(axis=0)), np.abs(b.mean(axis=0))), 1e-6)
     error2 = a.var(axis=0, ddof=1) / len(a) + b.var(axis=0, ddof=1) / len(b)
     noisy = error2 > (1e-5 * level) ** 2
-    z = welch(a, b, 0.0, noisy)
+    z = welch(a, b, tolerance * level, noisy)
     relative = (a.mean(axis=0) - b.mean(axis=0)) / level
     # Without noise there is nothing to wait for: rounding is all that may differ.
-    z = np.where(noisy, z, np.where(np.abs(relative) > 1e-3, 99.0 * np.sign(relative), 0.0))
+    z = np.where(
+        noisy, z, np.where(np.abs(relative) > tolerance + 1e-3, 99.0 * np.sign(relative), 0.0)
+    )
     return Comparison(ours, naive, z, relative[-3:], (np.sqrt(error2) / level)[-3:])
 
 

@@ -71,7 +71,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 }
 MERGED_TOLERANCE = 0.03
 """Relative difference that a blurred caustic may make to the image mean, by loss at edges."""
-SMOOTH_TOLERANCE = 0.0
+SMOOTH_TOLERANCE = 0.01
 """Relative difference that light paths may make on smooth coarse meshes (docs/light-paths.md)."""
 
 
@@ -200,7 +200,7 @@ class Renders:
             return 0.0
         if "merge_radius" in variant.settings:
             return MERGED_TOLERANCE
-        smooth = {"smooth ball", "smooth shell", "gprim", "points", "cage"}
+        smooth = {"smooth ball", "smooth shell", "gprim", "cage"}
         return SMOOTH_TOLERANCE if smooth & set(self.scene.features) else 0.0
 
     def compare(self, variant: Variant, turn: int) -> Comparison:

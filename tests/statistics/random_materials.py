@@ -184,6 +184,10 @@ class Materials:
         if self.chance(0.1):
             self.features.append("film")
             inputs["float thin_film_weight"] = "1"
+        return self.open_pbr_of(inputs)
+
+    def open_pbr_of(self, inputs: dict[str, str]) -> str:
+        """Adds an open_pbr_surface with these inputs, "type name" to value; returns its path."""
         name = f"M{len(self.prims)}"
         lines = "\n".join(
             f"{key.split()[0]} inputs:{key.split()[1]} = {value}" for key, value in inputs.items()

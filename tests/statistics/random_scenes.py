@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
+from random_enclosures import KINDS, Enclosures
 from random_lights import SQUARE, Lights
 from random_materials import Materials
 from stages import camera, matrix, mesh, moved, quad, sphere, turned, write_stage
@@ -32,6 +33,8 @@ class RandomScene:
         schlick: Whether Fresnel is by Schlick's formula.
         delta: Whether some lobe is perfectly narrow.
         features: What meets here.
+        single_light: Whether a single light, hidden or not, may give one image: an area light
+            without other emitters, lobes that are not perfectly narrow, a path of one scattering.
     """
 
     stage: Path
@@ -41,6 +44,7 @@ class RandomScene:
     schlick: bool
     delta: bool
     features: list[str] = field(default_factory=list)
+    single_light: bool = False
 
 
 class Objects:
@@ -189,8 +193,33 @@ def settings(random: Generator, features: list[str]) -> dict[str, Any]:
     return chosen
 
 
-def make_scene(seed: int, folder: Path) -> RandomScene:
-    """Writes the stage of a seed, with its files, to an empty folder."""
+def enclosed(
+    seed: int, materials: Materials, objects: Objects, places: list[Any], depth: int
+) -> tuple[Enclosures, int, bool]:
+    """Adds the enclosure of a seed for comparisons of settings.
+
+    Returns:
+        The enclosure, the max_depth of the stage, and whether its light is the only one.
+    """
+    random = np.random.default_rng((53, seed))
+    enclosures = Enclosures(random, materials)
+    kind = seed % (len(KINDS) + 1)
+    if kind < len(KINDS):
+        enclosures.add(KINDS[kind], places[int(random.integers(len(places)))])
+    objects.prims += enclosures.prims
+    # Textures need paths of one scattering at most, as in the stages without enclosures.
+    depths, shares = ([0, 1], [0.25, 0.75]) if depth == 1 else ([2, 3, 6], [0.4, 0.3, 0.3])
+    alone = enclosures.lights > 0 and bool(random.random() < 0.5)
+    return enclosures, int(random.choice(depths, p=shares)), alone
+
+
+def make_scene(seed: int, folder: Path, *, enclosure: bool = False) -> RandomScene:
+    """Writes the stage of a seed, with its files, to an empty folder.
+
+    Args:
+        enclosure: Adds an enclosure of ``random_enclosures`` to the stage, which only settings are
+            compared on: the naive integrator has no subsurface and would miss small lights.
+    """
     random = np.random.default_rng(seed)
     depth = int(random.choice([1, 2, 3], p=[0.6, 0.32, 0.08]))
     features: list[str] = []
@@ -200,8 +229,10 @@ def make_scene(seed: int, folder: Path) -> RandomScene:
     corners = [(-half, 0, half), (half, 0, half), (half, 0, -half), (-half, 0, -half)]
     prims = [quad("Floor", corners, floor, uv=SQUARE)]
     objects = Objects(random, materials)
-    for k in random.permutation(len(PLACES))[: int(random.integers(1, 4))]:
-        objects.add(PLACES[k])
+    order = [PLACES[k] for k in random.permutation(len(PLACES))]
+    taken = int(random.integers(1, 4))
+    for place in order[:taken]:
+        objects.add(place)
     lights = Lights(random, folder, materials, ["Floor", *objects.names])
     for _ in range(int(random.integers(1, 4))):
         lights.add()
@@ -212,6 +243,16 @@ def make_scene(seed: int, folder: Path) -> RandomScene:
     text, more = view(random, features, moves=objects.moves)
     chosen = settings(random, features)
     schlick = bool(random.random() < 0.1)
+    single = False
+    if enclosure:
+        added, depth, alone = enclosed(seed, materials, objects, order[taken:], depth)
+        if alone:
+            features.append("no other light")
+            lights.prims.clear()
+            lights.features.clear()
+        features += added.features
+        materials.delta = materials.delta or added.delta
+        single = depth == 1 and is_single(lights, materials, added)
     stage = write_stage(
         folder / "stage.usda", text, *materials.prims, *prims, *objects.prims, *lights.prims
     )
@@ -226,4 +267,14 @@ def make_scene(seed: int, folder: Path) -> RandomScene:
         schlick=schlick,
         delta=materials.delta,
         features=[*materials.features, *objects.features, *lights.features, *features],
+        single_light=single,
     )
+
+
+def is_single(lights: Lights, materials: Materials, added: Enclosures) -> bool:
+    """Whether hiding the lights of a stage changes only what sees them directly."""
+    area = {"rect light", "disk light", "sphere light", "cylinder light"}
+    outside = [word for word in lights.features if word.endswith(" light")]
+    emissive = "glow" in materials.features or "emissive ball inside" in added.features
+    known = all(word in area for word in outside)
+    return len(lights.prims) + added.lights == 1 and known and not emissive and not materials.delta
