@@ -22,7 +22,7 @@ from wavecomb.bench.suite_model import (
 from wavecomb.bench.table import Table
 from wavecomb.errors import WavecombError
 from wavecomb.options import settings
-from wavecomb.picture.files import reason
+from wavecomb.picture.files import check_regular, reason
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -75,10 +75,12 @@ def load_suite(path: Path) -> Suite:
         WavecombError: It is no good; one line that names the file and the key.
     """
     try:
+        check_regular(path)
         text = path.read_text(encoding="utf-8")
         document = tomllib.loads(text)
     except OSError as error:
-        raise WavecombError(f"{path}: cannot be read: {reason(error)}") from error
+        why = "" if error.strerror is None else f"{path}: cannot be read: "
+        raise WavecombError(why + reason(error)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise WavecombError(f"{path}: is no TOML: {error}") from error
     top = Table(path, "", document)

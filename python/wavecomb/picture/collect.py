@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from wavecomb.errors import WavecombError
+from wavecomb.picture.files import kind_of
 from wavecomb.run.frame_names import frame_text, has_place, matching
 
 ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr")
@@ -68,7 +69,9 @@ def collect(sources: Iterable[str]) -> dict[str, str]:
         elif os.path.isfile(source):
             found[os.path.basename(source) if len(found) else source] = source
         else:
-            raise WavecombError(f"{source}: no such file")
+            kind = kind_of(source)
+            why = "no such file" if kind is None else f"is {kind}, not a regular file"
+            raise WavecombError(f"{source}: {why}")
     return found
 
 

@@ -7,6 +7,7 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
@@ -56,6 +57,33 @@ def _target(path: str | os.PathLike[str]) -> Path:
 def reason(error: OSError) -> str:
     """Why, in words: "Permission denied"; the whole message where there is no number."""
     return error.strerror or str(error)
+
+
+_KINDS = (
+    (stat.S_ISFIFO, "a FIFO"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def kind_of(path: str | os.PathLike[str]) -> str | None:
+    """What a file is that is neither regular nor a folder, such as "a FIFO"; None for others.
+
+    Opening a FIFO waits until somebody writes to it, which may be for ever.
+    """
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return None
+    return next((kind for is_kind, kind in _KINDS if is_kind(mode)), None)
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Raises OSError, in one line that names the file, if ``kind_of`` names it."""
+    kind = kind_of(path)
+    if kind is not None:
+        raise OSError(f"{os.fspath(path)}: is {kind}, not a regular file; give a regular file")
 
 
 def one_line(message: str, name: str) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wavecomb.machine import memory_bytes
 from wavecomb.picture.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
-from wavecomb.picture.files import one_line, problem_of
+from wavecomb.picture.files import check_regular, one_line, problem_of
 
 __all__ = [
     "channel_names",
@@ -201,6 +201,7 @@ def _open(name: str) -> Any:
         raise FileNotFoundError(f"{name}: no such file")
     if Path(name).is_dir():
         raise IsADirectoryError(f"{name}: is a folder, not a picture")
+    check_regular(name)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(name, hints)

@@ -21,7 +21,7 @@ import numpy as np
 from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
 from wavecomb.picture.archive import ArchiveError, read_archive
-from wavecomb.picture.files import replacing
+from wavecomb.picture.files import check_regular, replacing
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.stats import plain
 from wavecomb.version import version
@@ -137,6 +137,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     name = os.fspath(path)
     if not Path(name).exists():
         raise FileNotFoundError(f"{name}: no such file; a render with --checkpoint makes one")
+    check_regular(name)
     try:
         header, state = read_archive(name)
         if not isinstance(header, dict) or header.get("kind") != _KIND:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import reason, replacing
+from wavecomb.picture.files import check_regular, reason, replacing
 
 SCHEMA = "wavecomb-costs/1"
 
@@ -23,8 +23,10 @@ def load_costs(path: str | os.PathLike[str]) -> Profile:
 
     Raises:
         WavecombError: It is none; one line that names the file.
+        OSError: It is not a regular file.
     """
     name = os.fspath(path)
+    check_regular(path)
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:

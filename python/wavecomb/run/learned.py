@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import replacing
+from wavecomb.picture.files import check_regular, replacing
 from wavecomb.version import version
 
 if TYPE_CHECKING:
@@ -97,6 +97,7 @@ def load_learned(path: str | os.PathLike[str]) -> bytes:
     name = os.fspath(path)
     if not Path(name).exists():
         raise FileNotFoundError(f"{name}: no such file; a render with --learn-to makes one")
+    check_regular(name)
     try:
         header, arrays = read_archive(name)
         if not isinstance(header, dict) or header.get("kind") != _KIND:

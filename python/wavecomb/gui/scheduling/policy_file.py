@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
+from wavecomb.picture.files import check_regular
 from wavecomb.scheduling import SchedulingPolicy, check_policy
 
 
@@ -85,9 +86,11 @@ def first_line(policy: SchedulingPolicy) -> str:
 
 def _run(path: Path) -> types.ModuleType:
     try:
+        check_regular(path)
         source = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise WavecombError(f"{path}: {error.strerror or error}") from None
+        why = str(error) if error.strerror is None else f"{path}: {error.strerror}"
+        raise WavecombError(why) from None
     except UnicodeDecodeError:
         raise WavecombError(f"{path}: is no text in UTF-8; choose a Python file") from None
     module = types.ModuleType(f"wavecomb_policy_{path.stem}")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pxr import Ar
 
 from wavecomb.machine import usable_cores
-from wavecomb.picture.files import problem_of
+from wavecomb.picture.files import kind_of, problem_of
 from wavecomb.run.isolate import trail
 from wavecomb.usd.looks.texture_cache import Image, Stamp
 
@@ -67,13 +67,18 @@ def _read(path: str, header_only: bool) -> Image:
     stamp = stamp_of(path)
     if not Ar.IsPackageRelativePath(path):
         if not os.path.isfile(path):
-            raise TextureError("no such file")
+            raise TextureError(_why_missing(path))
         return _read_file(path, stamp, header_only)
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise TextureError("no such file in the package")
     with _unpacked(asset.GetBuffer(), Ar.SplitPackageRelativePathInner(path)[1]) as name:
         return _read_file(name, stamp, header_only, path)
+
+
+def _why_missing(path: str) -> str:
+    kind = kind_of(path)
+    return "no such file" if kind is None else f"it is {kind}, not a regular file"
 
 
 _BY_ENDING = (".jp2", ".j2k", ".j2c", ".jph")

@@ -12,6 +12,7 @@ from xml.parsers import expat
 
 from pxr import Ar, UsdShade
 
+from wavecomb.picture.files import kind_of
 from wavecomb.usd.materialx.library import library
 from wavecomb.usd.stage import path_maps
 
@@ -117,7 +118,8 @@ def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
 
 def _bytes(path: str, most: int) -> bytes:
     if not (Ar.IsPackageRelativePath(path) or "://" in path or os.path.isfile(path)):
-        raise MtlxError("it is no file")
+        kind = kind_of(path)
+        raise MtlxError("it is no file" if kind is None else f"it is {kind}, not a regular file")
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
     if not asset:
         raise MtlxError("it cannot be opened")

@@ -12,11 +12,13 @@ from pathlib import Path
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
+from wavecomb.picture.files import check_regular
 from wavecomb.run.isolate import patience, trail
 from wavecomb.usd import mtlx
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.stage import path_maps
 from wavecomb.usd.stage.diagnostics import captured, commentary
+from wavecomb.usd.stage.fifos import refused_fifos
 from wavecomb.usd.stage.payloads import load_payloads
 from wavecomb.usd.stage.population import populate
 from wavecomb.usd.stage.report import LoadReport
@@ -77,7 +79,7 @@ def open_render_settings(
     Raises:
         WavecombError: A file is none, or cannot be read.
     """
-    with _layers(file, session_layer) as (root, session):
+    with refused_fifos(), _layers(file, session_layer) as (root, session):
         paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
         kept = {path for path in map(_prim_path, paths) if path is not None}
         mask = Usd.StagePopulationMask(sorted(kept))
@@ -171,19 +173,20 @@ def open_stage(
             payloads.
     """
     rule = Usd.Stage.LoadNone if payloads else Usd.Stage.LoadAll
-    with _layers(file, session_layer, overrides) as (root, session):
-        stage = Usd.Stage.Open(root, session, rule)
-    if not stage:
-        raise WavecombError(f"{file}: cannot be read as USD")
-    mtlx.resolve(stage)
-    select_variants(stage, variants or {})
-    if variants:
+    with refused_fifos():
+        with _layers(file, session_layer, overrides) as (root, session):
+            stage = Usd.Stage.Open(root, session, rule)
+        if not stage:
+            raise WavecombError(f"{file}: cannot be read as USD")
         mtlx.resolve(stage)
-    if payloads:
-        load_payloads(stage, payloads)
-        mtlx.resolve(stage)
-    if mask:
-        populate(stage, mask)
+        select_variants(stage, variants or {})
+        if variants:
+            mtlx.resolve(stage)
+        if payloads:
+            load_payloads(stage, payloads)
+            mtlx.resolve(stage)
+        if mask:
+            populate(stage, mask)
     return stage
 
 
@@ -211,6 +214,10 @@ def _check_file(file: Path) -> None:
         raise WavecombError(f"{file}: no such file")
     if file.is_dir():
         raise WavecombError(f"{file}: is a folder; name the stage in it")
+    try:
+        check_regular(file)
+    except OSError as error:
+        raise WavecombError(str(error)) from None
     if not Usd.Stage.IsSupportedFile(str(file)):
         raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
 

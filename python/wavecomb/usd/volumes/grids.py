@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
+from wavecomb.picture.files import kind_of
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import trail
 from wavecomb.usd.stage.report import LoadReport
@@ -115,7 +116,9 @@ class GridTable:
         if field.file not in self._tables:
             table = None
             if not os.path.isfile(field.file):
-                what = f"volume file {field.file} is not there: field left out"
+                kind = kind_of(field.file)
+                why = "not there" if kind is None else f"{kind}, not a regular file"
+                what = f"volume file {field.file} is {why}: field left out"
                 self._report.warn(what, field.prim)
             else:
                 try:

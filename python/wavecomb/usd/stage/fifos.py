@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Layers that are FIFOs: USD would wait for ever to open one."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from pxr import Sdf
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.files import kind_of
+from wavecomb.run.isolate import patience, trail
+
+_TICK_S = 0.25
+_IDLE = 0.1
+"""A process that computes less than this fraction of a tick may be waiting for a FIFO."""
+
+
+@contextmanager
+def refused_fifos() -> Iterator[None]:
+    """Ends or fails a block that opens layers where USD waits for a FIFO.
+
+    A thread looks at files that the layers name as soon as nothing is computed. A process that is
+    expendable ends with one line. In others the thread opens the FIFO for writing and closes it, so
+    that USD reads an empty layer; the block then raises.
+
+    Raises:
+        WavecombError: A layer names a FIFO that USD waited for.
+    """
+    done, found = threading.Event(), _Found()
+    thread = threading.Thread(target=_watch, args=(done, found), daemon=True)
+    thread.start()
+    try:
+        yield
+    except Exception:
+        if found.line is not None:
+            raise WavecombError(found.line) from None
+        raise
+    finally:
+        done.set()
+        thread.join()
+    if found.line is not None:
+        raise WavecombError(found.line)
+
+
+class _Found:
+    """The first FIFO that USD waited for.
+
+    Attributes:
+        line: A message that names it.
+    """
+
+    line: str | None = None
+
+
+def _watch(done: threading.Event, found: _Found) -> None:
+    clock, computed = time.monotonic(), time.process_time()
+    while not done.wait(_TICK_S):
+        now, so_far = time.monotonic(), time.process_time()
+        is_idle = so_far - computed < _IDLE * (now - clock)
+        clock, computed = now, so_far
+        if is_idle:
+            for path, layer in _fifos():
+                if not done.is_set():
+                    _release(path, layer, found)
+
+
+def _fifos() -> Iterator[tuple[str, str]]:
+    """FIFOs that loaded layers name as layers, and the layer that does."""
+    for layer in Sdf.Layer.GetLoadedLayers():
+        for name in layer.GetCompositionAssetDependencies():
+            path = layer.ComputeAbsolutePath(name)
+            if path and kind_of(path) == "a FIFO":
+                yield path, layer.realPath or layer.identifier
+
+
+def _release(path: str, layer: str, found: _Found) -> None:
+    line = f"{layer}: names the layer {path}, which is a FIFO, not a regular file; name a file"
+    if trail.is_expendable():
+        patience.on_end(line)
+        return
+    # Without a reader this fails: USD has not come to it, or never will.
+    with contextlib.suppress(OSError):
+        os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK))
+        found.line = found.line or line
