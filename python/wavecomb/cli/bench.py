@@ -14,7 +14,7 @@ from pathlib import Path
 import click
 
 from wavecomb.cli.options import examples
-from wavecomb.cli.row_options import Real
+from wavecomb.cli.row_options import add_options, option
 
 _METRICS = (
     *("render_s", "shade_and_order_s", "shade_s", "load_s", "build_s"),
@@ -55,32 +55,27 @@ def list_command() -> None:
 
 @bench_command.command("run")
 @click.argument("suite")
-@click.option(
-    "-o", "--output", required=True, type=click.Path(), metavar="DIR", help="Folder for results."
-)
-@click.option("--dry-run", is_flag=True, help="Say what would be run, and for how long.")
-@click.option("--resume", is_flag=True, help="Go on with the results in DIR.")
-@click.option(
-    "--repetitions", type=click.IntRange(min=1), metavar="N", help="In place of the suite's."
-)
-@click.option("--only", metavar="GLOB", help="Only configurations whose name matches.")
-@click.option(
-    "--stage", "only_these", multiple=True, metavar="NAME", help="Only this stage; repeat for more."
-)
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="In place of the suite's.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of the order of the runs.")
-@click.option(
-    "--time-limit", type=Real(0, above=True), metavar="MINUTES", help="Begin no run past it."
-)
-@click.option("--stages", type=click.Path(), metavar="FOLDER", help="More stages, of a folder.")
-@click.option(
-    "--progress",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="json: also lines on stdout, for programs (docs/bench.md).",
-)
-@click.option("--quiet", is_flag=True, help="Only warnings and errors.")
+@add_options(
+    option("-o --output DIR", "path", "Folder for results.", required=True),
+    option("--dry-run", "flag", "Say what would be run, and for how long."),
+    option("--resume", "flag", "Go on with the results in DIR."),
+    option("--repetitions N", "count", "In place of the suite's."),
+    option("--only GLOB", "text", "Only configurations whose name matches."),
+    option(
+        "--stage NAME", "text", "Only this stage; repeat for more.",
+        name="only_these", multiple=True,
+    ),
+    option("--threads N", "count", "In place of the suite's."),
+    option("--seed N", click.IntRange(min=0), "Of the order of the runs."),
+    option("--time-limit MINUTES", "positive", "Begin no run past it."),
+    option("--stages FOLDER", "path", "More stages, of a folder."),
+    option(
+        "--progress", click.Choice(["text", "json"]),
+        "json: also lines on stdout, for programs (docs/bench.md).",
+        default="text", show_default=True,
+    ),
+    option("--quiet", "flag", "Only warnings and errors."),
+)  # fmt: skip
 def run_command(
     suite: str,
     output: str,
@@ -172,12 +167,10 @@ def _dry_run(sitting: object) -> None:
 
 @bench_command.command("report")
 @click.argument("folder", type=click.Path(), metavar="DIR")
-@click.option(
-    "--markdown",
-    type=click.Path(),
-    metavar="FILE.md",
-    help="Also a page of Markdown, with its figures in a folder FILE beside it.",
-)
+@option(
+    "--markdown FILE.md", "path",
+    "Also a page of Markdown, with its figures in a folder FILE beside it.",
+)  # fmt: skip
 def report_command(folder: str, markdown: str | None) -> None:
     """Write DIR/report.html and DIR/figures from the results in DIR."""
     from wavecomb.errors import WavecombError
@@ -201,14 +194,11 @@ def report_command(folder: str, markdown: str | None) -> None:
 @bench_command.command("compare")
 @click.argument("before", type=click.Path(), metavar="BEFORE")
 @click.argument("after", type=click.Path(), metavar="AFTER")
-@click.option(
-    "--metric",
-    type=click.Choice(_METRICS),
-    default="render_s",
-    show_default=True,
-    help="The column of runs.csv that is compared.",
-)
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
+@option(
+    "--metric", click.Choice(_METRICS), "The column of runs.csv that is compared.",
+    default="render_s", show_default=True,
+)  # fmt: skip
+@option("--json", "flag", "For programs.", name="as_json")
 def compare_command(before: str, after: str, metric: str, as_json: bool) -> None:
     """Say what changed from the results in BEFORE to those in AFTER.
 

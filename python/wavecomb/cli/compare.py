@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import examples, isolate_option
-from wavecomb.cli.row_options import Real
+from wavecomb.cli.row_options import Real, add_options, option
 from wavecomb.cli.sandbox import enter_to_read
 
 _METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")
@@ -32,65 +32,47 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
 )
 @click.argument("a", type=click.Path())
 @click.argument("b", type=click.Path())
-@click.option(
-    "--metric",
-    "metrics",
-    multiple=True,
-    type=click.Choice(_METRICS),
-    help="How different they look, may be given again.",
-)
-@click.option(
-    "--exposure",
-    type=Real(),
-    default=0.0,
-    metavar="STOPS",
-    help="For psnr, ssim, flip-ldr, --page and --wipe: pictures times 2^STOPS.  [default: 0]",
-)
-@click.option(
-    "--variance-a",
-    type=click.Path(),
-    metavar="FILE",
-    help="Variance of A's pixels, for a z-test.  [default: none]",
-)
-@click.option("--variance-b", type=click.Path(), metavar="FILE", help="Likewise of B.")
-@click.option(
-    "--significance",
-    type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
-    default=0.01,
-    show_default=True,
-    help="Of the z-test.",
-)
-@click.option("--heatmap", type=click.Path(), metavar="FILE.png", help="Where they differ.")
-@click.option(
-    "--map",
-    "kind",
-    type=click.Choice(_MAPS),
-    default="absolute",
-    show_default=True,
-    help="What --heatmap shows.",
-)
-@click.option(
-    "--page",
-    type=click.Path(),
-    metavar="FILE.html",
-    help="A page in which A and B are wiped, with their difference.",
-)
-@click.option("--wipe", type=click.Path(), metavar="FILE.png", help="A left of a line, B right.")
-@click.option("--at", type=click.FloatRange(0, 1), default=0.5, metavar="X", help="Where the line "
-              "of --wipe is, of the width.  [default: 0.5]")  # fmt: skip
-@click.option(
-    "--tone-map",
-    type=click.Choice(["clamp", "neutral"]),
-    default="clamp",
-    help="Of --page and --wipe.  [default: clamp]",
-)
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
-@click.option(
-    "--tolerance",
-    type=Real(0),
-    metavar="X",
-    help="Exit with 0, too, where no colour channel differs by more than X.",
-)
+@add_options(
+    option(
+        "--metric", click.Choice(_METRICS), "How different they look, may be given again.",
+        name="metrics", multiple=True,
+    ),
+    option(
+        "--exposure STOPS", "number",
+        "For psnr, ssim, flip-ldr, --page and --wipe: pictures times 2^STOPS.  [default: 0]",
+        default=0.0,
+    ),
+    option(
+        "--variance-a FILE", "path", "Variance of A's pixels, for a z-test.  [default: none]"
+    ),
+    option("--variance-b FILE", "path", "Likewise of B."),
+    option(
+        "--significance", click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+        "Of the z-test.", default=0.01, show_default=True,
+    ),
+    option("--heatmap FILE.png", "path", "Where they differ."),
+    option(
+        "--map", click.Choice(_MAPS), "What --heatmap shows.",
+        name="kind", default="absolute", show_default=True,
+    ),
+    option(
+        "--page FILE.html", "path", "A page in which A and B are wiped, with their difference."
+    ),
+    option("--wipe FILE.png", "path", "A left of a line, B right."),
+    option(
+        "--at X", click.FloatRange(0, 1),
+        "Where the line of --wipe is, of the width.  [default: 0.5]", default=0.5,
+    ),
+    option(
+        "--tone-map", click.Choice(["clamp", "neutral"]),
+        "Of --page and --wipe.  [default: clamp]", default="clamp",
+    ),
+    option("--json", "flag", "For programs.", name="as_json"),
+    option(
+        "--tolerance X", Real(0),
+        "Exit with 0, too, where no colour channel differs by more than X.",
+    ),
+)  # fmt: skip
 @isolate_option
 def compare_command(
     a: str,
@@ -137,9 +119,9 @@ def compare_command(
 
     # What is compared is what is shown.
     look = Look(denoised=False, exposure=exposure, tone_map=tone_map)
-    for option, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
+    for name, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
         if file is not None and not file.lower().endswith(ending):
-            raise WavecombError(f"{option} {file}: the name must end in {ending}")
+            raise WavecombError(f"{name} {file}: the name must end in {ending}")
         if file is not None:
             check_writable(file)
     if many:

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +13,7 @@ from wavecomb.cli.done import Done
 from wavecomb.cli.job import Job, Names, how_far, purpose_at
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.cli.row_options import add_options, option
 from wavecomb.cli.shots import FrameShot
 from wavecomb.errors import WavecombError
 from wavecomb.run.faults import describe
@@ -21,26 +22,16 @@ from wavecomb.run.frame_names import frame_text, has_place, parse_frames
 if TYPE_CHECKING:
     from wavecomb.run.sequence import Frames
 
-F = TypeVar("F", bound=Callable[..., Any])
 
-
-def frame_options(command: F) -> F:
-    """--frames and --skip-existing."""
-    for option in (
-        click.option(
-            "--skip-existing",
-            is_flag=True,
-            help="With --frames: leave frames out whose files are there.",
-        ),
-        click.option(
-            "--frames",
-            metavar="RANGE",
-            help="Frames: 1-48, 1-48x2, 1,5,9. Names of files say where the frame goes: "
-            "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
-        ),
-    ):
-        command = option(command)
-    return command
+frame_options = add_options(
+    option(
+        "--frames RANGE", "text",
+        "Frames: 1-48, 1-48x2, 1,5,9. Names of files say where the frame goes: "
+        "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
+    ),
+    option("--skip-existing", "flag", "With --frames: leave frames out whose files are there."),
+)  # fmt: skip
+"""--frames and --skip-existing."""
 
 
 def check_frames(

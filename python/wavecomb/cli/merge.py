@@ -10,6 +10,7 @@ import click
 
 from wavecomb.cli.aovs import AovOptions, file_options
 from wavecomb.cli.options import examples, isolate_option
+from wavecomb.cli.row_options import option
 from wavecomb.cli.sandbox import enter_to_read
 
 
@@ -22,15 +23,8 @@ from wavecomb.cli.sandbox import enter_to_read
     ),
 )
 @click.argument("pictures", nargs=-1, required=True, type=click.Path(), metavar="A B ...")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(),
-    metavar="FILE.exr",
-    help="The sum.",
-)
-@click.option("--png", type=click.Path(), metavar="FILE", help="Picture for display, too.")
+@option("-o --output FILE.exr", "path", "The sum.", required=True)
+@option("--png FILE", "path", "Picture for display, too.")
 @file_options
 @isolate_option
 def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **options: Any) -> None:
@@ -50,13 +44,13 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
     layers = AovOptions.take(options)
     enter_to_read((output, png), split=output if layers.split else None)
     seen = {os.path.realpath(name) for name in pictures}
-    for name, option, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):
+    for name, flag, ending in ((output, "-o", ".exr"), (png, "--png", ".png")):
         if name is None:
             continue
         if not name.lower().endswith(ending):
-            raise WavecombError(f"{option} {name}: the name must end in {ending}")
+            raise WavecombError(f"{flag} {name}: the name must end in {ending}")
         if os.path.realpath(name) in seen:
-            raise WavecombError(f"{option} {name}: is one of the pictures that are merged")
+            raise WavecombError(f"{flag} {name}: is one of the pictures that are merged")
         check_writable(name)
     merged = merge(pictures)
     written = save_layers(

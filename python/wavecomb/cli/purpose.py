@@ -3,102 +3,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.row_options import Real
+from wavecomb.cli.row_options import add_options, option
 from wavecomb.errors import WavecombError
 
 if TYPE_CHECKING:
     from wavecomb.run.checkpoint import Checkpoint
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 DEFAULT_SPP = 64
 ADAPTIVE_SPP = 1024
 UNLIMITED_SPP = 1 << 20
 
-_COUNT = click.IntRange(min=1)
-
-
-def purpose_options(command: F) -> F:
-    """--adaptive, --noise, --time-limit, --checkpoint, --resume, --preview, --denoise ..."""
-    for option in reversed(
-        (
-            click.option(
-                "--adaptive",
-                type=Real(0, above=True),
-                metavar="X",
-                help="Samples go where the error of pixels is above X; 0.02 is fine.",
-            ),
-            click.option(
-                "--noise",
-                type=Real(0, above=True),
-                metavar="X",
-                help="Likewise, until the mean relative error of the picture is X: 0.02 is 2 %.",
-            ),
-            click.option(
-                "--min-spp",
-                type=_COUNT,
-                metavar="N",
-                help="With these: samples before the first look at errors.  [default: 16]",
-            ),
-            click.option(
-                "--max-spp",
-                type=_COUNT,
-                metavar="N",
-                help="With these: the most samples a pixel.  [default: 1024]",
-            ),
-            click.option(
-                "--time-limit",
-                type=Real(0, above=True),
-                metavar="S",
-                help="Seconds of rendering. Without --spp as many samples as fit.",
-            ),
-            click.option(
-                "--checkpoint",
-                type=click.Path(),
-                metavar="FILE",
-                help="Saves the state of the render, also on Ctrl-C and SIGTERM.",
-            ),
-            click.option(
-                "--every",
-                type=Real(0, above=True),
-                metavar="S",
-                help="Seconds between checkpoints.  [default: 120]",
-            ),
-            click.option(
-                "--resume",
-                type=click.Path(),
-                metavar="FILE",
-                help="Goes on from a checkpoint, and saves to it unless --checkpoint is given.",
-            ),
-            click.option(
-                "--preview", type=click.Path(), metavar="FILE.png", help="The picture as it grows."
-            ),
-            click.option(
-                "--preview-every",
-                type=Real(0, above=True),
-                metavar="S",
-                help="Seconds between previews.  [default: 10]",
-            ),
-            click.option(
-                "--denoise",
-                is_flag=True,
-                help="Adds the layer denoised, which PNGs then show (extra 'denoise').",
-            ),
-            click.option(
-                "--progress",
-                type=click.Choice(["bar", "json", "off"]),
-                help="json: a line a second on stdout, for programs.  [default: bar]",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
+purpose_options = add_options(
+    option(
+        "--adaptive X", "positive",
+        "Samples go where the error of pixels is above X; 0.02 is fine.",
+    ),
+    option(
+        "--noise X", "positive",
+        "Likewise, until the mean relative error of the picture is X: 0.02 is 2 %.",
+    ),
+    option(
+        "--min-spp N", "count",
+        "With these: samples before the first look at errors.  [default: 16]",
+    ),
+    option("--max-spp N", "count", "With these: the most samples a pixel.  [default: 1024]"),
+    option(
+        "--time-limit S", "positive",
+        "Seconds of rendering. Without --spp as many samples as fit.",
+    ),
+    option(
+        "--checkpoint FILE", "path",
+        "Saves the state of the render, also on Ctrl-C and SIGTERM.",
+    ),
+    option("--every S", "positive", "Seconds between checkpoints.  [default: 120]"),
+    option(
+        "--resume FILE", "path",
+        "Goes on from a checkpoint, and saves to it unless --checkpoint is given.",
+    ),
+    option("--preview FILE.png", "path", "The picture as it grows."),
+    option("--preview-every S", "positive", "Seconds between previews.  [default: 10]"),
+    option(
+        "--denoise", "flag", "Adds the layer denoised, which PNGs then show (extra 'denoise')."
+    ),
+    option(
+        "--progress", click.Choice(["bar", "json", "off"]),
+        "json: a line a second on stdout, for programs.  [default: bar]",
+    ),
+)  # fmt: skip
+"""--adaptive, --noise, --time-limit, --checkpoint, --resume, --preview, --denoise ..."""
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -15,113 +14,68 @@ from wavecomb.cli.job import how_far
 from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.purpose import purpose_options
-from wavecomb.cli.row_options import Real
+from wavecomb.cli.row_options import add_options, option
 from wavecomb.cli.sandbox import enter_to_render
 from wavecomb.cli.setting_options import SettingCommand, setting_options
 from wavecomb.cli.shots import Shot, Still
 from wavecomb.run.learned import save_learned
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def picture_options(command: F) -> F:
-    """What is rendered, how long, and where it goes: of all commands that render pictures."""
-    for option in reversed(
-        (
-            click.option(
-                "-o",
-                "--output",
-                type=click.Path(),
-                metavar="FILE.exr",
-                help="Picture, all layers.  [default: the productName of each render product]",
-            ),
-            click.option(
-                "--output-dir",
-                type=click.Path(),
-                metavar="DIR",
-                help="Without -o: the folder that the stage's pictures go to, and may not leave.  "
-                "[default: the working folder]",
-            ),
-            aov_options,
-            click.option(
-                "--png", type=click.Path(), metavar="FILE", help="Picture for display, too."
-            ),
-            click.option(
-                "--deep",
-                type=click.Path(),
-                metavar="FILE.exr",
-                help="Deep picture, too: colour and alpha by depth (docs/deep.md).",
-            ),
-            click.option(
-                "--stats",
-                "stats_file",
-                type=click.Path(),
-                metavar="FILE.json",
-                help="Statistics (docs/statistics.md).",
-            ),
-            click.option(
-                "--size",
-                nargs=2,
-                type=int,
-                metavar="W H",
-                help="Pixels.  [default: of the render settings, else 600 600]",
-            ),
-            click.option(
-                "--region",
-                nargs=4,
-                type=int,
-                metavar="X0 Y0 X1 Y1",
-                help="Pixels to render, the end excluded; others have no samples.  "
-                "[default: the render settings' data window, else all]",
-            ),
-            click.option(
-                "--spp",
-                type=int,
-                metavar="N",
-                help="Samples per pixel; with --adaptive and --noise the most of them.  "
-                "[default: 64]",
-            ),
-            purpose_options,
-            setting_options(),
-            click.option(
-                "--costs",
-                metavar="auto|measured|model|FILE.json",
-                help="Costs of materials. A file is read if it is there, and written at the end.  "
-                "[default: auto]",
-            ),
-            click.option(
-                "--learn-from",
-                metavar="FILE|before",
-                help="With --guiding: what another render has learned, in place of learning it; "
-                "before: each of --frames starts from the one before it.",
-            ),
-            click.option(
-                "--learn-to",
-                type=click.Path(),
-                metavar="FILE.learned",
-                help="Keeps what guided this render, for --learn-from.",
-            ),
-            click.option(
-                "--film-memory",
-                type=Real(0, above=True),
-                metavar="MB",
-                help="A picture that takes more is rendered and written in bands of rows.  "
-                "[default: half of the machine's memory]",
-            ),
-            click.option(
-                "--exposure", type=Real(), default=0.0, metavar="EV", help="Of the PNG, in stops."
-            ),
-            click.option(
-                "--tone-map",
-                type=click.Choice(["clamp", "neutral"]),
-                default="clamp",
-                help="Of the PNG: cut at 1, or roll highlights off.  [default: clamp]",
-            ),
-            click.option("--quiet", is_flag=True, help="Only warnings and errors."),
-        )
-    ):
-        command = option(command)
-    return command
+picture_options = add_options(
+    option(
+        "-o --output FILE.exr", "path",
+        "Picture, all layers.  [default: the productName of each render product]",
+    ),
+    option(
+        "--output-dir DIR", "path",
+        "Without -o: the folder that the stage's pictures go to, and may not leave.  "
+        "[default: the working folder]",
+    ),
+    aov_options,
+    option("--png FILE", "path", "Picture for display, too."),
+    option(
+        "--deep FILE.exr", "path", "Deep picture, too: colour and alpha by depth (docs/deep.md)."
+    ),
+    option("--stats FILE.json", "path", "Statistics (docs/statistics.md).", name="stats_file"),
+    option(
+        "--size W H", click.INT, "Pixels.  [default: of the render settings, else 600 600]", nargs=2
+    ),
+    option(
+        "--region X0 Y0 X1 Y1", click.INT,
+        "Pixels to render, the end excluded; others have no samples.  "
+        "[default: the render settings' data window, else all]", nargs=4,
+    ),
+    option(
+        "--spp N", click.INT,
+        "Samples per pixel; with --adaptive and --noise the most of them.  [default: 64]",
+    ),
+    purpose_options,
+    setting_options(),
+    option(
+        "--costs auto|measured|model|FILE.json", "text",
+        "Costs of materials. A file is read if it is there, and written at the end.  "
+        "[default: auto]",
+    ),
+    option(
+        "--learn-from FILE|before", "text",
+        "With --guiding: what another render has learned, in place of learning it; before: each "
+        "of --frames starts from the one before it.",
+    ),
+    option(
+        "--learn-to FILE.learned", "path", "Keeps what guided this render, for --learn-from."
+    ),
+    option(
+        "--film-memory MB", "positive",
+        "A picture that takes more is rendered and written in bands of rows.  "
+        "[default: half of the machine's memory]",
+    ),
+    option("--exposure EV", "number", "Of the PNG, in stops.", default=0.0),
+    option(
+        "--tone-map", click.Choice(["clamp", "neutral"]),
+        "Of the PNG: cut at 1, or roll highlights off.  [default: clamp]", default="clamp",
+    ),
+    option("--quiet", "flag", "Only warnings and errors."),
+)  # fmt: skip
+"""Image, duration and files: options of all commands that render images."""
 
 
 @click.command(

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands made of rows of tables: of settings, and of loading."""
+"""Options of commands: from rows of tables, and from one line each."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import click
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Real(click.ParamType):
@@ -88,3 +90,45 @@ def row_option(
         nargs=2 if kind == "pair" else 1,
         help=text,
     )
+
+
+_TYPES: dict[str, Any] = {
+    "count": click.IntRange(min=1),
+    "flag": None,
+    "path": click.Path(),
+    "positive": Real(0, above=True),
+    "number": Real(),
+    "text": None,
+}
+
+
+def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> Callable[[F], F]:
+    """Makes an option of a command.
+
+    Args:
+        usage: Names and metavar as help shows them: "-o --output FILE.exr".
+        kind: A type, or one of "count" (a positive integer), "flag", "path", "positive" (a
+            positive number), "number", "text".
+        text: Help.
+        more: Further arguments of ``click.option``; ``name`` is that of the argument.
+    """
+    words = usage.split()
+    names = [word for word in words if word.startswith("-")]
+    metavar = " ".join(words[len(names) :]) or None
+    if "name" in more:
+        names.append(more.pop("name"))
+    given = _TYPES[kind] if isinstance(kind, str) else kind
+    return click.option(
+        *names, type=given, is_flag=kind == "flag", metavar=metavar, help=text, **more
+    )
+
+
+def add_options(*options: Callable[[F], F]) -> Callable[[F], F]:
+    """Makes a decorator that adds options to a command, in the order of help."""
+
+    def add(command: F) -> F:
+        for one in reversed(options):
+            command = one(command)
+        return command
+
+    return add

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import examples
-from wavecomb.cli.row_options import Real
+from wavecomb.cli.row_options import Real, add_options, option
 
 
 def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
@@ -35,56 +35,33 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     ),
 )
 @click.argument("name", required=False, shell_complete=_names)
-@click.option("-o", "--output", type=click.Path(), metavar="FILE", help=".usda, .usdc or .usd.")
-@click.option("--list", "list_", is_flag=True, help="List the scenes.")
-@click.option("--dragon", type=click.Path(), metavar="FILE", help="OBJ, PLY or USD mesh to use.")
-@click.option(
-    "--triangles",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Of our own dragon, or of the field.",
-)
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Of layout and patterns.")
-@click.option("--texture-size", type=click.IntRange(min=16), metavar="N", help="Largest, texels.")
-@click.option("--aspect", type=Real(0, above=True), metavar="X", help="Width / height.")
-@click.option("--material", metavar="NAME", help="cornell-dragon: gold, copper, glass, jade.")
-@click.option(
-    "--materials", type=click.IntRange(min=1), metavar="N", help="spread, heavy: how many."
-)
-@click.option(
-    "--programs", type=click.IntRange(1, 5), metavar="N", help="spread: kinds of materials, 1 to 5."
-)
-@click.option("--lights", type=click.IntRange(min=1), metavar="N", help="lights: how many.")
-@click.option("--lamps", is_flag=True, help="mixed, dragon: a key, a fill and a dim dome.")
-@click.option("--strands", type=click.IntRange(min=1), metavar="N", help="fur, head: how many.")
-@click.option("--splats", type=click.IntRange(min=1), metavar="N", help="splats: how many.")
-@click.option(
-    "--capture",
-    type=click.Path(),
-    metavar="FILE",
-    help="splats: a PLY of 3D Gaussian splats instead.",
-)
-@click.option(
-    "--capture-linear", is_flag=True, help="Colours of the capture are linear light, not sRGB."
-)
-@click.option(
-    "--voxels",
-    type=click.IntRange(min=16),
-    metavar="N",
-    help="smoke, clouds: along the longest edge.",
-)
-@click.option("--texture-mb", type=Real(0), metavar="X", help="spread, heavy: memory of textures.")
-@click.option(
-    "--shader-cost",
-    type=Real(1),
-    metavar="X",
-    help="spread: octaves of noise on the dearest material; 1: none.",
-)
-@click.option(
-    "--plain",
-    is_flag=True,
-    help="UsdPreviewSurface as others export it: no program, metallic workflow. Not of heavy.",
-)
+@add_options(
+    option("-o --output FILE", "path", ".usda, .usdc or .usd."),
+    option("--list", "flag", "List the scenes.", name="list_"),
+    option("--dragon FILE", "path", "OBJ, PLY or USD mesh to use."),
+    option("--triangles N", "count", "Of our own dragon, or of the field."),
+    option("--seed N", click.IntRange(min=0), "Of layout and patterns."),
+    option("--texture-size N", click.IntRange(min=16), "Largest, texels."),
+    option("--aspect X", "positive", "Width / height."),
+    option("--material NAME", "text", "cornell-dragon: gold, copper, glass, jade."),
+    option("--materials N", "count", "spread, heavy: how many."),
+    option("--programs N", click.IntRange(1, 5), "spread: kinds of materials, 1 to 5."),
+    option("--lights N", "count", "lights: how many."),
+    option("--lamps", "flag", "mixed, dragon: a key, a fill and a dim dome."),
+    option("--strands N", "count", "fur, head: how many."),
+    option("--splats N", "count", "splats: how many."),
+    option("--capture FILE", "path", "splats: a PLY of 3D Gaussian splats instead."),
+    option("--capture-linear", "flag", "Colours of the capture are linear light, not sRGB."),
+    option("--voxels N", click.IntRange(min=16), "smoke, clouds: along the longest edge."),
+    option("--texture-mb X", Real(0), "spread, heavy: memory of textures."),
+    option(
+        "--shader-cost X", Real(1), "spread: octaves of noise on the dearest material; 1: none."
+    ),
+    option(
+        "--plain", "flag",
+        "UsdPreviewSurface as others export it: no program, metallic workflow. Not of heavy.",
+    ),
+)  # fmt: skip
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
     """Write one of our own test stages, and its textures and grids beside it."""
     from wavecomb.errors import WavecombError
