@@ -280,9 +280,9 @@ class Assigner:
     def _display(self, primvars: _Primvars, otherwise: int | None) -> int:
         """The id for displayColor and displayOpacity."""
         colours = primvars.find("displayColor", 3)
-        if colours is None:
-            return self.table.plain() if otherwise is None else otherwise
         opacities = primvars.find("displayOpacity", 1)
+        if colours is None and opacities is None:
+            return self.table.plain() if otherwise is None else otherwise
         opacity = 1.0
         if opacities is not None and opacities.is_constant:
             opacity = min(max(number(float(opacities.first[0]), 1.0), 0.0), 1.0)
@@ -291,7 +291,9 @@ class Assigner:
             if found is not None and not found.is_constant:
                 varying.append(parameter)
                 primvars.keep(found)
-        shown = colour(colours.first, DEFAULT_COLOUR) if colours.is_constant else DEFAULT_COLOUR
+        shown = DEFAULT_COLOUR
+        if colours is not None and colours.is_constant:
+            shown = colour(colours.first, DEFAULT_COLOUR)
         return self.table.plain(shown, opacity, tuple(varying))
 
 

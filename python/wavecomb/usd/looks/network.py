@@ -35,10 +35,16 @@ class Source:
 
 
 def source_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Source | None:
-    """What feeds an input; None where it is not authored, dangles or runs in a circle."""
+    """What feeds an input; None where it is not authored, dangles or runs in a circle.
+
+    An input that is connected to an input of another shader has the source of that input, though
+    UsdShade resolves such connections for containers only.
+    """
     shader_input = shader.GetInput(name)
-    if not shader_input:
-        return None
+    return _source_of(shader_input, time, MAX_DEPTH) if shader_input else None
+
+
+def _source_of(shader_input: UsdShade.Input, time: Usd.TimeCode, depth: int) -> Source | None:
     for attribute in UsdShade.Utils.GetValueProducingAttributes(shader_input):
         if UsdShade.Output.IsOutput(attribute):
             node = UsdShade.Shader(attribute.GetPrim())
@@ -48,6 +54,12 @@ def source_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Source 
         value = attribute.Get(time)
         if value is not None:
             return Source(value=value, attribute=attribute)
+    for path in shader_input.GetAttr().GetConnections() if depth else ():
+        attribute = shader_input.GetAttr().GetStage().GetAttributeAtPath(path)
+        if UsdShade.Input.IsInput(attribute):
+            source = _source_of(UsdShade.Input(attribute), time, depth - 1)
+            if source is not None:
+                return source
     value = shader_input.Get(time)
     return None if value is None else Source(value=value, attribute=shader_input.GetAttr())
 
