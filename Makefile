@@ -28,6 +28,7 @@ SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
 # One build at a time per directory, whoever starts it.
 LOCK := $(if $(shell command -v flock),flock build/.lock)
+ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
 # The tools of the environment, also where a tool asks PATH.
@@ -38,7 +39,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-test-tools wheels sdist render docs test test-fast test-cpp test-py test-py-fast test-long fuzz test-asan test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
+.PHONY: help setup setup-test build build-test-tools wheels sdist render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -113,15 +114,16 @@ docs: build ## The documentation as a site in out/site
 
 # ---- tests ---------------------------------------------------------------------------------------------
 
-# Every stage runs, so that one slip in layout does not hide what the tests say; any failure fails the whole.
-stages = failed=; for stage in $(1); do $(MAKE) --no-print-directory $$stage || failed+=" $$stage"; done; \
-	if [ -n "$$failed" ]; then echo "make $@: FAILED:$$failed"; exit 1; fi; echo "make $@: passed"
-
-test: ## Everything: lint, C++ tests, the same under sanitizers, pytest
-	@$(call stages,lint test-cpp test-asan test-py)
+# Parts, what they need, their lanes and budgets: tests/parts.txt. Every part runs, so that one slip in layout does not hide
+# what the tests say; any failure fails the whole.
+test: ## Lint, C++ tests, the same under sanitizers, pytest with one of each kind of what takes long
+	@python3 tools/run_parts $@
 
 test-fast: ## Lint, C++ tests, pytest without the slow ones
-	@$(call stages,lint test-cpp test-py-fast)
+	@python3 tools/run_parts $@
+
+test-long: ## Everything, an hour or more: all tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers
+	@python3 tools/run_parts $@
 
 # Those that optimising may show something of; the others are in test-asan (tests/cpp/CMakeLists.txt).
 test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole renders
@@ -130,11 +132,14 @@ test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole render
 
 # CHECKS=all: all tests, and every check in packets and tests, too, which takes five times as long to compile.
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
-	@test -e $(ASAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
+	@test -e $(ASAN)/build.ninja || $(ASAN_LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
 	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS) \
 	  -DWAVECOMB_BATCH=ON
-	@$(LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
+	@$(ASAN_LOCK) $(VENV)/cmake --build $(ASAN) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(ASAN) -j $(JOBS) --verbose --output-on-failure --no-tests=error
+
+test-asan-all:
+	@$(MAKE) --no-print-directory test-asan CHECKS=all
 
 test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
 	@test -e $(TSAN)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(TSAN) -G Ninja --log-level=NOTICE \
@@ -148,20 +153,31 @@ build-test-tools: build
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_test_tools -j $(JOBS) -- --quiet
 
 test-py: build-test-tools build/.setup-test ## Python and statistical tests
+	@$(MAKE) --no-print-directory run-py
+
+# Without what has to be built before: as parts of make test, which has built it.
+run-py:
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
-# Python tests that go over the lane widths of the build; test-long runs them on a build of all widths.
-lane_tests = $(shell grep -lr --include='test_*.py' lane_widths tests/python tests/statistics)
-test-long: build-test-tools build/.setup-test ## What takes minutes: all lane widths, 10^6 samples, 500 random scenes, 100 kills, fuzzing, all sanitizers
-	@$(MAKE) --no-print-directory test-asan CHECKS=all
-	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON; \
-	    $(MAKE) --no-print-directory build LANES=$(LANES)' EXIT; \
-	  $(MAKE) --no-print-directory build LANES=all; \
+run-py-fast:
+	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
+
+run-py-long:
+	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -o faulthandler_timeout=7200
+
+# All files of tests/cpp, with 10^6 samples.
+test-cpp-long: build build/.setup-test
+	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON' EXIT; \
 	  $(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=all; \
 	  $(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet; \
-	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error; \
-	  $(VENV)/python -m pytest -q -n $(JOBS) $(lane_tests); \
-	  WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -m long -o faulthandler_timeout=7200
+	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
+
+# Of test-long, which compares all lane widths; afterwards the build has its usual ones again.
+build-all-lanes:
+	@$(MAKE) --no-print-directory build LANES=all
+
+build-default:
+	@$(MAKE) --no-print-directory build LANES=default
 
 # Of a machine that has no compiler either: tests/packaging/test_empty_root.py.
 test-wheel: wheels ## Install that wheel into a fresh environment and an empty root; render with each of its libraries
@@ -219,7 +235,7 @@ test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for AR
 	GTEST_FILTER='-$(arm64_without)' $(VENV)/ctest --test-dir $(ARM64) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
 test-py-fast: build-test-tools build/.setup-test
-	$(VENV)/python -m pytest -q -n $(JOBS) -m "not slow"
+	@$(MAKE) --no-print-directory run-py-fast
 
 fuzz: build-test-tools build/.setup-test ## Broken inputs for MINUTES=10; those that are wrong are kept in out/fuzz
 	nice $(VENV)/python tests/python/fuzz_stages.py --minutes $(MINUTES) --seed $(SEED) --jobs $(JOBS) --keep out/fuzz
