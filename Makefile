@@ -39,7 +39,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-test-tools wheels sdist render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
+.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -165,19 +165,20 @@ run-py-fast:
 run-py-long:
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -o faulthandler_timeout=7200
 
+# make test-long runs on a build of all lane widths; what was built before comes back at its end.
+build-all-lanes:
+	@mkdir -p build; test -e build/.lanes-before || echo "$(LANES)" > build/.lanes-before
+	@$(MAKE) --no-print-directory build LANES=all
+
+build-lanes-before:
+	@$(MAKE) --no-print-directory build LANES=$$(cat build/.lanes-before 2> /dev/null || echo "$(LANES)"); rm -f build/.lanes-before
+
 # All files of tests/cpp, with 10^6 samples.
 test-cpp-long: build build/.setup-test
 	@trap '$(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=ON' EXIT; \
 	  $(LOCK) $(VENV)/cmake -S . -B $(BUILD) --log-level=NOTICE -DWAVECOMB_TESTS=all; \
 	  $(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet; \
 	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
-
-# Of test-long, which compares all lane widths; afterwards the build has its usual ones again.
-build-all-lanes:
-	@$(MAKE) --no-print-directory build LANES=all
-
-build-default:
-	@$(MAKE) --no-print-directory build LANES=default
 
 # Of a machine that has no compiler either: tests/packaging/test_empty_root.py.
 test-wheel: wheels ## Install that wheel into a fresh environment and an empty root; render with each of its libraries
