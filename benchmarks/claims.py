@@ -26,25 +26,21 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import random
 import sys
-import time
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from sitting import (
-    RESULTS,
-    ROOT,
-    STAGES,
     head,
     load_stage,
-    log,
     phase_times,
     ratio,
     row,
     show,
+    shuffled_rounds,
+    sitting_arguments,
+    sitting_parser,
     summary,
     write_result,
 )
@@ -271,13 +267,8 @@ def main() -> None:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--stages", nargs="+", default=list(STAGES), metavar="NAME")
+    parser = sitting_parser(__doc__, "claims")
     parser.add_argument("--only", nargs="+", default=list(CLAIMS), choices=list(CLAIMS))
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--spp", type=int, default=16)
-    parser.add_argument("--size", type=int, default=600, help="edge of the picture, pixels")
-    parser.add_argument("--threads", type=int, default=2)
     parser.add_argument(
         "--policies",
         nargs="+",
@@ -285,17 +276,7 @@ def _arguments() -> argparse.Namespace:
         metavar="NAME",
         help="among which the best is looked for",
     )
-    parser.add_argument("--triangles", type=int, default=250_000, help="of a dragon")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "stages", help="of stages")
-    parser.add_argument("--seed", type=int, default=1, help="of the order of the renders")
-    parser.add_argument("--output", type=Path, default=RESULTS / "claims.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
-    args = parser.parse_args()
-    if args.quick:
-        args.size, args.spp, args.rounds, args.triangles = 80, 2, 2, 20_000
-        args.folder = ROOT / "out" / "quick"
-        args.output = args.folder / "claims.json"
-    return args
+    return sitting_arguments(parser, size=80, spp=2, rounds=2, triangles=20_000)
 
 
 def measure(name: str, args: argparse.Namespace) -> Stage:
@@ -307,12 +288,9 @@ def measure(name: str, args: argparse.Namespace) -> Stage:
             if choice not in choices:
                 choices.append(choice)
     wavecomb.render(stage.loaded.scene, size=(args.size, args.size), spp=1, threads=args.threads)
-    shuffle = random.Random(args.seed)
-    started = time.perf_counter()
-    for number in range(args.rounds):
-        for choice in shuffle.sample(choices, len(choices)):
+    for turns in shuffled_rounds(choices, args, name):
+        for choice in turns:
             stage.render(choice)
-        log(f"{name}: round {number + 1}/{args.rounds}, {time.perf_counter() - started:.0f} s")
     return stage
 
 

@@ -28,16 +28,11 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import random
 import sys
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from sitting import (
-    RESULTS,
-    ROOT,
-    STAGES,
     head,
     load_stage,
     log,
@@ -45,6 +40,9 @@ from sitting import (
     ratio,
     row,
     show,
+    shuffled_rounds,
+    sitting_arguments,
+    sitting_parser,
     summary,
     write_result,
 )
@@ -81,26 +79,11 @@ def main() -> None:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--stages", nargs="+", default=list(STAGES), metavar="NAME")
-    parser.add_argument("--spp", type=int, default=16)
-    parser.add_argument("--size", type=int, default=600, help="edge of the picture, pixels")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--rounds", type=int, default=5)
+    parser = sitting_parser(__doc__, "limit")
     parser.add_argument("--tuning-rounds", type=int, default=2, help="for the choice of widths")
     parser.add_argument("--policy", default="program")
     parser.add_argument("--memory-gb", type=float, default=4.0, help="most that rays may take")
-    parser.add_argument("--triangles", type=int, default=250_000, help="of a dragon")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "stages", help="of stages")
-    parser.add_argument("--seed", type=int, default=1, help="of the order of turns")
-    parser.add_argument("--output", type=Path, default=RESULTS / "limit.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
-    args = parser.parse_args()
-    if args.quick:
-        args.size, args.spp, args.rounds, args.triangles = 96, 4, 2, 20_000
-        args.folder = ROOT / "out" / "quick"
-        args.output = args.folder / "limit.json"
-    return args
+    return sitting_arguments(parser, size=96, spp=4, rounds=2, triangles=20_000)
 
 
 def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
@@ -136,14 +119,12 @@ def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
         turn = recording.replay(alone=False, threads=args.threads, width=(widest,) * 3)
         return {"calls": turn["wall_s"]}
 
-    shuffle = random.Random(args.seed)
     rounds: list[Round] = []
-    for number in range(args.rounds):
+    for turns in shuffled_rounds((render, by_embree, by_calls), args, name):
         done: Round = {}
-        for turn in shuffle.sample((render, by_embree, by_calls), 3):
+        for turn in turns:
             done |= turn()
         rounds.append(done)
-        log(f"{name}: round {number + 1}: limit ratio {done['render'] / done['alone']:.2f}")
 
     def of(key: str) -> list[float]:
         return [done[key] for done in rounds]

@@ -3,25 +3,70 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
+import random
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from scipy import stats
 
 import wavecomb
 from wavecomb.picture.files import replacing
 from wavecomb.run.stats import SORTING, machine
 from wavecomb.scenes import write_scene
 
+T = TypeVar("T")
+
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 STAGES = ("cornell", "mixed", "dragon")
+
+
+# ---- arguments and rounds ------------------------------------------------------------------------
+
+
+def sitting_parser(doc: str, name: str) -> argparse.ArgumentParser:
+    """A parser with the arguments of sittings on generated stages; results go to ``name``.json."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
+    parser.add_argument("--stages", nargs="+", default=list(STAGES), metavar="NAME")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--spp", type=int, default=16)
+    parser.add_argument("--size", type=int, default=600, help="edge of the picture, pixels")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--triangles", type=int, default=250_000, help="of a dragon")
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "stages", help="of stages")
+    parser.add_argument("--seed", type=int, default=1, help="of the order of renders in a round")
+    parser.add_argument("--output", type=Path, default=RESULTS / f"{name}.json")
+    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    return parser
+
+
+def sitting_arguments(parser: argparse.ArgumentParser, **quick: Any) -> argparse.Namespace:
+    """Parses the arguments; ``quick`` are those of --quick, which writes beside its stages."""
+    args = parser.parse_args()
+    if args.quick:
+        folder = ROOT / "out" / "quick"
+        vars(args).update(quick, folder=folder, output=folder / args.output.name)
+    return args
+
+
+def shuffled_rounds(
+    turns: Sequence[T], args: argparse.Namespace, name: str
+) -> Iterator[Iterator[T]]:
+    """Yields the turns of each round in shuffled order, and logs the end of each round."""
+    shuffle = random.Random(args.seed)
+    started = time.perf_counter()
+    for number in range(args.rounds):
+        yield iter(shuffle.sample(turns, len(turns)))
+        log(f"{name}: round {number + 1}/{args.rounds}, {time.perf_counter() - started:.0f} s")
 
 
 # ---- what is rendered ----------------------------------------------------------------------------
@@ -63,11 +108,15 @@ def phase_times(stats: Mapping[str, Any]) -> dict[str, float]:
 
 
 def bootstrap(values: Any, statistic: Callable[[Any], Any] = np.median) -> tuple[float, float]:
-    """95 % interval of a statistic over rounds."""
-    rng = np.random.default_rng(0)
-    draws = [statistic(rng.choice(values, len(values))) for _ in range(1000)]
-    low, high = np.quantile(draws, (0.025, 0.975))
-    return float(low), float(high)
+    """95 % percentile interval of a statistic over rounds."""
+    if len(values) < 2:
+        value = float(statistic(np.asarray(values)))
+        return value, value
+    found = stats.bootstrap(
+        (np.asarray(values),), statistic, n_resamples=1000, vectorized=False,
+        method="percentile", rng=np.random.default_rng(0),
+    ).confidence_interval  # fmt: skip
+    return float(found.low), float(found.high)
 
 
 def summary(values: Sequence[float]) -> dict[str, float]:
