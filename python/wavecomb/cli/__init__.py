@@ -4,11 +4,32 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
+from typing import Any
 
-import click
 
-from wavecomb.cli.group import Commands, print_version
-from wavecomb.cli.options import examples
+def _stop(number: int, frame: Any) -> None:
+    """Ends the process at a Ctrl-C while modules are imported, when there is nothing to keep."""
+    os.write(2, b"stopped\n")
+    os._exit(130)
+
+
+# An exception in the midst of imports would be a traceback.
+_handles = (
+    threading.current_thread() is threading.main_thread()
+    and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+)
+if _handles:
+    signal.signal(signal.SIGINT, _stop)
+
+import click  # noqa: E402
+
+from wavecomb.cli.group import Commands, print_version  # noqa: E402
+from wavecomb.cli.options import examples  # noqa: E402
+
+if _handles:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 __all__ = ["main"]
 

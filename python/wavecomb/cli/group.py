@@ -12,9 +12,11 @@ from typing import Any, NoReturn
 
 import click
 
+from wavecomb import terminal
+from wavecomb.errors import WavecombError
 from wavecomb.run.faults import describe
 from wavecomb.run.isolate import supervisor
-from wavecomb.run.progress import keep_interrupts
+from wavecomb.run.progress import keep_interrupts, was_interrupted
 
 ERROR = 2
 INTERRUPTED = 130
@@ -75,12 +77,13 @@ class Commands(click.Group):
         """Runs the command line and exits."""
         if not standalone_mode:
             return super().main(args, prog_name, complete_var, False, **extra)
+        terminal.guard_streams()
         if not sys.warnoptions and not os.environ.get("WAVECOMB_DEBUG"):
             warnings.simplefilter("ignore")  # Python's own are for developers
         keep_interrupts()
-        supervisor.choices.words = tuple(sys.argv[1:] if args is None else args)
+        supervisor.choices.words = words = tuple(sys.argv[1:] if args is None else args)
         try:
-            code = super().main(args, prog_name, complete_var, False, **extra)
+            code = super().main(words, prog_name, complete_var, False, **extra)
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.format_message(), err=True)
             sys.exit(ERROR)
@@ -92,8 +95,33 @@ class Commands(click.Group):
         except Exception as error:
             if os.environ.get("WAVECOMB_DEBUG"):
                 raise
+            if was_interrupted() and not isinstance(error, WavecombError):
+                # A library made another exception of the KeyboardInterrupt.
+                click.echo("stopped", err=True)
+                sys.exit(INTERRUPTED)
             _fail(describe(error))
+        lost = terminal.flush_streams()
+        if lost is not None:
+            line = f"standard output: {lost.strerror}"
+            if _output_of(words) == "result":
+                _fail(f"{line}; what it was to get is incomplete")
+            click.echo(f"warning: {line}; messages were lost", err=True)
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _output_of(words: Sequence[str]) -> str:
+    """What a command writes to standard output: its "result", or "messages" about files."""
+    names = [word for word in words if not word.startswith("-")]
+    return "messages" if _WRITES_FILES & {tuple(names[:1]), tuple(names[:2])} else "result"
+
+
+_WRITES_FILES = {
+    *(("render",), ("view",), ("scene",), ("sheet",), ("merge",), ("bench", "run")),
+    *(("bench", "report"), ("bench", "page"), ("farm", "submit"), ("farm", "worker")),
+    *(("farm", "resume"), ("farm", "assemble"), ("farm", "cancel"), ("farm", "retry")),
+    ("farm", "export"),
+}
+"""Commands whose standard output is only messages."""
 
 
 def print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:

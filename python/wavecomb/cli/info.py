@@ -50,10 +50,10 @@ def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any
     if as_json:
         click.echo(json.dumps(info, indent=2))
         return
-    from rich.console import Console
+    from wavecomb import terminal
 
     warn(stage_warnings(loaded))
-    print_info(info, loaded, Console(emoji=False))
+    print_info(info, loaded, terminal.console())
 
 
 def _say_machine(as_json: bool) -> None:

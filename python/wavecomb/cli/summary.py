@@ -20,12 +20,12 @@ MOST_LIGHTS = 5
 
 def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[str]) -> None:
     """Prints the figures of a render in a few lines and small tables."""
-    from rich.console import Console
     from rich.markup import escape
 
+    from wavecomb import terminal
     from wavecomb.run.progress import count_text, time_text
 
-    console = Console(highlight=False, emoji=False, soft_wrap=True)
+    console = terminal.console(highlight=False, soft_wrap=True)
     seconds, counts = stats["seconds"], stats["counts"]
     rays = counts["rays"] + counts["shadow_rays"]
     console.print(

@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator, Mapping
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any
 
+from wavecomb import terminal
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -86,6 +88,11 @@ def keep_interrupts() -> None:
         signal.signal(signal.SIGINT, note)
 
 
+def was_interrupted() -> bool:
+    """Whether ``keep_interrupts`` saw a Ctrl-C that no ``Interrupt`` took."""
+    return bool(_earlier)
+
+
 class Interrupt:
     """While it is entered, the first Ctrl-C or SIGTERM is only noted; the next acts as always.
 
@@ -134,11 +141,10 @@ def progress_console(*, quiet: bool = False) -> Console | None:
     Rich decides what a terminal is. It is not loaded where it could only say no: standard error is
     none, and no variable that Rich goes by claims that it is.
     """
-    if quiet or not (sys.stderr.isatty() or any(name in os.environ for name in _FORCED)):
+    is_terminal = sys.stderr is not None and sys.stderr.isatty()
+    if quiet or not (is_terminal or any(name in os.environ for name in _FORCED)):
         return None
-    from rich.console import Console
-
-    console = Console(stderr=True, emoji=False)
+    console = terminal.console(stderr=True)
     return console if console.is_terminal else None
 
 
@@ -194,14 +200,19 @@ class ProgressBar(Silent):
             console=console,
             auto_refresh=False,
             transient=True,
+            redirect_stdout=False,
+            redirect_stderr=False,
         )
+        self._above = terminal.lines_above(console)
         self._task = self._bar.add_task("", total=None, figures="")
 
     def __enter__(self) -> ProgressBar:
         self._bar.start()
+        self._above.__enter__()
         return self
 
     def __exit__(self, *error: object) -> None:
+        self._above.__exit__(None, None, None)
         self._bar.stop()
 
     def show(self, status: Mapping[str, Any]) -> None:
@@ -224,14 +235,17 @@ def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
     """A bar while a stage is read; it pulses until the first call, so small stages show no more."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    with Progress(
-        TextColumn(title, markup=False),
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.fields[figures]}"),
         console=console,
         transient=True,
-    ) as bar:
-        task = bar.add_task("", total=None, figures="")
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with bar, terminal.lines_above(console):
+        task = bar.add_task(terminal.clean(title), total=None, figures="")
 
         def show(done: int, found: int) -> None:
             text = f"{done:,} of {found:,} prims"

@@ -36,8 +36,9 @@ def allowed_s(layer_bytes: int) -> float:
 
 
 def _say_and_end(message: str) -> None:
-    sys.stderr.write(f"error: {' '.join(message.split())}\n")
-    sys.stderr.flush()
+    if sys.stderr is not None:
+        sys.stderr.write(f"error: {' '.join(message.split())}\n")
+        sys.stderr.flush()
     os._exit(2)
 
 

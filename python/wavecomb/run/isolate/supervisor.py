@@ -10,7 +10,6 @@ signal of the terminal, which goes to a whole group, reaches it once.
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import os
 import signal
@@ -24,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wavecomb import processes
+from wavecomb import processes, terminal
 from wavecomb.boot import end_with_parent
 from wavecomb.errors import WavecombError
 from wavecomb.picture import files
@@ -126,19 +125,13 @@ def enter(outputs: Outputs, *, gpu: bool = False) -> None:
     memory.limit()
 
 
-def _flush() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
-            stream.flush()
-
-
 def supervise() -> None:
     """Continues in a fork; the parent waits for it and ends as it did.
 
     Contract: one thread. Returns in the child only.
     """
     global _is_child
-    _flush()
+    terminal.flush_streams()
     page, words = trail.new_page(), _memory_file("stderr")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _WATCHED)
     chld = signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -167,7 +160,7 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
         gpu: Whether it uses GPU devices.
         program: Python code that the child runs.
     """
-    _flush()
+    terminal.flush_streams()
     page, words = trail.new_page(), _memory_file("stderr")
     mine, its = socket.socketpair()
     mine.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
@@ -298,13 +291,7 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
 def _say_on(descriptor: int) -> None:
     """Sends what Python prints to stderr there; what libraries write to descriptor 2 is kept."""
     stderr = sys.stderr
-    sys.stderr = io.TextIOWrapper(
-        os.fdopen(descriptor, "wb", 0),
-        encoding=stderr.encoding,
-        errors=stderr.errors,
-        line_buffering=True,
-        write_through=True,
-    )
+    sys.stderr = terminal.Stream(descriptor, stderr.encoding, is_prompt=True, owns=True)
 
 
 def _print_exception(kind: type[BaseException], error: BaseException, trace: Any) -> None:
@@ -358,8 +345,8 @@ def _end(code: int, sent: set[int], page: int, words: int) -> None:
     if code < 0:
         seen = trail.open_page(page)
         line = trail.obituary(-code, trail.read(seen), text, memory.limit_of(seen))
-        os.write(2, f"error: {' '.join(line.split())}\n".encode(errors="replace"))
+        terminal.write_error(f"error: {' '.join(line.split())}\n")
         os._exit(2)
     rest = [line for line in text.splitlines(keepends=True) if not line.startswith(CHATTER)]
-    os.write(2, "".join(rest).encode(errors="replace"))
+    terminal.write_error("".join(rest))
     os._exit(code)

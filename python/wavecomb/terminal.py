@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Standard streams of commands: all text that reaches a terminal goes through ``Stream``.
+
+Names of prims, files and messages of libraries may hold control characters, which would move the
+cursor, hide text or change the window's title. ``Stream`` writes them as escapes. A stream that was
+closed, whose reader ended, or whose disk is full loses text, and never ends a render.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import os
+import re
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 without tab and newline, delete, C1
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # direction of text, separators
+    "\ud800-\udfff]"  # bytes of file names that are not UTF-8
+)
+
+
+def clean(text: str) -> str:
+    r"""Text with its control characters as escapes, but for tabs and newlines.
+
+    >>> clean("a\x1b[31mb"), clean("a\udcffb"), clean("\u202egpj.exe")
+    ('a\\x1b[31mb', 'a\\xffb', '\\u202egpj.exe')
+    """
+    return _CONTROL.sub(_escape, text)
+
+
+def _escape(match: re.Match[str]) -> str:
+    code = ord(match[0])
+    if 0xDC80 <= code <= 0xDCFF:  # a byte, as Python keeps those of file names
+        code -= 0xDC00
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+class _Raw(io.FileIO):
+    """A descriptor to which writing never fails.
+
+    Attributes:
+        error: The first error of a write.
+    """
+
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            self.error = self.error or error
+            return len(data)
+
+
+class Stream(io.TextIOWrapper):
+    """Standard output or error.
+
+    Attributes:
+        plain: The same stream for text whose control characters are meant.
+    """
+
+    def __init__(self, number: int, encoding: str, *, is_prompt: bool, owns: bool = False) -> None:
+        """Makes a stream of a descriptor.
+
+        Args:
+            number: The descriptor.
+            encoding: Of the text; UTF-8 in place of ASCII.
+            is_prompt: Whether each line is written at once.
+            owns: Whether the descriptor is closed with the stream.
+        """
+        self._raw = _Raw(number, "w", closefd=owns)
+        if encoding.lower() in ("ascii", "us-ascii", "ansi_x3.4-1968", "646"):
+            encoding = "utf-8"
+        super().__init__(
+            io.BufferedWriter(self._raw), encoding, "backslashreplace",
+            line_buffering=is_prompt or self._raw.isatty(), write_through=is_prompt,
+        )  # fmt: skip
+        self.plain = _Plain(self)
+
+    @property
+    def error(self) -> OSError | None:
+        """Why text was lost; None: it was not, or its reader wanted no more."""
+        error = self._raw.error
+        return None if error is None or error.errno == errno.EPIPE else error
+
+    def write(self, text: str) -> int:
+        """Writes text with escapes for its control characters."""
+        super().write(clean(text))
+        return len(text)
+
+    def write_plain(self, text: str) -> int:
+        """Writes text as it is."""
+        return super().write(text)
+
+
+class _Plain:
+    """A stream without escapes, for Rich, whose control characters are meant."""
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        return self._stream.write_plain(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+_NAMES = ("stdout", "stderr")
+
+
+def guard_streams() -> None:
+    """Puts a ``Stream`` in place of standard output and error, and opens what is closed.
+
+    A descriptor 0, 1 or 2 that is closed would be given to the next file that is opened, which then
+    gets messages. Streams that a program or a test put in place are left alone.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            other = os.open(os.devnull, os.O_RDWR)
+            if other != number:
+                os.dup2(other, number)
+                os.close(other)
+            os.set_inheritable(number, True)
+    for number, name in enumerate(_NAMES, 1):
+        before = getattr(sys, name)
+        if before is not getattr(sys, f"__{name}__") or isinstance(before, Stream):
+            continue
+        if before is not None:
+            with contextlib.suppress(OSError, ValueError):
+                before.flush()
+        encoding = "utf-8" if before is None else before.encoding
+        stream = Stream(number, encoding, is_prompt=name == "stderr")
+        _replaced.append(before)
+        setattr(sys, name, stream)
+        setattr(sys, f"__{name}__", stream)
+
+
+_replaced: list[Any] = []
+"""Streams that were in place before, kept since closing them may close their descriptors."""
+
+
+def flush_streams() -> OSError | None:
+    """Flushes standard output and error; gives why text for standard output was lost."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+    return sys.stdout.error if isinstance(sys.stdout, Stream) else None
+
+
+def write_error(text: str) -> None:
+    """Writes text to descriptor 2 where there may be no stream any more; it may be lost."""
+    with contextlib.suppress(OSError):
+        os.write(2, clean(text).encode(errors="backslashreplace"))
+
+
+def console(**options: Any) -> Console:
+    """A console of Rich whose text has escapes for its control characters.
+
+    Args:
+        **options: Arguments of Rich's Console.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    class Cleaning(Console):
+        def render_str(self, text: str, **how: Any) -> Text:
+            return super().render_str(clean(text), **how)
+
+    stream = sys.stderr if options.get("stderr") else sys.stdout
+    if isinstance(stream, Stream):
+        options = {"file": stream.plain, **options}
+    return Cleaning(emoji=False, **options)
+
+
+@contextlib.contextmanager
+def lines_above(console: Console) -> Iterator[None]:
+    """While a bar is shown, prints lines of the standard streams above it."""
+    from rich.file_proxy import FileProxy
+
+    class Proxy(FileProxy):
+        def write(self, text: str) -> int:
+            return super().write(clean(text))
+
+    before = [getattr(sys, name) for name in _NAMES]
+    for name, stream in zip(_NAMES, before, strict=True):
+        if stream is not None and console.is_terminal:
+            setattr(sys, name, Proxy(console, stream))
+    try:
+        yield
+    finally:
+        for name, stream in zip(_NAMES, before, strict=True):
+            proxy = getattr(sys, name)
+            if isinstance(proxy, Proxy):
+                proxy.flush()
+                setattr(sys, name, stream)

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Standard streams that are closed, full or nobody's, names that are not text, and Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import forks
+import pytest
+from parts import only_where
+
+from wavecomb import terminal
+
+pytest.importorskip("wavecomb._core")
+pytestmark = only_where(sys.platform == "linux", "/dev/full is Linux's")
+
+STAGE = '#usda 1.0\ndef Sphere "Ball" {}\n'
+WAVECOMB = f"'{sys.executable}' -m wavecomb"
+SMALL = "--size 8 8 --spp 1"
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Path:
+    path = tmp_path / "a.usda"
+    path.write_text(STAGE)
+    return path
+
+
+def shell(command: str, folder: Path, **options: object) -> subprocess.CompletedProcess[str]:
+    """Runs a line of bash in a folder; its exit code is that of the first command of a pipe."""
+    line = f"{command}; exit ${{PIPESTATUS[0]}}"
+    return subprocess.run(
+        ["bash", "-c", line], cwd=folder, capture_output=True, text=True, errors="replace",
+        timeout=100, env={**os.environ, "WAVECOMB_ISOLATE": "1"}, **options,
+    )  # type: ignore[call-overload]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "to", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-", "> /dev/full", "2> /dev/full",
+           "> /dev/full 2>&1", "| head -0", "2>&1 | head -1", "--progress json > /dev/full",
+           "--isolate off >&- 2>&-", "--isolate off > /dev/full"],
+)  # fmt: skip
+def test_an_image_is_written_whatever_becomes_of_messages(
+    stage: Path, tmp_path: Path, to: str
+) -> None:
+    done = shell(f"{WAVECOMB} render a.usda -o a.exr {SMALL} {to}", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "a.exr").stat().st_size > 1000
+    for bad in ("Traceback", "internal", "Exception ignored", "Errno"):
+        assert bad not in done.stdout + done.stderr
+    is_told = "full" in to and "2>" not in to
+    assert ("messages were lost" in done.stderr) == is_told, done.stderr
+
+
+@pytest.mark.parametrize("command", ["info a.usda", "doctor", "completion bash", "--help"])
+def test_a_result_that_is_lost_is_an_error_and_a_reader_that_ends_is_none(
+    stage: Path, tmp_path: Path, command: str
+) -> None:
+    done = shell(f"{WAVECOMB} {command} > /dev/full", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: standard output: No space left on device")
+    assert done.stderr.count("\n") == 1
+    done = shell(f"{WAVECOMB} {command} | head -1", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.count("\n") == 1
+    done = shell(f"{WAVECOMB} {command} >&-", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_closed_stream_is_not_given_to_a_file(stage: Path, tmp_path: Path) -> None:
+    """Else messages of libraries would be written into the first file that is opened."""
+    words = "render a.usda -o a.exr --stats a.json --isolate off"
+    done = shell(f"{WAVECOMB} {words} {SMALL} <&- >&- 2>&-", tmp_path)
+    assert done.returncode == 0
+    assert (tmp_path / "a.json").read_text().startswith("{")
+
+
+# ---- control characters --------------------------------------------------------------------------
+
+HOSTILE = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp"
+
+
+def has_controls(text: str) -> bool:
+    return terminal.clean(text) != text
+
+
+def test_clean() -> None:
+    assert terminal.clean("a\tb\nc é \u4e2d") == "a\tb\nc é \u4e2d"
+    assert terminal.clean("\r\x1b\x7f\x85\u2028") == "\\x0d\\x1b\\x7f\\x85\\u2028"
+    assert terminal.clean(os.fsdecode(b"a\xffb")) == "a\\xffb"
+
+
+@pytest.mark.parametrize("forced", [False, True])
+def test_names_in_a_stage_reach_no_terminal_as_they_are(tmp_path: Path, forced: bool) -> None:
+    """Names of files in warnings, in tables and in errors; also where Rich writes colours."""
+    name = HOSTILE.replace("/", "")
+    inner = name.replace("\x1b", "\\x1b").replace("\x07", "\\x07")
+    texture = f"""
+def Material "M" {{
+    token outputs:surface.connect = </M/S.outputs:surface>
+    def Shader "S" {{
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </M/T.outputs:rgb>
+        token outputs:surface
+    }}
+    def Shader "T" {{
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @./{name}.png@
+        float3 outputs:rgb
+    }}
+}}
+def Mesh "Quad" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    rel material:binding = </M>
+}}
+def Camera "C" {{
+    token projection = "{inner}"
+}}
+"""
+    stage = tmp_path / f"{name}.usda"
+    stage.write_text(STAGE + texture)
+    env = {**os.environ, **({"FORCE_COLOR": "1", "COLUMNS": "200"} if forced else {})}
+    for words in (
+        ("render", stage, "-o", tmp_path / f"{name}.exr", *SMALL.split()),
+        ("info", stage),
+        ("info", tmp_path / f"no{name}.usda"),
+        ("render", stage, f"--{name}"),
+        (name,),
+        ("compare", f"{name}.exr", f"{name}.exr"),
+    ):
+        done = forks.wavecomb(*words, cwd=tmp_path, env=env)
+        said = done.stdout + done.stderr
+        for bad in ("\x1b]", "\x07", "\x1b[2J", "\x9b", "\u202e", "Traceback"):
+            assert bad not in said, (words, said)
+        assert forced or not has_controls(said), (words, said)
+        assert "\\x1b" in said or "no camera" in said
+
+
+def test_lines_above_a_bar_are_clean() -> None:
+    import io
+
+    from wavecomb.run.progress import ProgressBar
+
+    out = io.StringIO()
+    console = terminal.console(file=out, force_terminal=True, width=200)
+    before = sys.stderr
+    with ProgressBar(console, "a"):
+        print(f"warning: {HOSTILE}", file=sys.stderr)
+    assert sys.stderr is before
+    assert "\\x1b]0;owned\\x07\\x1b[2J" in out.getvalue()
+    assert "\x1b]0" not in out.getvalue() and "\x9b" not in out.getvalue()
+
+
+# ---- Ctrl-C --------------------------------------------------------------------------------------
+
+INTERRUPTED = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class At:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, At())
+from wavecomb.cli import main
+main(sys.argv[2:])
+"""
+
+
+IN_ALL = ("click", "wavecomb.cli.group", "wavecomb.run.faults", "wavecomb.cli.render")
+LATER = ("numpy", "wavecomb._core", "pxr.Usd", "OpenImageIO", "wavecomb.cli.summary")
+
+
+@pytest.mark.parametrize(
+    ("isolate", "module"),
+    [*(("on", module) for module in IN_ALL), *(("off", module) for module in IN_ALL + LATER)],
+)
+def test_ctrl_c_while_modules_are_imported(
+    stage: Path, tmp_path: Path, isolate: str, module: str
+) -> None:
+    words = ["render", str(stage), "-o", str(tmp_path / "a.exr"), *SMALL.split()]
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, module, *words, "--isolate", isolate],
+        capture_output=True, text=True, timeout=100,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr and "internal" not in done.stderr
+    if (tmp_path / "a.exr").exists():  # a library lost the signal, or all was done
+        assert done.returncode in (0, 130)
+    else:
+        assert done.returncode == 130 and "stopped" in done.stderr, done.stderr
