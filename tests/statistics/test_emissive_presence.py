@@ -112,7 +112,7 @@ def driven() -> str:
             uniform token info:id = "ND_open_pbr_surface_surfaceshader"
             float inputs:base_weight = 0
             float inputs:specular_weight = 0
-            float inputs:emission_luminance = 1000
+            float inputs:emission_luminance = 1
             color3f inputs:emission_color = {numbers(GLOW)}
             float inputs:geometry_opacity.connect = </World/G/Add.outputs:out>
             token outputs:out

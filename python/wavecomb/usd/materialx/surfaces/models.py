@@ -46,14 +46,12 @@ class Model:
 
     Attributes:
         textured: Parameters that plain textures may drive.
-        emission_unit: Emission in the units of a radiance of 1.
         normal: The input that tilts the surface.
         layers: All other parameters; names are those of ``add_material(openpbr=...)``.
         ignored: Inputs without effect, said where they are authored.
     """
 
     textured: dict[str, Row]
-    emission_unit: float
     normal: str
     layers: dict[str, Row]
     ignored: tuple[str, ...]
@@ -72,7 +70,6 @@ MODELS: dict[str, Model] = {
             "opacity": Row("opacity", 1.0),
             "emission": Row("emission_color", WHITE, weight=("emission", 0.0)),
         },
-        emission_unit=1.0,
         normal="normal",
         layers={
             "diffuse_roughness": Row("diffuse_roughness", 0.0),
@@ -122,7 +119,6 @@ MODELS: dict[str, Model] = {
             "opacity": Row("geometry_opacity", 1.0),
             "emission": Row("emission_color", WHITE, weight=("emission_luminance", 0.0)),
         },
-        emission_unit=1000.0,  # of nits: open_pbr's own scale for a bright display
         normal="geometry_normal",
         layers={
             "diffuse_roughness": Row("base_diffuse_roughness", 0.0),
@@ -170,7 +166,6 @@ MODELS: dict[str, Model] = {
             "opacity": Row("alpha", 1.0),
             "emission": Row("emissive", BLACK, weight=("emissive_strength", 1.0)),
         },
-        emission_unit=1.0,
         normal="normal",
         layers={
             "specular_weight": Row("specular", 1.0),

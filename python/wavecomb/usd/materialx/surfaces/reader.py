@@ -50,10 +50,9 @@ class MaterialXReader:
         parameters: dict[str, Any] = {"presence": True}
         for parameter, row in model.textured.items():
             weight = self._value(shader, "", *row.weight)
-            if parameter == "emission":
-                weight = self._radiance(weight, model.emission_unit)
-                if is_constant(weight) and weight[0] <= 0.0:  # type: ignore[operator]
-                    continue
+            is_black = is_constant(weight) and weight[0] <= 0.0  # type: ignore[operator]
+            if parameter == "emission" and is_black:
+                continue
             self._put(parameters, shader, parameter, row, weight)
         if parameters.get("ior", 1.5) <= 0.0:
             self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
@@ -76,14 +75,6 @@ class MaterialXReader:
             value = self.values[name]
             return numbers(*value) if isinstance(value, tuple) else numbers(float(value))
         return self.drivers.value(shader, name, parameter)
-
-    def _radiance(self, glow: Value, unit: float) -> Value:
-        """Emission in its model's unit, as radiance."""
-        if unit == 1.0:
-            return glow
-        if is_constant(glow):
-            return (glow[0] / unit,)  # type: ignore[operator]
-        return self.drivers.scaled(glow, (1.0 / unit,))
 
     def _value(
         self, shader: UsdShade.Shader, parameter: str, name: str, default: float | Colour
