@@ -13,6 +13,7 @@ from typing import Any
 
 import parts
 import pytest
+import tiers
 
 # A command in the sandbox is a fresh Python, which hundreds of tests would wait for. Tests of the
 # sandbox give --sandbox on.
@@ -58,8 +59,17 @@ def forked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "Popen", forks.Popen)
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Leaves the long tests to `make test-long`."""
+    rows = tiers.read(tiers.FILE.read_text(encoding="utf-8"))
+    by_file: dict[str, list[str]] = {}
+    for row in rows:
+        by_file.setdefault(row.long.partition("::")[0], []).append(row.long)
+    for item in items:
+        patterns = by_file.get(item.nodeid.partition("::")[0], ())
+        if any(tiers.matches(pattern, item.nodeid) for pattern in patterns):
+            item.add_marker(pytest.mark.long)
     if parts.is_long():
         return
     mark = pytest.mark.skip(reason=parts.LONG + "make test-long runs it")

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests that are left to `make test-long`: the rows of long_tests.txt."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+FILE = Path(__file__).with_name("long_tests.txt")
+
+
+@dataclass(frozen=True)
+class Row:
+    """Tests that are long, and one of their kind that is not; patterns of node ids."""
+
+    long: str
+    representative: str
+
+
+def matches(pattern: str, node: str) -> bool:
+    """Whether a test or one of its cases has this name; * stands for any text."""
+    wanted = re.escape(pattern).replace(r"\*", ".*")
+    return re.fullmatch(rf"{wanted}(\[.*\])?", node, re.DOTALL) is not None
+
+
+def read(text: str) -> list[Row]:
+    """The rows of a file.
+
+    Raises:
+        ValueError: A line is no row.
+    """
+    rows = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip() or line.startswith("# "):
+            continue
+        long, arrow, representative = (word.strip() for word in line.partition(" <- "))
+        if not arrow or "::" not in long or "::" not in representative:
+            raise ValueError(f"{FILE.name}, line {number}: no row of LONG <- REPRESENTATIVE")
+        rows.append(Row(long, representative))
+    return rows
