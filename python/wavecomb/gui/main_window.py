@@ -15,6 +15,8 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QMainWindow,
     QMenu,
+    QMessageBox,
+    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -24,9 +26,10 @@ from wavecomb.gui.about import make_about
 from wavecomb.gui.actions import make_action
 from wavecomb.gui.history_actions import HistoryActions, UnsavedMark
 from wavecomb.gui.menus import CHECKED, MENUS, entries
-from wavecomb.gui.messages import MessageBar
+from wavecomb.gui.messages import MessageBar, log_folder
 from wavecomb.gui.panels import make_panels
 from wavecomb.gui.recent_stages import RecentStages
+from wavecomb.gui.scene.autosave import Autosave
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog
 from wavecomb.gui.status import StatusLine
@@ -206,6 +209,8 @@ class MainWindow(QMainWindow):
         HistoryActions(edits, actions["undo"], actions["redo"], self)
         HistoryActions(self.views.stack, actions["view_back"], actions["view_forth"], self)
         UnsavedMark(edits, self)
+        self.autosave = Autosave(self.scene.edits, log_folder() / "autosave", self)
+        self.autosave.found.connect(self._offer_edits)
         self._state_changed(session.state)
         self._setup_changed(session.setup)
 
@@ -245,6 +250,26 @@ class MainWindow(QMainWindow):
         if path is not None:
             self._recent.add(path)
         self._retitle()
+
+    def _offer_edits(self) -> None:
+        """Asks what to do with edits that a window which crashed did not save."""
+        box = QMessageBox(self)
+        box.setObjectName("autosave")
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("Unsaved edits")
+        box.setText("The window ended before edits of this stage were saved.")
+        box.setInformativeText("Restore them?")
+        for text, role, act in (
+            ("Restore", QMessageBox.ButtonRole.AcceptRole, self.autosave.restore),
+            ("Discard", QMessageBox.ButtonRole.DestructiveRole, self.autosave.discard),
+        ):
+            button = QPushButton(text, box)
+            button.setObjectName(f"autosave.{text.lower()}")
+            button.clicked.connect(act)
+            box.addButton(button, role)
+        box.setModal(False)
+        box.show()
 
     def _retitle(self) -> None:
         path = self.session.path
@@ -407,6 +432,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Keeps the state, ends the threads."""
+        self.autosave.close()
         self.settings.setValue("geometry", self.saveGeometry())
         self.settings.setValue("state", self.saveState(_STATE_VERSION))
         self.display.keep(self.settings)

@@ -43,6 +43,12 @@ def _collected(qapp, _modules):
     gc.enable()
 
 
+@pytest.fixture(autouse=True)
+def _own_autosave(tmp_path, monkeypatch):
+    """No window finds the unsaved edits of another test."""
+    monkeypatch.setattr("wavecomb.gui.main_window.log_folder", lambda: tmp_path / "state")
+
+
 @pytest.fixture(scope="session")
 def cornell(tmp_path_factory):
     """The Cornell box as a file."""

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps a copy of unsaved edits, so that a crash of the window loses none."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pxr import Sdf
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from wavecomb.errors import WavecombError
+from wavecomb.gui.scene.edit_layer import save_edits
+
+if TYPE_CHECKING:
+    from wavecomb.gui.scene.scene_edits import SceneEdits
+
+DELAY_MS = 2000
+"""Time from an edit to its copy on the disk."""
+
+
+class Autosave(QObject):
+    """Writes the edits of the open stage to a file until they are saved or undone.
+
+    Each stage has one file. The window that has the stage open holds a lock on a file beside it; a
+    second window of the same stage writes none.
+
+    Signals:
+        found(): Edits of an earlier window, which ended without saving them, can be restored.
+    """
+
+    found = Signal()
+
+    def __init__(self, edits: SceneEdits, folder: Path, parent: QObject | None = None) -> None:
+        """Follows the edits of a window.
+
+        Args:
+            edits: The edits.
+            folder: Where the files go; made when it is needed.
+            parent: Lives as long.
+        """
+        super().__init__(parent)
+        self._edits, self._folder = edits, folder
+        self._file: Path | None = None
+        self._lock: int | None = None
+        self._waits = False
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self.write)
+        edits.session.opened.connect(self._on_opened)
+        edits.session.closing.connect(self._timer.stop)
+        edits.changed.connect(self._on_changed)
+        edits.history.stack.cleanChanged.connect(self._on_clean)
+
+    @property
+    def file(self) -> Path | None:
+        """File of the stage that is open; None if there is none or another window has it."""
+        return self._file
+
+    def close(self) -> None:
+        """Writes what is due and lets other windows have the file. Unsaved edits stay in it."""
+        if self._timer.isActive():
+            self.write()
+        self._release()
+
+    def _release(self) -> None:
+        self._timer.stop()
+        if self._lock is not None:
+            os.close(self._lock)
+        self._file = self._lock = None
+
+    def write(self) -> None:
+        """Writes the edits now, or removes the file where there are none."""
+        if self._file is None or self._edits.edits is None:
+            return
+        if self._edits.history.stack.isClean():
+            if not self._waits:
+                self.discard()
+            return
+        self._waits = False  # new edits replace those that nobody restored
+        with contextlib.suppress(WavecombError, OSError):
+            save_edits(self._edits.edits.stage, self._file)
+
+    def restore(self) -> None:
+        """Brings the edits of the file into the stage."""
+        self._waits = False
+        usd, layer = self._edits.usd, None
+        if self._file is not None and usd is not None:
+            with contextlib.suppress(Exception):
+                layer = Sdf.Layer.OpenAsAnonymous(str(self._file))
+        if layer is None or usd is None:
+            self._edits.session.failed.emit(f"{self._file}: the edits cannot be read")
+            return
+        layer.subLayerPaths = []
+        usd.GetSessionLayer().TransferContent(layer)
+        self._edits.history.stack.resetClean()
+        self._edits.structure_changed.emit()
+        self._edits.session.rebuild("restored edits")
+
+    def discard(self) -> None:
+        """Removes the file."""
+        self._waits = False
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self._file.unlink()
+
+    def _on_opened(self, loaded: Any) -> None:
+        path = self._edits.session.path
+        if path is None:
+            return
+        name = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:24]
+        file = self._folder / f"{name}.usda"
+        if file == self._file:
+            self._timer.start(0)
+            return
+        self._release()
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            lock = os.open(file.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        except OSError:
+            return
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(lock)
+            return
+        self._file, self._lock = file, lock
+        self._waits = file.exists()
+        if self._waits:
+            self.found.emit()
+
+    def _on_changed(self) -> None:
+        if self._edits.edits is not None:
+            self._timer.start(DELAY_MS)
+
+    def _on_clean(self, clean: bool) -> None:
+        if clean and not self._waits:
+            self._timer.start(0)  # a stage that is being closed stops the timer: its edits stay
