@@ -15,7 +15,7 @@ from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import catchers, live
 from wavecomb.run.learned import check_taught, learned_of
-from wavecomb.run.settings import DEFAULT_SIZE, check_memory, prepare
+from wavecomb.run.settings import DEFAULT_SIZE, check_memory, check_options, prepare
 from wavecomb.run.watcher import CheckpointSink, Sink, Watcher
 
 if TYPE_CHECKING:
@@ -158,6 +158,7 @@ def render(
 
     warn_deprecated(isolate=isolate)
     loading, settings = split(options, without=("size", "threads"))
+    check_options(size, spp, settings)
     if isinstance(source, (str, os.PathLike)):
         size, aovs = _asked_for(source, size, aovs, settings, loading)
     own, profile, names, chosen = prepare(size or DEFAULT_SIZE, spp, policy, costs, aovs, settings)

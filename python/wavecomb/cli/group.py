@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from wavecomb import terminal
+from wavecomb.cli.suggestions import message_of
 from wavecomb.errors import WavecombError
 from wavecomb.run.faults import describe
 from wavecomb.run.isolate import supervisor
@@ -59,6 +60,11 @@ class Commands(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Without any, says what to do."""
+        for word in args:
+            try:
+                word.encode()
+            except UnicodeEncodeError:
+                raise click.UsageError(f"{word}: is not UTF-8; rename the file or folder") from None
         if not args and not ctx.resilient_parsing:
             from wavecomb.version import version
 
@@ -88,7 +94,7 @@ class Commands(click.Group):
             click.echo(error.format_message(), err=True)
             sys.exit(ERROR)
         except click.ClickException as error:
-            _fail(error.format_message(), _help_of(error))
+            _fail(message_of(error), _help_of(error))
         except (click.Abort, KeyboardInterrupt):
             click.echo("stopped", err=True)
             sys.exit(INTERRUPTED)

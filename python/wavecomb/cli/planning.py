@@ -237,9 +237,10 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     if resumed is not None:
         asked.check_deep_resumed(kept)
     before = None if resumed is None else resumed.aovs
+    _check_settings(chosen)
     choices, opened = peek(source, asked.stage)
     plans = plan_products(choices, asked.output, beside, purpose, asked.frames, asked.output_dir)
-    if asked.frames is None:
+    if asked.frames is None and any(has_place(plan.names.output) for plan in plans):
         frame = choices[0].first_frame if source.frame is None else source.frame
         plans = [replace(plan, names=plan.names.at(frame)) for plan in plans]
     reporter = make_reporter(purpose.progress, asked.quiet)
@@ -273,6 +274,19 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
         for plan, numbers in zip(plans, all_numbers, strict=True)
     ]
     return Prepared(asked, source, resumed, jobs, learning, opened, reporter)
+
+
+def _check_settings(chosen: dict[str, Any]) -> None:
+    """Raises an error for settings that are wrong whatever the stage asks for.
+
+    A region, and memory, are checked when the size is known for certain.
+    """
+    from wavecomb.run.settings import check_options
+
+    known = dict(chosen)
+    width, height = known.pop("width", None), known.pop("height", None)
+    size = None if width is None or height is None else (width, height)
+    check_options(size, known.pop("spp"), known)
 
 
 def _with_frame(asked: Asked, peek: Peek) -> Asked:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture.exr import BAND, Window, bands_of, set_attributes
-from wavecomb.picture.files import one_line, replacing
+from wavecomb.picture.files import one_line, replacing, why_not_written
 
 CHANNELS = ("R", "G", "B", "A", "Z", "ZBack")
 """Of a sample, in the order of ``DeepPicture.samples``."""
@@ -101,7 +101,7 @@ class DeepPicture:
 
         def check(ok: bool) -> None:
             if not ok:
-                why = one_line(output.geterror(), part)
+                why = why_not_written(part, one_line(output.geterror(), part))
                 output.close()
                 raise OSError(f"{called}: cannot be written: {why}")
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
 from wavecomb.picture.cryptomatte import is_crypto
-from wavecomb.picture.files import one_line, replacing
+from wavecomb.picture.files import is_whole_png, one_line, replacing, why_not_written
 
 Compression = Literal["none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"]
 COMPRESSIONS: tuple[str, ...] = get_args(Compression)
@@ -306,6 +306,10 @@ class RowFile:
     def close(self) -> None:
         """Ends the file."""
         self._check(self._output.close())
+        if self._part.lower().endswith(".png") and not is_whole_png(self._part):
+            # OpenImageIO does not look whether the system took all that it wrote.
+            why = why_not_written(self._part, "the file is incomplete")
+            raise OSError(f"{self._called}: cannot be written: {why}")
 
     def _check(self, ok: bool) -> None:
         if ok:
@@ -313,7 +317,8 @@ class RowFile:
         problem = self._output.geterror()
         self._output.close()
         problem = problem or self._output.geterror()
-        raise OSError(f"{self._called}: cannot be written: {one_line(problem, self._part)}")
+        why = why_not_written(self._part, one_line(problem, self._part))
+        raise OSError(f"{self._called}: cannot be written: {why}")
 
 
 def _values(rows: NDArray[Any], as_half: bool) -> NDArray[np.float32]:

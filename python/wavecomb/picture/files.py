@@ -8,6 +8,7 @@ import errno
 import os
 import shutil
 import stat
+import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
@@ -40,6 +41,7 @@ def _publisher_of(target: Path) -> Publisher | None:
 
 def _target(path: str | os.PathLike[str]) -> Path:
     """The file behind symbolic links; raises OSError where no file can be written."""
+    check_name(path)
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise IsADirectoryError(f"{os.fspath(path)}: is a folder; give a file name")
@@ -57,6 +59,60 @@ def _target(path: str | os.PathLike[str]) -> Path:
 def reason(error: OSError) -> str:
     """Why, in words: "Permission denied"; the whole message where there is no number."""
     return error.strerror or str(error)
+
+
+_ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".html", ".learned")
+
+
+def check_name(path: str | os.PathLike[str]) -> None:
+    """Raises OSError, in one line, where libraries could not open a file of this name.
+
+    USD and OpenImageIO take names in UTF-8, and tell the kind of a file by its ending.
+    """
+    name = os.fspath(path)
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise OSError(f"{name}: the name is not UTF-8; rename the file or folder") from None
+    if "\0" in name:
+        raise OSError(f"{name}: the name holds a zero byte; give another name")
+    last = os.path.basename(name)
+    if last.lower() in _ENDINGS:
+        raise OSError(f"{name}: is only an ending; give a name before it, such as image{last}")
+
+
+def why_not_written(part: str | os.PathLike[str], said: str) -> str:
+    """Why a library could not write a file: a full disk, or what it says itself.
+
+    Libraries do not pass on what the system said. So this appends to what they wrote.
+
+    Args:
+        part: The incomplete file.
+        said: Message of the library.
+    """
+    try:
+        with open(part, "ab", 0) as file:
+            written = file.write(bytes(1 << 20))
+            if written < 1 << 20:
+                file.write(b"\0")
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return "the disk is full, or its quota is used up; make space"
+        if error.errno in (errno.EFBIG, errno.EIO, errno.EROFS):
+            return reason(error)
+    return said
+
+
+def is_whole_png(path: str | os.PathLike[str]) -> bool:
+    """Whether the chunks of a PNG file follow each other to its end."""
+    with open(path, "rb") as file:
+        end = os.fstat(file.fileno()).st_size
+        place, kind = 8, b""
+        while place + 12 <= end and kind != b"IEND":
+            file.seek(place)
+            length, kind = struct.unpack(">I4s", file.read(8))
+            place += 12 + length
+    return kind == b"IEND" and place == end
 
 
 _KINDS = (

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wavecomb.machine import memory_bytes
 from wavecomb.picture.exr import LAYER_ORDER, bands_of, channel_names, write_bands, write_exr
-from wavecomb.picture.files import check_regular, one_line, problem_of
+from wavecomb.picture.files import check_name, check_regular, one_line, problem_of
 
 __all__ = [
     "channel_names",
@@ -197,6 +197,7 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _open(name: str) -> Any:
     import OpenImageIO as oiio
 
+    check_name(name)
     if not Path(name).exists():
         raise FileNotFoundError(f"{name}: no such file")
     if Path(name).is_dir():

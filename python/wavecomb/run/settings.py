@@ -58,6 +58,21 @@ def prepare(
     return own, profile, tuple(names), chosen
 
 
+def check_options(size: tuple[int, int] | None, spp: int, settings: Mapping[str, Any]) -> None:
+    """Raises an error for settings that are wrong whatever the stage asks for.
+
+    To be called before a stage is opened. Regions, and memory, are checked by ``make_settings``
+    when the size is known for certain.
+
+    Args:
+        size: Width and height; None: the stage says.
+        spp: Samples per pixel.
+        settings: Others.
+    """
+    known = {name: value for name, value in settings.items() if name not in ("region", "crop")}
+    make_settings(size or DEFAULT_SIZE, spp, fits=lambda chosen, aovs: None, **known)
+
+
 def make_settings(
     size: tuple[int, int],
     spp: int,

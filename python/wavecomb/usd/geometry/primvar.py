@@ -149,7 +149,10 @@ def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.floa
     if wanted is None:
         raise PrimvarError(f"primvar {primvar.name!r} has unknown interpolation {kind!r}")
     if len(values) != wanted:
-        raise PrimvarError(f"primvar {primvar.name!r} ({kind}) has the wrong number of values")
+        raise PrimvarError(
+            f"primvar {primvar.name!r} ({kind}) has the wrong number of values, {len(values):,} "
+            f"where the mesh needs {wanted:,}"
+        )
     return values
 
 

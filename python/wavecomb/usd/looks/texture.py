@@ -48,7 +48,10 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     if UDIM in value.resolvedPath:
         return value.resolvedPath
     layer = layer_of_value(attribute)
-    return UsdShade.UdimUtils.ResolveUdimPath(value.path, layer) or value.path
+    found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
+    if not found and layer is not None and value.path.startswith("."):
+        return layer.ComputeAbsolutePath(value.path)  # for messages: there are no tiles
+    return found or value.path
 
 
 def tile_files(pattern: str) -> list[tuple[int, str]]:
@@ -223,7 +226,11 @@ class TextureTable:
                 if first is not None:
                     return TiledImage(first, tuple(tiles))
             if not tiles:
-                self._report.warn(f"texture {path} cannot be read (no tile is there)", prim)
+                folder, name = os.path.split(path)
+                why = f"no tile {name} is in the folder {folder or os.curdir}"
+                if folder and not os.path.isdir(folder):
+                    why = f"the folder of its tiles, {folder}, is not there"
+                self._report.warn(f"texture {path} cannot be read ({why})", prim)
             return None
         return self._image(self._twin(path), prim)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import check_regular
+from wavecomb.picture.files import check_name, check_regular
 from wavecomb.run.isolate import patience, trail
 from wavecomb.usd import mtlx
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
@@ -210,14 +210,15 @@ def open_editable(
 
 
 def _check_file(file: Path) -> None:
+    try:
+        check_name(file)
+        check_regular(file)
+    except OSError as error:
+        raise WavecombError(str(error)) from None
     if not file.exists():
         raise WavecombError(f"{file}: no such file")
     if file.is_dir():
         raise WavecombError(f"{file}: is a folder; name the stage in it")
-    try:
-        check_regular(file)
-    except OSError as error:
-        raise WavecombError(str(error)) from None
     if not Usd.Stage.IsSupportedFile(str(file)):
         raise WavecombError(f"{file}: not a USD file; use .usd, .usda, .usdc or .usdz")
 
