@@ -62,7 +62,7 @@ def tile_files(pattern: str) -> list[tuple[int, str]]:
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
     """Files that the shaders in a material name: a guess at what it will ask for."""
-    for prim in Usd.PrimRange(material, Usd.TraverseInstanceProxies()):
+    for prim in _each_once(material):
         for attribute in prim.GetAuthoredAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
                 value = attribute.Get(time)
@@ -72,6 +72,18 @@ def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
                     yield from (path for _, path in tile_files(asset_file(value, attribute)))
                 elif value.resolvedPath:
                     yield value.resolvedPath
+
+
+def _each_once(top: Usd.Prim) -> Iterator[Usd.Prim]:
+    """A prim and all below it; what is in instances once, however often it is there."""
+    tops = [top.GetPrimInPrototype() if top.IsInstanceProxy() else top]
+    known: set[Sdf.Path] = set()
+    while tops:
+        for prim in Usd.PrimRange(tops.pop()):
+            yield prim
+            if prim.IsInstance() and (prototype := prim.GetPrototype()).GetPath() not in known:
+                known.add(prototype.GetPath())
+                tops.append(prototype)
 
 
 def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:

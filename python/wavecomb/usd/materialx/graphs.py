@@ -13,6 +13,13 @@ from wavecomb.usd.materialx.prims import TERMINALS, Prims, child, connect, valid
 GRAPHS = Sdf.Path("/MaterialX/NodeGraphs")
 """Where node graphs are, and nodes of the document that are in no graph."""
 
+MAX_EXPANDED = 4096
+"""Nodes of a graph with all graphs in it, above which nodes of a document that are graphs are
+instances: a document of some lines may nest graphs into billions of nodes."""
+
+_SMALL = 32
+"""Nodes of graphs that are no instances even then."""
+
 
 def definition(node: Any) -> Any:
     """The definition of a node, None where it has none: the one that fits best."""
@@ -58,6 +65,7 @@ class Graphs:
         self._document = document
         self._prims = prims
         self._written: set[Sdf.Path] = set()
+        self._sizes: dict[str, int] = {}
 
     def all(self) -> None:
         """All node graphs of the document, and the nodes beside them where there are any."""
@@ -128,12 +136,30 @@ class Graphs:
         if inside is not None:
             spec = self._prims.refer(path, self.graph_of(nodedef, inside))
             spec.typeName = "NodeGraph"
+            if self._is_deep() and self._nodes_in(inside) > _SMALL:
+                spec.instanceable = True
             return spec
         prim = self._prims.define(path, "Shader")
         if nodedef is None:
             self._prims.tell(node, f"MaterialX node {node.getCategory()} has no definition")
         self._prims.identify(prim, node.getCategory() if nodedef is None else nodedef.getName())
         return prim
+
+    def _is_deep(self) -> bool:
+        """Whether a graph of the document has too many nodes to be a prim for each."""
+        return any(self._nodes_in(graph) > MAX_EXPANDED for graph in self._document.graphs)
+
+    def _nodes_in(self, graph: Any) -> int:
+        """Nodes of a graph with all that the graphs of its nodes hold."""
+        name = graph.getName()
+        if name not in self._sizes:
+            self._sizes[name] = 0  # of a graph that holds itself
+            total = 0
+            for node in graph.getNodes():
+                inside = implementation(self._document, definition(node))
+                total += 1 if inside is None else self._nodes_in(inside)
+            self._sizes[name] = total
+        return self._sizes[name]
 
     def graph_of(self, nodedef: Any, inside: Any) -> Sdf.Path:
         """The prim of the node graph that implements a definition."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.stage.diagnostics import commentary
 from wavecomb.usd.stage.report import LoadReport
@@ -106,6 +106,9 @@ def _evaluated(stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery) -> Rul
     prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     walk = iter(prims)
     for prim in walk:
+        if prim.IsA(UsdShade.NodeGraph):  # a material, which is nobody's member
+            walk.PruneChildren()
+            continue
         path = prim.GetPath()
         inside = bool(query.IsPathIncluded(path))
         if inside != member.get(path.GetParentPath(), False):

@@ -17,6 +17,7 @@ from wavecomb.usd.looks.network import Source, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
 from wavecomb.usd.materialx.nodes.body import Body
 from wavecomb.usd.materialx.nodes.call import OF_MATRICES, Handler, NodeCall
+from wavecomb.usd.materialx.nodes.instances import InstancedGraphs
 from wavecomb.usd.materialx.nodes.table import CATEGORIES, PRIMITIVES
 from wavecomb.usd.stage.report import LoadReport
 
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 MAX_DEPTH = 100
 """Nodes in a row."""
+
+MAX_NODES = 10_000
+"""Nodes of the networks of a material; a tenth of these in instances of node graphs, whose paths
+are long."""
 
 PER_COMPONENT = {"overlay": "ND_overlay_float"}
 """Graphs that do the same to each component: the one for numbers does it to all at once."""
@@ -75,6 +80,10 @@ def support_of(identifier: str) -> str:
     return "graph" if all(one is not None for one in known) else ""
 
 
+class _TooManyNodes(Exception):
+    """A material has more nodes than are read."""
+
+
 class Networks:
     """Expressions of the networks of one material; each node once."""
 
@@ -91,6 +100,7 @@ class Networks:
         self.primvars: list[str] = []
         self._done: dict[tuple[Any, ...], Value | None] = {}
         self._path: list[tuple[Any, ...]] = []
+        self._instances = InstancedGraphs(material, self.node)
 
     def in_working_space(self) -> Networks:
         """The same networks with constant colours of the working space; tells nothing."""
@@ -101,15 +111,24 @@ class Networks:
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
         """What feeds an input; None where nothing does, or nothing that can be read."""
-        source = source_of(shader, name, self.time)
+        source = self.source(shader, name)
         if source is None:
             return None
         if source.is_value:
             return self._constant(source.value, source.attribute, kind)
         return None if source.shader is None else self.node(source.shader, source.output, kind)
 
+    def source(self, shader: UsdShade.Shader, name: str) -> Source | None:
+        """What feeds an input, as ``source_of``; the shader may be an instanced node graph."""
+        if self._instances.are_there:
+            return self._instances.source(shader.GetInput(name), self.time)
+        return source_of(shader, name, self.time)
+
     def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
         """What an output of a node gives."""
+        prim = shader.GetPrim()
+        if prim.IsInstance() and prim.IsA(UsdShade.NodeGraph):
+            return self._instances.value(prim, output, kind)
         key = (shader.GetPath(), output, kind)
         if key in self._done:
             return self._done[key]
@@ -117,9 +136,18 @@ class Networks:
             what = "shading network that runs in a circle or is too deep (cut there)"
             self.report.warn(what, shader.GetPath())
             return None
+        most = MAX_NODES // 10 if self._instances.are_there else MAX_NODES
+        if len(self._done) >= most:
+            raise _TooManyNodes
         self._path.append(key)
         try:
             value = self.compiled(self._call(shader, output, kind))
+        except _TooManyNodes:
+            if len(self._path) > 1:
+                raise
+            what = f"shading network of more than {most} nodes (left out)"
+            self.report.missing(what, self.material.GetPath())
+            return None
         finally:
             self._path.pop()
         self._done[key] = value
@@ -227,7 +255,7 @@ class _Authored:
 
     def source(self, name: str) -> Source | None:
         """The same of what is no number."""
-        return source_of(self._shader, name, self._networks.time)
+        return self._networks.source(self._shader, name)
 
     def has(self, name: str) -> bool:
         """Whether an input is authored."""
