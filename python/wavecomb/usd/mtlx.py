@@ -2,7 +2,7 @@
 """The door to MaterialX: the one module that imports ``wavecomb.usd.materialx``.
 
 Without that package, or without the ``materialx`` wheel, stages load as they are: what asks for
-MaterialX is drawn grey or left out, and said once.
+MaterialX is drawn in its displayColor or left out, and said once.
 """
 
 from __future__ import annotations
@@ -103,7 +103,12 @@ def translated_files(stage: Usd.Stage) -> list[str]:
 
 
 def model_of(identifier: str) -> str:
-    """The shading model of a shader id such as ``ND_standard_surface_surfaceshader``, or ''."""
+    """The shading model of a shader id such as ``ND_standard_surface_surfaceshader``, or ''.
+
+    MaterialX has its standard_surface from Arnold, whose shader has the same inputs.
+    """
+    if identifier == "arnold:standard_surface":
+        return "standard_surface"
     return next((name for name in MODELS if identifier.startswith(f"ND_{name}")), "")
 
 
@@ -138,7 +143,7 @@ def surface(
         values: Constants of the shader in place of what the stage says.
     """
     if not is_there():
-        report.missing(f"{ABSENT}: drawn grey", material.GetPath())
+        report.missing(f"{ABSENT}: displayColor in its place", material.GetPath())
         return None
     if model == HAIR:
         from wavecomb.usd.materialx.surfaces.hair import HairReader

@@ -122,7 +122,7 @@ class Assigner:
         sets = self.uv_names(draw)
         if len(sets) > 1:  # the mesh has the first that is there
             primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
-        if surface is None:
+        if surface is None or surface.stand_in:
             worn = Worn(self._display(primvars, otherwise))
         else:
             worn = Worn(self._bound(primvars, surface))
@@ -202,7 +202,9 @@ class Assigner:
             if not inside.all():
                 self.report.warn("subset names faces that are not there", subset.GetPath())
                 index = index[inside]
-            per_face[index] = self._bound(primvars, self._surface(draw, material))
+            surface = self._surface(draw, material)
+            shown = self._display(primvars, None) if surface.stand_in else None
+            per_face[index] = self._bound(primvars, surface) if shown is None else shown
             bound = True
         return per_face if bound else None
 
@@ -300,7 +302,7 @@ class Assigner:
 def is_alike(surface: Surface) -> bool:
     """Whether a surface is the same on all gprims."""
     reads = surface.primvars or asks_for(surface.graph) or surface.emission_attributes()
-    return not (reads or surface.texture_uvs or surface.object_reads)
+    return not (reads or surface.texture_uvs or surface.object_reads or surface.stand_in)
 
 
 class _Primvars:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from wavecomb.usd.looks.surface import (
     fallback_surface,
     is_cloudy,
 )
+from wavecomb.usd.looks.terminals import terminals
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.inside import filling
@@ -47,6 +49,8 @@ PREVIEW = "preview"
 
 LAMP = 1.0
 """Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
+
+_INSTEAD = "displayColor in its place"
 
 SPLATS = Surface("splats", "emissive", {"emission": (1.0, 1.0, 1.0)})
 """What Gaussian splats wear: it multiplies the light that they have."""
@@ -79,7 +83,8 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     """
     shader = material.ComputeSurfaceSource()[0]
     # Where a material comes in both forms, the preview is the one for who knows no MaterialX.
-    for candidate in (material.ComputeSurfaceSource("mtlx")[0], shader):
+    others = (one.shader for one in terminals(material))
+    for candidate in chain((material.ComputeSurfaceSource("mtlx")[0], shader), others):
         name = shader_id(candidate)
         if name.startswith(("ND_UsdPreviewSurface", "UsdPreviewSurface")):
             return PREVIEW, candidate
@@ -168,8 +173,9 @@ class MaterialTable:
             try:
                 surface = self._convert(material)
             except (Tf.ErrorException, RecursionError):
-                self._report.warn("material network cannot be read: drawn grey", path)
-                surface = fallback_surface(DEFAULT_COLOUR, name=str(path))
+                what = "material network cannot be read: displayColor in its place"
+                self._report.warn(what, path)
+                surface = _stand_in(material.GetPrim())
             if str(path).startswith("/__Prototype_"):
                 surface = replace(surface, name=self._report.place(path))
             self._surfaces[path] = surface
@@ -324,14 +330,20 @@ class MaterialTable:
             return PreviewReader(prim, self.time, self._textures, self._report).read(shader)
         if kind:
             read = mtlx.surface(prim, self.time, self._textures, self._report, shader, kind)
-            return read or fallback_surface(DEFAULT_COLOUR, name=str(prim.GetPath()))
-        what = shader_id(shader) or shader_id(material.ComputeSurfaceSource("mtlx")[0])
-        if not what and (inside := filling(material, self.time, self._report)) is not None:
+            return read or _stand_in(prim)
+        found = list(terminals(material))
+        if not found and (inside := filling(material, self.time, self._report)) is not None:
             return inside
-        if what:
-            self._report.missing(f"surface shader {what} (drawn grey)", prim.GetPath())
+        if found:
+            what = ", ".join(map(str, found))
+            self._report.missing(f"surface shader {what} ({_INSTEAD})", prim.GetPath())
         elif not material.GetSurfaceOutputs():
-            self._report.warn("material without a surface: drawn grey", prim.GetPath())
+            self._report.warn(f"material without a surface: {_INSTEAD}", prim.GetPath())
         else:
-            self._report.warn("material whose surface leads nowhere: drawn grey", prim.GetPath())
-        return fallback_surface(DEFAULT_COLOUR, name=str(prim.GetPath()))
+            self._report.warn(f"material whose surface leads nowhere: {_INSTEAD}", prim.GetPath())
+        return _stand_in(prim)
+
+
+def _stand_in(material: Usd.Prim) -> Surface:
+    """What stands for a material that cannot be drawn."""
+    return replace(fallback_surface(DEFAULT_COLOUR, name=str(material.GetPath())), stand_in=True)

@@ -14,6 +14,7 @@ from wavecomb.material_table import own_parameters, preview_programs, programs
 from wavecomb.usd import mtlx
 from wavecomb.usd.graphs.node import PARAMETERS
 from wavecomb.usd.graphs.surface import Drivers
+from wavecomb.usd.looks.asset_files import asset_file
 from wavecomb.usd.looks.colour_space import SRGB, canonical, read_colour, space_of
 from wavecomb.usd.looks.input_values import InputValues
 from wavecomb.usd.looks.network import (
@@ -27,7 +28,6 @@ from wavecomb.usd.looks.network import (
     word,
 )
 from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
-from wavecomb.usd.looks.texture import asset_file
 
 if TYPE_CHECKING:
     from wavecomb.usd.looks.texture import TextureTable, TiledImage

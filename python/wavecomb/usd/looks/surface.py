@@ -87,6 +87,8 @@ class Surface:
         displacement: How far points move along their normals: a length, or a texture use; None: not
             at all. Part of the mesh's shape, not of the material's look.
         graph: Computes parameters that neither constants nor plain textures give.
+        stand_in: Whether it stands for a material that cannot be drawn: the display colour of what
+            it is bound to goes before it.
         object_reads: Primvars whose one value on an object changes how textures are read: the
             material is read again for each value.
     """
@@ -101,6 +103,7 @@ class Surface:
     graph: SurfaceGraph | None = None
     texture_uvs: dict[str, str] = field(default_factory=dict)
     object_reads: tuple[str, ...] = ()
+    stand_in: bool = False
 
     def key(self) -> str:
         """Equal for surfaces that look alike."""

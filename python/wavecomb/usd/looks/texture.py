@@ -5,21 +5,20 @@ from __future__ import annotations
 
 import filecmp
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdShade
+from pxr import Usd
 
 from wavecomb.errors import WavecombError
 from wavecomb.machine import give_back_memory
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import memory
+from wavecomb.usd.looks.asset_files import UDIM, image_files, tile_files
 from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.looks.halve import halve
-from wavecomb.usd.looks.network import layer_of_value
 from wavecomb.usd.looks.pixels import ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.looks.texture_cache import Image, TextureCache
 from wavecomb.usd.stage.report import LoadReport
@@ -30,60 +29,8 @@ if TYPE_CHECKING:
 _WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black"}
 
 
-UDIM = "<UDIM>"
 CURVE = "sRGB curve"
 """In place of a space to convert from: only the transfer curve of sRGB is undone, by the core."""
-
-
-def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
-    """The file that an asset value names: resolved where it resolves, else as authored.
-
-    Of a UDIM texture its pattern, with ``<UDIM>`` in it.
-    """
-    if not isinstance(value, Sdf.AssetPath):
-        return str(value or "")
-    path = value.resolvedPath or value.path
-    if UDIM not in path and UDIM not in value.path:
-        return path
-    if UDIM in value.resolvedPath:
-        return value.resolvedPath
-    layer = layer_of_value(attribute)
-    found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
-    if not found and layer is not None and value.path.startswith("."):
-        return layer.ComputeAbsolutePath(value.path)  # for messages: there are no tiles
-    return found or value.path
-
-
-def tile_files(pattern: str) -> list[tuple[int, str]]:
-    """Tile numbers and files that are there of a UDIM pattern, 1001 to 1100."""
-    found = UsdShade.UdimUtils.ResolveUdimTilePaths(pattern, None)
-    return [(int(number), path) for path, number in found]
-
-
-def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    """Files that the shaders in a material name: a guess at what it will ask for."""
-    for prim in _each_once(material):
-        for attribute in prim.GetAuthoredAttributes():
-            if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
-                value = attribute.Get(time)
-                if value is None:
-                    continue
-                if UDIM in value.path:
-                    yield from (path for _, path in tile_files(asset_file(value, attribute)))
-                elif value.resolvedPath:
-                    yield value.resolvedPath
-
-
-def _each_once(top: Usd.Prim) -> Iterator[Usd.Prim]:
-    """A prim and all below it; what is in instances once, however often it is there."""
-    tops = [top.GetPrimInPrototype() if top.IsInstanceProxy() else top]
-    known: set[Sdf.Path] = set()
-    while tops:
-        for prim in Usd.PrimRange(tops.pop()):
-            yield prim
-            if prim.IsInstance() and (prototype := prim.GetPrototype()).GetPath() not in known:
-                known.add(prototype.GetPath())
-                tops.append(prototype)
 
 
 def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:

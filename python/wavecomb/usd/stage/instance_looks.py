@@ -160,6 +160,7 @@ class InstanceLooks:
         surface = self._materials.surface(material)
         graph = () if surface.graph is None else surface.graph.primvars
         names = (*surface.primvars.values(), *graph, *surface.emission_attributes())
+        names += ("displayColor", "displayOpacity") if surface.stand_in else ()
         return frozenset((*names, *surface.texture_uvs.values(), *surface.object_reads))
 
     def _bytes(self, primvar: Any) -> bytes:

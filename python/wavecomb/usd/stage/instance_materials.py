@@ -42,8 +42,9 @@ class InstanceMaterials:
 
     def of_instance(self, placed: Placed, scope: Scope) -> int:
         """The id for the meshes of an instance that have none of their own."""
-        if placed.material is not None:
-            return self.materials.add(self.materials.surface(placed.material))
+        surface = None if placed.material is None else self.materials.surface(placed.material)
+        if surface is not None and not surface.stand_in:
+            return self.materials.add(surface)
         if scope.override or scope.bound:
             return INHERIT_MATERIAL
         for primvar in placed.inherited:

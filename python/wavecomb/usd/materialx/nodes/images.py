@@ -7,8 +7,8 @@ import math
 
 from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import COLOURS, NORMAL, uv_matrix
+from wavecomb.usd.looks.asset_files import asset_file
 from wavecomb.usd.looks.colour_space import space_of
-from wavecomb.usd.looks.texture import asset_file
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}
@@ -34,14 +34,25 @@ def read_image(
     fallback: str,
     is_raw: bool,
     stretch: float | None = None,
+    *,
+    name: str = "file",
+    space: str = "",
 ) -> Value:
     """r, g, b, alpha of the node's file; its default where there is none that can be read.
 
-    ``stretch``: lengths in ``uv`` for one in the mesh's coordinates, where it is known better.
+    Args:
+        n: The node.
+        uv: Texture coordinates.
+        wraps: Wrap modes in u and v.
+        fallback: Input that stands for a missing file.
+        is_raw: Whether the file holds no colours.
+        stretch: Lengths in ``uv`` for one in the mesh's coordinates, where it is known better.
+        name: Input that names the file.
+        space: Colour space that the node itself says, "": none.
     """
     networks = n.networks
     stretch = stretch_of(uv) if stretch is None else stretch
-    file = n.inputs.source("file")
+    file = n.inputs.source(name)
     path = asset_file(file.value, file.attribute) if file is not None and file.is_value else ""
     image = networks.textures.image(path, n.inputs.path) if path else None
     if image is None:
@@ -52,7 +63,8 @@ def read_image(
             return n.make.image(networks.textures.missing(), uv, stretch)
         return numbers(0.0, 0.0, 0.0, 1.0)
     is_colour = n.kind in COLOURS and not is_raw
-    space = space_of(file.attribute if file else None) or ("auto" if is_colour else "raw")
+    space = space or space_of(file.attribute if file else None)
+    space = space or ("auto" if is_colour else "raw")
     if n.kind == NORMAL:
         space = "raw"
     texture = networks.textures.add(path, image, space, *wraps, is_colour=is_colour)

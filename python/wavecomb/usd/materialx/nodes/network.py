@@ -15,6 +15,7 @@ from wavecomb.usd.graphs.surface import COLOURS, NORMAL
 from wavecomb.usd.looks.colour_space import holds_colour, read_colour
 from wavecomb.usd.looks.network import Source, shader_id, source_of
 from wavecomb.usd.materialx.library import WIDTHS, FlatGraph, definition_of, flat_graph
+from wavecomb.usd.materialx.nodes import arnold
 from wavecomb.usd.materialx.nodes.body import Body
 from wavecomb.usd.materialx.nodes.call import OF_MATRICES, Handler, NodeCall
 from wavecomb.usd.materialx.nodes.instances import InstancedGraphs
@@ -39,7 +40,19 @@ _WIDTH_OF_TYPE = {
     "float3": 3, "color3f": 3, "vector3f": 3, "normal3f": 3, "point3f": 3, "float4": 4,
     "color4f": 4, "matrix3d": 9, "matrix4d": 16,
 }  # fmt: skip
-_FIRST_CHOICES = ("in", "in1", "bg", "base", "fg", "color1", "color", "value", "default")
+_FIRST_CHOICES = (
+    "in",
+    "input",
+    "input1",
+    "in1",
+    "bg",
+    "base",
+    "fg",
+    "color1",
+    "color",
+    "value",
+    "default",
+)
 
 
 def category_of(identifier: str) -> tuple[str, int]:
@@ -163,6 +176,7 @@ class Networks:
         identifier = shader_id(shader)
         is_known = identifier.startswith("ND_")
         category, width = category_of(identifier) if is_known else ("", 0)
+        category = category or arnold.category_of(identifier)
         declared = shader.GetOutput(output)
         if declared:
             width = _WIDTH_OF_TYPE.get(str(declared.GetTypeName()), width)
@@ -193,7 +207,8 @@ class Networks:
         return None
 
     def _tell(self, call: NodeCall, instead: str) -> None:
-        what = f"MaterialX node {call.identifier or '(no info:id)'} ({instead})"
+        known = "" if call.identifier.startswith(arnold.PREFIX) else "MaterialX "
+        what = f"{known}node {call.identifier or '(no info:id)'} ({instead})"
         self.report.missing(what, call.inputs.path)
 
     def _constant(self, value: Any, attribute: Usd.Attribute | None, kind: str) -> Value | None:

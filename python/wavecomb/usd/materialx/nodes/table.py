@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from wavecomb.usd.materialx.nodes import (
     arithmetic,
+    arnold,
     channels,
     colours,
     compositing,
@@ -21,6 +22,7 @@ from wavecomb.usd.materialx.nodes.call import Handler
 
 PRIMITIVES: dict[str, Handler] = {
     **arithmetic.NODES,
+    **arnold.NODES,
     **channels.NODES,
     **colours.NODES,
     **compositing.NODES,
