@@ -24,6 +24,7 @@ class Textures:
     """Every file is there, of four channels; the uses are told apart."""
 
     working = "rec709"
+    origin = (0.0, 0.0, 0.0)
 
     def __init__(self):
         self.uses = []

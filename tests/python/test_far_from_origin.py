@@ -208,6 +208,28 @@ def test_without_a_camera(tmp_path: Path) -> None:
     assert np.abs(far.beauty - near.beauty).mean() < 5e-3 * near.beauty.mean()
 
 
+def test_the_middle_of_what_is_drawn(tmp_path: Path) -> None:
+    """Extents that are authored count; hidden purposes, lights and broken extents do not."""
+    box = """def Cube "{}" {{
+        {}
+        double3 xformOp:translate = ({}, 0, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }}"""
+    usd = open_text(
+        "\n".join(
+            (
+                box.format("A", "float3[] extent = [(-1, -1, -1), (1, 1, 1)]", 10 * CELL),
+                box.format("B", "float3[] extent = [(0, 0, 0)]", 20 * CELL),
+                box.format("Guide", 'uniform token purpose = "guide"', 500 * CELL),
+                box.format("Light", "", 900 * CELL).replace("Cube", "SphereLight"),
+            )
+        )
+    )
+    assert find_origin(usd, Usd.TimeCode(0), None, ["default"]) == (15 * CELL, 0, 0)
+    assert find_origin(usd, Usd.TimeCode(0), None, ["default", "guide"]) == (255 * CELL, 0, 0)
+    assert find_origin(open_text(""), Usd.TimeCode(0), None, ["default"]) == WORLD
+
+
 def test_parts_of_an_image(tmp_path: Path) -> None:
     path = stage(tmp_path, FAR)
     whole, part = render(path), render(path, region=(8, 8, 40, 24), crop=True)

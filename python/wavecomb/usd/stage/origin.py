@@ -9,14 +9,13 @@ Transforms are double precision until they have been moved there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Tf, Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom, UsdLux, Vt
 
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
-from wavecomb.usd.stage.diagnostics import captured
-from wavecomb.usd.stage.report import LoadReport
 
 Origin = tuple[float, float, float]
 
@@ -26,6 +25,12 @@ NEAR = 2.0**14
 CELL = 2.0**12
 """Origins are multiples of it, so that most frames of a moving camera have the same one."""
 
+MANY = 4096
+"""Prims that are looked at to find the middle of a stage without a camera."""
+
+DEEP = 256
+"""Prims that are nested deeper are not looked at: USD adds up their transforms recursively."""
+
 WORLD: Origin = (0.0, 0.0, 0.0)
 """The world's origin: of all stages that are seen from nearby."""
 
@@ -33,7 +38,7 @@ WORLD: Origin = (0.0, 0.0, 0.0)
 def find_origin(
     stage: Usd.Stage, time: Usd.TimeCode, camera: Usd.Prim | None, purposes: Sequence[str]
 ) -> Origin:
-    """The origin of a scene: near the camera, or near the center of the bounds without one.
+    """The origin of a scene: near the camera, or in the middle of the drawn prims without one.
 
     It depends on the stage, frame and camera alone, so that all regions, tiles and machines that
     render one image agree.
@@ -47,15 +52,36 @@ def find_origin(
     if camera is not None:
         matrix = UsdGeom.XformCache(time).GetLocalToWorldTransform(camera)
         return _snapped(np.array(matrix.ExtractTranslation()))
-    cache = UsdGeom.BBoxCache(time, list(purposes), True)
-    try:
-        with captured(LoadReport()):  # whoever reads the prims reports what is wrong with them
-            whole = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
-    except Tf.ErrorException:
+    places = _places(stage, time, frozenset(purposes))
+    if len(places) == 0:
         return WORLD
-    if whole.IsEmpty():
-        return WORLD
-    return _snapped(np.array(whole.GetMidpoint()))
+    return _snapped(0.5 * (places.min(axis=0) + places.max(axis=0)))
+
+
+def _places(stage: Usd.Stage, time: Usd.TimeCode, purposes: frozenset[str]) -> NDArray[np.float64]:
+    """World positions (n, 3) of drawn prims: of the middle of their authored extents, or of theirs.
+
+    USD's own bounds need every point, and crash on arrays that do not fit together.
+    """
+    xforms = UsdGeom.XformCache(time)
+    found = []
+    for prim in islice(filter(_is_drawn, stage.Traverse()), MANY):
+        if UsdGeom.Imageable(prim).ComputePurpose() not in purposes:
+            continue
+        middle = Gf.Vec3d(0.0)
+        extent = prim.GetAttribute("extent").Get(time)
+        if isinstance(extent, Vt.Vec3fArray) and len(extent) == 2:
+            middle = 0.5 * (Gf.Vec3d(extent[0]) + Gf.Vec3d(extent[1]))
+        found.append(xforms.GetLocalToWorldTransform(prim).Transform(middle))
+    places = np.array(found, np.float64).reshape(-1, 3)
+    return places[np.isfinite(places).all(axis=1)]
+
+
+def _is_drawn(prim: Usd.Prim) -> bool:
+    if prim.GetPath().pathElementCount > DEEP:
+        return False
+    is_light = prim.IsA(UsdLux.BoundableLightBase)
+    return prim.IsInstance() or (prim.IsA(UsdGeom.Boundable) and not is_light)
 
 
 def _snapped(place: NDArray[np.float64]) -> Origin:
