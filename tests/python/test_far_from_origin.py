@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from parts import needs
+from parts import needs, only_where
 from pxr import Gf, Sdf, Usd
 
 import wavecomb
+from wavecomb import vdb
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.stage.origin import CELL, NEAR, WORLD, around, find_origin, moved_to
 from wavecomb.usd.stage.precision import INSTANCED, POSITIONS, STORED
@@ -286,6 +287,43 @@ def test_random_stages(seed: int, tmp_path: Path) -> None:
     # Doubles hold the moved transforms to 2^-24: a few floats are rounded otherwise.
     error = np.abs(images[0] - images[1]).mean() / max(images[0].mean(), 1e-6)
     assert error < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        pytest.param("smoke", {"voxels": 16}, marks=only_where(vdb.is_there(), "without OpenVDB")),
+        ("splats", {"splats": 500}),
+        ("candles", {}),
+    ],
+)
+def test_volumes_splats_and_subsurface(name: str, options: dict[str, Any], tmp_path: Path) -> None:
+    """Generated scenes that a moved prim references."""
+    from pxr import UsdGeom
+
+    from wavecomb.scenes import write_scene
+
+    write_scene(name, tmp_path / "scene.usdc", **options)
+    up = UsdGeom.GetStageUpAxis(Usd.Stage.Open(str(tmp_path / "scene.usdc")))
+    images = []
+    for place in (WORLD, EXACT):
+        (path := tmp_path / f"{len(images)}.usda").write_text(f"""#usda 1.0
+(
+    upAxis = "{up}"
+    metersPerUnit = 1
+)
+def Xform "Far" {{
+    double3 xformOp:translate = {place}
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def "Scene" ( references = @./scene.usdc@ ) {{
+    }}
+}}
+""")
+        loaded = wavecomb.load(path)
+        assert loaded.origin == place
+        images.append(wavecomb.render(loaded, size=(24, 16), spp=4, max_depth=3).beauty)
+    assert images[0].any()
+    assert np.abs(images[0] - images[1]).mean() < 1e-3 * images[0].mean()
 
 
 def open_text(text: str) -> Usd.Stage:

@@ -187,12 +187,18 @@ class Renders:
         return self.trained[key]
 
     def sees_lights(self) -> bool:
-        """Whether the camera sees the shape of a light, or light that passes through a cut-out."""
+        """Whether the camera sees the shape of a light, be it the dark back."""
         import wavecomb
 
-        stage = self.stage({"lights": "visible"})
-        image = wavecomb.render(stage, spp=256, aovs=["emission"], **self.settings({}))
-        return bool(image.aovs["emission"].any())
+        def seen(lights: str) -> Any:
+            stage = self.stage({"lights": lights})
+            layers = {"spp": 256, "aovs": ["emission", "albedo", "depth"]}
+            image = wavecomb.render(stage, **layers, **self.settings({}))
+            return image.aovs["emission"], image.albedo, image.depth
+
+        visible, hidden = seen("visible"), seen("hidden")
+        same = all(np.array_equal(a, b) for a, b in zip(visible, hidden, strict=True))
+        return bool(visible[0].any()) or not same
 
     def tolerance(self, variant: Variant) -> float:
         """Relative difference of means that the documentation admits."""

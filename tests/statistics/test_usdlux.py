@@ -43,9 +43,10 @@ def test_a_few_pictures(tmp_path: Path) -> None:
 @pytest.mark.long
 @needs("wavecomb._core")
 @needs_asset(*files(("sphere:1", "dome:1", "visibleRect:1")))
-def test_the_whole_suite(tmp_path: Path) -> None:
-    """All of it at 512 and 256 samples."""
-    assert usdlux.main(["--size", "512", "--spp", "256", "-o", str(tmp_path)]) == 0
+@pytest.mark.parametrize("size", ["256", "512"])
+def test_the_whole_suite(size: str, tmp_path: Path) -> None:
+    """All of it with 256 samples: means within 0.5 %, blocks within the noise."""
+    assert usdlux.main(["--size", size, "--spp", "256", "-o", str(tmp_path)]) == 0
 
 
 def fake(rng: np.random.Generator, noise: float) -> np.ndarray:
