@@ -51,7 +51,8 @@ if(WAVECOMB_SANITIZE)
   # OpenSubdiv's templates take a compiler three times as long to optimise under sanitizers as without.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
-file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h")
+file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h"
+  "${PROJECT_SOURCE_DIR}/src/wavecomb/*.inl")
 # Only the core. Not all of -Wconversion: int to float is everyday in kernels that serve float and packets.
 set(core_warnings -Wfloat-conversion)
 
@@ -59,43 +60,56 @@ set(core_warnings -Wfloat-conversion)
 set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <limits> <memory> <numeric>
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 
-# wavecomb_lane_units(VAR WIDTH IS_WIDEST PLAIN): units of WIDTH lanes, made in the build tree: one for each
-# *.lanes.cpp, and one for each program, out of program.lanes.cpp.in. They differ from one width to the next by
-# WAVECOMB_LANES. Of the widest lanes and of scalars alone (the reference integrator's), another for each program
-# out of joint.lanes.cpp.in. With PLAIN, the plain kernels of all variants, too, out of variant.lanes.cpp.in.
-function(wavecomb_lane_units var width is_widest plain)
-  set(folder "${PROJECT_BINARY_DIR}/lanes")
+# Rows of WAVECOMB_KERNELS, as "kind:set:widths:reduced".
+wavecomb_read_rows(kernels integrate/kernel_matrix.h "\n  X\\([a-z]+, [a-z]+, [a-z]+, [a-z]+, ")
+list(TRANSFORM kernels REPLACE "^.*\\(([a-z]+), ([a-z]+), ([a-z]+), ([a-z]+), $" "\\1:\\2:\\3:\\4")
+
+# wavecomb_kernel_units(VAR KIND SET WIDTH): units of a row of WAVECOMB_KERNELS in WIDTH lanes, made in the build tree.
+function(wavecomb_kernel_units var kind set width)
   set(units "")
-  foreach(program IN LISTS programs)
-    configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/program.lanes.cpp.in"
-      "${folder}/${program}_${width}.cpp" @ONLY)
-    list(APPEND units "${folder}/${program}_${width}.cpp")
-    if(is_widest OR width EQUAL 1)
-      configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/joint.lanes.cpp.in"
-        "${folder}/joint_${program}_${width}.cpp" @ONLY)
-      list(APPEND units "${folder}/joint_${program}_${width}.cpp")
-    endif()
-  endforeach()
   set(index 0)
   foreach(row IN LISTS variants)
     string(REGEX MATCH "^(.*):(.*)$" row "${row}")
-    set(variant "${CMAKE_MATCH_1}")
+    set(member "${CMAKE_MATCH_1}")
     set(program "${CMAKE_MATCH_2}")
-    if(plain AND NOT program IN_LIST media)
-      configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/variant.lanes.cpp.in"
-        "${folder}/plain_${variant}_${width}.cpp" @ONLY)
-      list(APPEND units "${folder}/plain_${variant}_${width}.cpp")
+    if(NOT program IN_LIST media AND (set STREQUAL "variants" OR member STREQUAL program))
+      set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
+      configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/${kind}.lanes.cpp.in" "${unit}" @ONLY)
+      list(APPEND units "${unit}")
     endif()
     math(EXPR index "${index} + 1")
+  endforeach()
+  set(${var} ${units} PARENT_SCOPE)
+endfunction()
+
+# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): units of WIDTH lanes in a build whose widest lanes are WIDEST: those of
+# the rows of WAVECOMB_KERNELS, with the column `reduced` where REDUCED, and one for each *.lanes.cpp. They differ from
+# one width to the next by WAVECOMB_LANES.
+function(wavecomb_lane_units var width widest reduced)
+  set(all "")
+  foreach(row IN LISTS kernels)
+    string(REPLACE ":" ";" row "${row}")
+    list(GET row 0 kind)
+    list(GET row 1 set)
+    list(GET row 2 widths)
+    if(reduced)
+      list(GET row 3 widths)
+    endif()
+    if(widths STREQUAL "every"
+        OR (widths MATCHES "^(scalar|ends)$" AND width EQUAL 1)
+        OR (widths MATCHES "^(widest|ends)$" AND width EQUAL widest AND width GREATER 1))
+      wavecomb_kernel_units(units ${kind} ${set} ${width})
+      list(APPEND all ${units})
+    endif()
   endforeach()
   foreach(source IN LISTS lane_sources)
     get_filename_component(name "${source}" NAME_WE)
     file(RELATIVE_PATH source "${PROJECT_SOURCE_DIR}/src" "${source}")
-    file(CONFIGURE OUTPUT "${folder}/all_${name}_${width}.cpp"
-      CONTENT "#define WAVECOMB_LANES ${width}\n#include \"${source}\"\n")
-    list(APPEND units "${folder}/all_${name}_${width}.cpp")
+    set(unit "${PROJECT_BINARY_DIR}/lanes/all_${name}_${width}.cpp")
+    file(CONFIGURE OUTPUT "${unit}" CONTENT "#define WAVECOMB_LANES ${width}\n#include \"${source}\"\n")
+    list(APPEND all "${unit}")
   endforeach()
-  set(${var} ${units} PARENT_SCOPE)
+  set(${var} ${all} PARENT_SCOPE)
 endfunction()
 
 # wavecomb_add_core(NAME FLAGS [STATIC]): the library NAME, compiled with FLAGS of wavecomb_add_flags. Scalar
@@ -115,20 +129,12 @@ function(wavecomb_add_core name flags)
   list(GET widths -1 widest)
   list(REMOVE_ITEM widths 1)
   set(packets "")
-  get_target_property(plain ${flags} WAVECOMB_PLAIN)
+  get_target_property(reduced ${flags} WAVECOMB_REDUCED_KERNELS)
   foreach(width IN LISTS widths)
-    set(is_plain OFF)
-    if(width EQUAL plain)
-      set(is_plain ON)
-    endif()
-    set(is_widest OFF)
-    if(width EQUAL widest)
-      set(is_widest ON)
-    endif()
-    wavecomb_lane_units(units ${width} ${is_widest} ${is_plain})
+    wavecomb_lane_units(units ${width} ${widest} ${reduced})
     list(APPEND packets ${units})
   endforeach()
-  wavecomb_lane_units(scalar 1 OFF OFF)
+  wavecomb_lane_units(scalar 1 ${widest} ${reduced})
   # lane_kernels() lists the widths of this library.
   set(table ${name}_lane_kernels)
   add_library(${table} OBJECT "${PROJECT_SOURCE_DIR}/src/wavecomb/render/lane_kernels.cpp")

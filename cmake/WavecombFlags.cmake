@@ -87,19 +87,20 @@ function(wavecomb_add_flags name arch)
     set(label default)
   endif()
   add_library(${name} INTERFACE)
-  # Plain kernels are for the widest packets, and the same code as the others: sanitizers see those.
-  set(plain ${most})
+  # Sanitizers see the same code in fewer kernels (integrate/kernel_matrix.h).
+  set(reduced 0)
   if(WAVECOMB_SANITIZE AND NOT WAVECOMB_SANITIZE STREQUAL "all")
-    set(plain 1)
+    set(reduced 1)
   endif()
   set_target_properties(${name} PROPERTIES WAVECOMB_WIDTHS "${widths}" WAVECOMB_LABEL "${label}"
-    WAVECOMB_PLAIN ${plain})
+    WAVECOMB_REDUCED_KERNELS ${reduced})
   target_link_libraries(${name} INTERFACE wavecomb_common)
   target_include_directories(${name} SYSTEM INTERFACE "${WAVECOMB_DRJIT_INCLUDE_DIR}")
   if(arch)
     target_compile_options(${name} INTERFACE "-march=${arch}")
   endif()
-  target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most} WAVECOMB_PLAIN=${plain})
+  target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most}
+    WAVECOMB_REDUCED_KERNELS=${reduced})
   # Only for units that list the widths: the others compile to the same objects with fewer widths or more.
   add_library(${name}_widths INTERFACE)
   foreach(width IN LISTS widths)

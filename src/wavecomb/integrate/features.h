@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What kernels of a vertex are compiled with or without. There are two of each: with everything,
-/// and plain ones for scenes and settings that ask for nothing of it.
+/// What kernels of a vertex are compiled with or without (kernel_matrix.h): with everything, or
+/// plain, for scenes and settings that ask for nothing of it.
 #pragma once
 
 #include <cstdint>
-
-#include "wavecomb/core/lane_types.h"
 
 namespace wavecomb {
 
@@ -20,13 +18,6 @@ enum Feature : uint32_t {
   kInside = 256,      ///< paths that know what they are inside of
   kJoined = 64,       ///< paths from the lights, which share in the weights of the camera's
 };
-/// Renders that are joined by paths from the lights have kernels of their own; nothing walks there.
-inline constexpr uint32_t kPlain = kNotes, kEverything = 63 | kBelow | kInside,
-                          kPlainJoint = kNotes | kJoined, kJoint = 63 | kJoined;
-
-/// Whether there are plain kernels and least variants for packets of F: for the widest ones.
-/// WAVECOMB_PLAIN is how many lanes they have; 1 where there are none.
-template <typename F>
-inline constexpr bool kHasPlain = !kIsScalar<F> && kWidth<F> == WAVECOMB_PLAIN;
+inline constexpr uint32_t kPlain = kNotes, kEverything = 511;
 
 }  // namespace wavecomb

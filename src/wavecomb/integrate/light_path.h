@@ -81,6 +81,7 @@ inline LightPathSetup light_path_setup(const Context& context, const Merger* mer
 template <typename Context>
 inline ShadeSettings camera_shade_settings(const Context& context) {
   ShadeSettings s(*context.settings);
+  s.joins_light = context.joins_light() && !context.has_media();
   if (context.merges()) {
     s.merge_scale = context.settings->merge_radius / kConeShare;
     s.light_paths = 1.f / context.light_path_share();

@@ -31,6 +31,7 @@ struct ShadeSettings {
   bool filters_textures_whole;
   bool shows_sky;  ///< to the camera itself: domes and distant lights
   bool connects;   ///< vertices of camera paths and of paths from lights, where those are joined
+  bool joins_light = false;  ///< paths from lights share in the weights of camera paths
   /// Radius within which vertices are merged, over the width of a path's cone; 0: none are.
   float merge_scale = 0;
   float light_paths = 0;  ///< that a sample has, where vertices are merged
@@ -204,12 +205,13 @@ struct Vertex {
   VertexAovs<F>* aovs;  ///< null where none are wanted
   const Mask<F>& active;
   const GuideView* guide = nullptr;     ///< the field that guides bounces, or is to be learned
-  ConnectionOffer<F>* offer = nullptr;  ///< null where nothing is connected; of joint kernels
-  VisibleOffer<F>* visible = nullptr;   ///< null where nothing is merged; of joint kernels
+  ConnectionOffer<F>* offer = nullptr;  ///< null where nothing is connected
+  VisibleOffer<F>* visible = nullptr;   ///< null where nothing is merged
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// What AOVs are to be given; null where nothing is.
   VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
+  bool joins_light() const { return has(kJoined) && settings.joins_light; }
   bool wants_lights() const { return notes() && aovs->wants_lights; }
   bool wants_events() const { return notes() && aovs->wants_events; }
   bool wants_bounces() const { return notes() && aovs->wants_bounces; }

@@ -288,20 +288,15 @@ class PathTracer {
     counts_.add_records(depth, 1);
     if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(material));
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    if constexpr (!Media::kAny)
-      if (context_.joins_light()) {
-        if (vertices_) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
-        VisibleOffer<F> visible;
-        const VertexResult<F> v = kShadeJointVertex<F>[scene.material_program[material]](
-            {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
-             context_.guide, vertices_ ? &offer_ : nullptr, visible_ ? &visible : nullptr});
-        if (visible.seen) store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
-        return v;
-      }
+    const bool joins = settings_.joins_light, connects = joins && vertices_;
+    if (connects) offer_ = offer_for<F>(vertices_, kSlot, depth, settings_.max_depth, true);
+    VisibleOffer<F> visible;
     constexpr auto& kernels = kShadeVertex<F, typename Media::template Programs<F>>;
-    return kernels[scene.material_program[material]]({scene, settings_, key, depth, mesh_hit,
-                                                      hit.geom, hit.t, material, path, &aovs, true,
-                                                      context_.guide});
+    const VertexResult<F> v = kernels[scene.material_program[material]](
+        {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, path, &aovs, true,
+         context_.guide, connects ? &offer_ : nullptr, joins && visible_ ? &visible : nullptr});
+    if (visible.seen) store_row<VisiblePoint, F>(visible_.rows, kSlot, visible.row, true);
+    return v;
   }
 
   /// Connects the vertex at `depth` to that of the path from the light.

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The kernels of all programs by the program's id. Each is compiled in a unit of its own
-/// (program.lanes.cpp.in); here they are known by name alone.
+/// The kernels of all programs by the program's id. Each is compiled in a separate unit
+/// (kernel_matrix.h); here they are known by name alone.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
+#include "wavecomb/integrate/kernel_matrix.h"
 #include "wavecomb/integrate/path_state.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/material/program_list.h"
@@ -48,35 +49,33 @@ constexpr Kernels for_variants(Kernels kernels) {
 template <size_t kVariant>
 inline constexpr bool kIsOfSurface =
     static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount;
-enum class PathsOf : uint8_t { kCamera, kLights };
-template <PathsOf kPaths, typename Bsdf, typename F, uint32_t kFeatures>
-constexpr typename BatchKernels<F>::value_type batch_kernel() {
-  if constexpr (kPaths == PathsOf::kCamera)
-    return &shade_batch<Bsdf, F, kFeatures>;
-  else
-    return &shade_light_batch<Bsdf, F, kFeatures>;
-}
-template <PathsOf kPaths, size_t kVariant, typename F, uint32_t kFeatures>
+template <size_t kVariant, typename F>
 constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
   if constexpr (kIsOfSurface<kVariant>)
-    return batch_kernel<kPaths, VariantBsdf<kVariant, F>, F, kFeatures>();
+    return &shade_batch<VariantBsdf<kVariant, F>, F, kPlain>;
   else
     return nullptr;
 }
-template <PathsOf kPaths, typename F, uint32_t kFeatures, typename... Bsdf>
+template <typename F, typename... Bsdf>
 constexpr auto batch_kernels(ProgramList<Bsdf...>) {
   BatchKernels<F> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = batch_kernel<kPaths, Bsdf, F, kFeatures>()), ...);
+  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F, kEverything>), ...);
   return for_variants(kernels);
 }
-template <PathsOf kPaths, typename F, uint32_t kFeatures, size_t... kVariant>
-constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
-  return BatchKernels<F>{plain_batch_kernel<kPaths, kVariant, F, kFeatures>()...};
+template <typename F, typename... Bsdf>
+constexpr auto light_batch_kernels(ProgramList<Bsdf...>) {
+  BatchKernels<F> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_light_batch<Bsdf, F, kEverything>), ...);
+  return for_variants(kernels);
 }
-template <typename F, uint32_t kFeatures, typename... Bsdf>
+template <typename F, size_t... kVariant>
+constexpr auto plain_batch_kernels(std::index_sequence<kVariant...>) {
+  return BatchKernels<F>{plain_batch_kernel<kVariant, F>()...};
+}
+template <typename F, typename... Bsdf>
 constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
-  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kFeatures>), kProgramCount> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kFeatures>), ...);
+  std::array<decltype(&shade_vertex<DiffuseBsdf<F>, F, kEverything>), kProgramCount> kernels{};
+  ((kernels[id_of<Bsdf, F>()] = &shade_vertex<Bsdf, F, kEverything>), ...);
   return kernels;
 }
 template <typename F, typename... Bsdf>
@@ -91,35 +90,17 @@ constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
 /// The kernels of the programs of a list: shade_batch, for the wave, by variant (all of a program
 /// are the program), and shade_vertex, for the reference, by ProgramId.
 template <typename F, typename List>
-inline constexpr auto kShadeBatch =
-    detail::batch_kernels<detail::PathsOf::kCamera, F, kEverything>(List{});
+inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
 template <typename F, typename List>
-inline constexpr auto kShadeVertex = detail::vertex_kernels<F, kEverything>(List{});
-/// The lanes of kernels where paths start at lights, too: the widest of the library, whatever those
-/// of the wave are. So they are compiled once, and for the reference.
-using JointLanes = Lanes<WAVECOMB_MAX_LANES>;
-/// The same where paths from lights share in the weights, and for those paths.
-inline constexpr auto kShadeJointBatch =
-    detail::batch_kernels<detail::PathsOf::kCamera, JointLanes, kJoint>(Programs<JointLanes>{});
+inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
+/// The same for paths from lights, for waves of any lanes.
 inline constexpr auto kShadeLightBatch =
-    detail::batch_kernels<detail::PathsOf::kLights, JointLanes, kEverything>(
-        Programs<JointLanes>{});
-template <typename F>
-inline constexpr auto kShadeJointVertex = detail::vertex_kernels<F, kJoint>(Programs<F>{});
+    detail::light_batch_kernels<LightLanes>(Programs<LightLanes>{});
 template <typename F>
 inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
 /// Plain kernels by variant; only where kHasPlain.
 template <typename F>
 inline constexpr auto kShadePlain =
-    detail::plain_batch_kernels<detail::PathsOf::kCamera, F, kPlain>(
-        std::make_index_sequence<kVariantCount>());
-template <typename F>
-inline constexpr auto kShadePlainJoint =
-    detail::plain_batch_kernels<detail::PathsOf::kCamera, F, kPlainJoint>(
-        std::make_index_sequence<kVariantCount>());
-template <typename F>
-inline constexpr auto kShadePlainLight =
-    detail::plain_batch_kernels<detail::PathsOf::kLights, F, kPlain>(
-        std::make_index_sequence<kVariantCount>());
+    detail::plain_batch_kernels<F>(std::make_index_sequence<kVariantCount>());
 
 }  // namespace wavecomb

@@ -78,8 +78,8 @@ struct LightPaths {
       note_first_places(wave, context, *task);
     wavecomb::collect<F, NoMedia, true>(wave, context, settings, depth, NoMedia());
   }
-  static const auto& kernels(const WaveContext& context, const ShadeSettings& settings) {
-    return light_kernels_for(context, settings);
+  static const auto& kernels(const WaveContext& /*context*/, const ShadeSettings& /*settings*/) {
+    return kShadeLightBatch;
   }
   void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
     splat<F>(wave, context, *task, depth);

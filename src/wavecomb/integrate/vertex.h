@@ -63,17 +63,17 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   const auto seen = at.bsdf.view(wo);
   const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
   JointVertex<F> joint{};
-  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface) {
-    joint = joint_vertex<Bsdf, F>(v, at, frame);
-    if (v.visible) [[unlikely]]
-      leave_point<F>(v, at, joint);
-  }
+  if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
+    if (v.joins_light()) [[unlikely]] {
+      joint = joint_vertex<Bsdf, F>(v, at, frame);
+      if (v.visible) leave_point<F>(v, at, joint);
+    }
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
   LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
   sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, place, joint, receiver, out);
-  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+  if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
     if (v.offer) [[unlikely]]
       offer_connection<Bsdf, F>(v, at, frame, wo, seen, joint);
   const Sample4<F> r_bsdf =

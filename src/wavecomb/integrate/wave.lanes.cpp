@@ -23,7 +23,7 @@ template <size_t W>
 double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits) {
   using F = Lanes<W>;
   using Q = ShadingQueue;
-  const ShadeSettings settings(*context.settings);
+  const ShadeSettings settings = camera_shade_settings(context);
   ShadingQueue& queue = wave.shading;
   queue.clear();
   queue.size = hits.count;

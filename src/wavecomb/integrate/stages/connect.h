@@ -52,7 +52,7 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   if (wave.shading.size == 0) return;
   wave.light_use = Wave::LightUse::kConnect;
   const ShadeSettings settings = ShadeSettings(*context.settings).of_light_paths();
-  shade<F>(wave, context, settings, depth, light_kernels_for(context, settings));
+  shade<F>(wave, context, settings, depth, kShadeLightBatch);
   wave.light_use = Wave::LightUse::kShow;
   compact_shadows<F>(wave);
   const ShadowQueue& q = wave.shadows;

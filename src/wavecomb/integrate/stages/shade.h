@@ -64,31 +64,18 @@ inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, s
 /// Whether scene and settings ask for nothing that plain kernels know nothing of.
 inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) {
   const SceneView& scene = context.scene;
-  return !scene.has_motion && !scene.has_curves && !context.links() && !scene.mesh_lights &&
-         !scene.lights.has_effects && !settings.cosine_sampling && !settings.schlick_fresnel;
+  return !context.joins_light() && !scene.has_motion && !scene.has_curves && !context.links() &&
+         !scene.mesh_lights && !scene.lights.has_effects && !settings.cosine_sampling &&
+         !settings.schlick_fresnel;
 }
 
 /// The kernels, by variant.
 template <typename F, typename Media>
 const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
                                            const ShadeSettings& settings) {
-  if constexpr (!Media::kAny)
-    if (context.joins_light()) {
-      if constexpr (kHasPlain<JointLanes>)
-        if (is_plain(context, settings)) return kShadePlainJoint<JointLanes>;
-      return kShadeJointBatch;
-    }
   if constexpr (kHasPlain<F> && !Media::kAny)
     if (is_plain(context, settings)) return kShadePlain<F>;
   return kShadeBatch<F, typename Media::template Programs<F>>;
-}
-
-/// Those of paths from lights.
-inline const detail::BatchKernels<JointLanes>& light_kernels_for(const WaveContext& context,
-                                                                 const ShadeSettings& settings) {
-  if constexpr (kHasPlain<JointLanes>)
-    if (is_plain(context, settings)) return kShadePlainLight<JointLanes>;
-  return kShadeLightBatch;
 }
 
 /// Shades the whole queue with `kernels`, batch by batch.

@@ -8,6 +8,16 @@
 
 namespace wavecomb {
 
+/// The steps of a vertex: inlined into kernels of packets, a call of the reference's kernel in
+/// scalar lanes.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v) {
+  if constexpr (kIsScalar<F>)
+    return shade_vertex<Bsdf, F>(v);
+  else
+    return take_steps<Bsdf, F>(v);
+}
+
 /// Shades records [begin, end) of the queue's order, all of variant `Bsdf`, W at a time. A path's
 /// next ray takes the place of its last in the pool; what became of it is noted by arrival.
 template <typename Bsdf, typename F, uint32_t kFeatures>
@@ -20,6 +30,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   using V = Vertex<F, kFeatures>;
   const bool wants_aovs = V::has(kNotes) && wave.aovs.wants_vertex(depth);
   const bool is_watched = wants_aovs || (V::has(kNotes) && wave.history);
+  const bool joins = V::has(kJoined) && settings.joins_light;
   const bool links = V::has(kLinks) && context.links();
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const RecordPacket<F> packet(queue, i, end);
@@ -45,33 +56,42 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       state.diffuse = load_row<RadianceRow, F>(pool.diffuse, slot, active).sum;
     if (context.weighs_pixels()) [[unlikely]]
       state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
-    if constexpr ((kFeatures & kJoined) != 0) state.ratio = gather<F>(pool.ratio, slot, active);
+    if (joins) [[unlikely]]
+      state.ratio = gather<F>(pool.ratio, slot, active);
     const bool knows_inside = V::has(kInside) && pool.inside;
     if (knows_inside) [[unlikely]] {
       state.outer = gather_field<F>(pool.inside, &InsideRow<float>::outer, slot, active);
       state.medium = gather_field<F>(pool.inside, &InsideRow<float>::medium, slot, active);
     }
     ConnectionOffer<F> offer;
-    const bool connects = (kFeatures & kJoined) != 0 && wave.light_vertices;
-    if constexpr ((kFeatures & kJoined) != 0)
-      if (connects) [[unlikely]]
-        offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
+    const bool connects = joins && wave.light_vertices;
+    if (connects) [[unlikely]]
+      offer = offer_for<F>(wave.light_vertices, slot, depth, settings.max_depth, active);
     VisibleOffer<F> visible;
-    const bool merges = (kFeatures & kJoined) != 0 && wave.visible;
-    const VertexResult<F> v =
-        take_steps<Bsdf, F>(V{context.scene, settings, path.key, depth, hit, r.geom, t, material,
-                              state, wants_aovs ? &aovs : nullptr, active, context.guide,
-                              connects ? &offer : nullptr, merges ? &visible : nullptr});
-    if constexpr ((kFeatures & kJoined) != 0)
-      if (merges && any(visible.seen)) [[unlikely]]
-        store_row<VisiblePoint, F>(wave.visible.rows, slot, visible.row, visible.seen);
-    if constexpr ((kFeatures & kJoined) != 0)
-      if (connects) [[unlikely]] {
-        store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
-        if (aovs.wants_events)
-          wave.light_aovs.offer<F>(slot, wave.aovs.expressions().template states<F>(slot, active),
-                                   offer.note, active);
-      }
+    const bool merges = joins && wave.visible;
+    const V vertex{context.scene,
+                   settings,
+                   path.key,
+                   depth,
+                   hit,
+                   r.geom,
+                   t,
+                   material,
+                   state,
+                   wants_aovs ? &aovs : nullptr,
+                   active,
+                   context.guide,
+                   connects ? &offer : nullptr,
+                   merges ? &visible : nullptr};
+    const VertexResult<F> v = shade_one<Bsdf, F>(vertex);
+    if (merges && any(visible.seen)) [[unlikely]]
+      store_row<VisiblePoint, F>(wave.visible.rows, slot, visible.row, visible.seen);
+    if (connects) [[unlikely]] {
+      store_row<ConnectionRow, F>(wave.light_vertices.connections, slot, offer.row, active);
+      if (aovs.wants_events)
+        wave.light_aovs.offer<F>(slot, wave.aovs.expressions().template states<F>(slot, active),
+                                 offer.note, active);
+    }
 
     const Mask<F> emits = active & not_(is_black(v.emitted));
     if (any(emits)) add_radiance<F>(pool.radiance, slot, v.emitted, emits);
@@ -104,7 +124,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
                             {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
                              v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
                             v.alive);
-    if constexpr ((kFeatures & kJoined) != 0) scatter<F>(pool.ratio, v.next.ratio, slot, v.alive);
+    if (joins) [[unlikely]]
+      scatter<F>(pool.ratio, v.next.ratio, slot, v.alive);
     if (knows_inside) [[unlikely]]
       scatter_field<F>(pool.inside, &InsideRow<float>::crossed, slot, v.crossed, active);
     if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);

@@ -7,6 +7,17 @@
 
 namespace wavecomb {
 
+/// The steps of a vertex of a path from a light, as shade_one.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeatures>& v,
+                                                        const LightPathSetup& setup,
+                                                        const ConnectionTarget<F>* target) {
+  if constexpr (kIsScalar<F>)
+    return shade_light_vertex<Bsdf, F>(v, setup, target);
+  else
+    return take_light_steps<Bsdf, F>(v, setup, target);
+}
+
 /// Shades records [begin, end) of the queue's order, as shade_batch does those of camera paths, for
 /// what Wave::light_use says. The words of a shadow ray's row that say whose light it brings hold
 /// its place on the film.
@@ -39,10 +50,12 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
       target = {
           load_row<ConnectionRow, F>(vertices.connections, r.slot, active),
           Mask<F>(load_row<LightVertexRow, F>(vertices.chosen, r.slot, active).depth == U(0u))};
-    const LightVertexResult<F> out = take_light_steps<Bsdf, F>(
-        Vertex<F, kFeatures>{context.scene, settings, path.key, depth, hit, r.geom, r.t,
-                             packet.material, state, aovs.wants_events ? &aovs : nullptr, active},
-        setup, connects ? &target : nullptr);
+    const Vertex<F, kFeatures> vertex{
+        context.scene, settings, path.key,        depth, hit,
+        r.geom,        r.t,      packet.material, state, aovs.wants_events ? &aovs : nullptr,
+        active};
+    const LightVertexResult<F> out =
+        shade_one_of_light<Bsdf, F>(vertex, setup, connects ? &target : nullptr);
     const VertexResult<F>& v = out.v;
     if (aovs.wants_events) [[unlikely]] {
       if (connects)

@@ -91,7 +91,7 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
   }
   F w = bounce_weight<F>(v.path.pdf, light_pdf);
   if constexpr ((kFeatures & kJoined) != 0) {
-    if (scene.has_emissive_meshes && v.depth > 0) {
+    if (v.joins_light() && scene.has_emissive_meshes && v.depth > 0) [[unlikely]] {
       const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
       const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
       const Mask<F> known = emits & Mask<F>(base != U(kNoLight));

@@ -86,10 +86,11 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
   Color<F> f_cos = e.f_cos;
   U light(kNoLight), set(0u);
   const bool has_effects = v.has(kMeshLights) && lights.has_effects;
-  if ((kFeatures & kJoined) != 0 || has_effects || v.has_links() || v.wants_lights()) [[unlikely]]
+  if (v.joins_light() || has_effects || v.has_links() || v.wants_lights()) [[unlikely]]
     light = chosen_light<F>(lights, receiver, r.x, lit);
-  if constexpr ((kFeatures & kJoined) != 0)
-    w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, receiver.p);
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+    if (v.joins_light()) [[unlikely]]
+      w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, receiver.p);
   ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
   if (has_effects) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);

@@ -57,8 +57,9 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
-  if constexpr ((kFeatures & kJoined) != 0)
-    out.next.ratio = next_ratio<Bsdf, F>(v, at, joint, wo, d, b);
+  if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
+    if (v.joins_light()) [[unlikely]]
+      out.next.ratio = next_ratio<Bsdf, F>(v, at, joint, wo, d, b);
   const F largest = max_component(out.next.throughput);
   out.alive =
       v.active & (b.pdf > 0.f) & at.is_consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);
