@@ -37,7 +37,7 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt tests/naive/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
 # Directories too: their time changes when a file comes or goes.
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
-CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' \) 2> /dev/null)
+CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
 .PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
 

@@ -12,7 +12,8 @@
 #include "bind.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/graph/parameters.h"
-#include "wavecomb/graph/run.h"
+#include "wavecomb/graph/run.inl"
+#include "wavecomb/texture/lookup.inl"
 
 namespace nb = nanobind;
 using namespace nb::literals;

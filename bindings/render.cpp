@@ -21,8 +21,17 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/film/cryptomatte.h"
 #include "wavecomb/integrate/calibration.h"
+#include "wavecomb/integrate/ray_recorder.h"
+#include "wavecomb/render/cost_profile.h"
+#include "wavecomb/render/lane_kernels.h"
+#include "wavecomb/render/learned.h"
+#include "wavecomb/render/pick.h"
+#include "wavecomb/render/process_memory.h"
 #include "wavecomb/render/ray_recording.h"
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
 
 namespace nb = nanobind;

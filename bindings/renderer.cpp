@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// wavecomb._core.Renderer.
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/cost_profile.h"
+#include "wavecomb/render/learned.h"
+#include "wavecomb/render/pick.h"
+#include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
+#include "wavecomb/schedule/policy.h"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>

@@ -8,8 +8,12 @@
 #include <functional>
 #include <vector>
 
+#include "wavecomb/render/cost_profile.h"
 #include "wavecomb/render/ray_recording.h"
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
 
 /// A picture with the figures of its render.
 struct Result {

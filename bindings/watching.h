@@ -4,7 +4,10 @@
 
 #include <nanobind/nanobind.h>
 
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
 
 /// Options whose callbacks ask Python's `progress(done, total)` and `watcher`; either may be None.
 /// `settings`: for statistics of snapshots. The callbacks take the GIL; all three must outlive the

@@ -7,7 +7,10 @@
 #include <vector>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wc = wavecomb;
 

@@ -12,6 +12,13 @@
 
 #include "wavecomb/core/lanes.h"
 #include "wavecomb/core/vec.h"
+// The library has kernels of its own lane widths alone; tests instantiate them at every width.
+#include "wavecomb/graph/hit_point.inl"
+#include "wavecomb/graph/run.inl"
+#include "wavecomb/learn/guide.inl"
+#include "wavecomb/surface/inputs.inl"
+#include "wavecomb/surface/motion.inl"
+#include "wavecomb/texture/lookup.inl"
 
 namespace wavecomb::lane_testing {
 

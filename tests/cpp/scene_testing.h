@@ -17,7 +17,9 @@
 
 #include "wavecomb/core/error.h"
 #include "wavecomb/light/kinds.h"
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb::scene_testing {

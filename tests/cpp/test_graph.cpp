@@ -9,6 +9,7 @@
 
 #include "graph_ops.h"
 #include "lane_testing.h"
+#include "wavecomb/graph/noise.h"
 #include "wavecomb/material/openpbr_params.h"
 #include "wavecomb/scene/triangle_means.h"
 

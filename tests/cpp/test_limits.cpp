@@ -10,7 +10,7 @@
 #include "wavecomb/film/layer_ids.h"
 #include "wavecomb/scene/scene_limits.h"
 #include "wavecomb/scene/scene_parts.h"
-#include "wavecomb/texture/lookup.h"
+#include "wavecomb/texture/lookup.inl"
 #include "wavecomb/texture/pyramid.h"
 
 namespace wavecomb {

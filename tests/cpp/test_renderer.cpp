@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
 
 #include <chrono>
 

@@ -7,8 +7,11 @@
 
 #include "scene_testing.h"
 #include "wavecomb/render/light_paths.h"
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
 #include "wavecomb/render/transport_choice.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 namespace {

@@ -18,12 +18,13 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "editable"
 HEADERS = ROOT / "src" / "wavecomb" / "material" / "programs"
 PROGRAMS = ROOT / "src" / "wavecomb" / "scene" / "programs.h"
+MATRIX = ROOT / "src" / "wavecomb" / "integrate" / "kernel_matrix.h"
 VARIANTS = ROOT / "src" / "wavecomb" / "scene" / "material_parts.h"
 
 
 @pytest.fixture(scope="module")
-def units_of() -> dict[str, set[str]]:
-    """Objects of the library by each header of a program that they include."""
+def units_with() -> dict[str, set[str]]:
+    """Objects of the library and the module by each source of the core that they include."""
     ninja = Path(sys.executable).with_name("ninja")
     if not ninja.exists() or not (BUILD / ".ninja_deps").exists():
         not_here("the library was not built by make build")
@@ -34,20 +35,58 @@ def units_of() -> dict[str, set[str]]:
         if line and not line.startswith(" "):
             name, _, state = line.partition(": ")
             unit = name if "(VALID)" in state and name.startswith("CMakeFiles/") else ""
-        elif unit and "/material/programs/" in line:
-            found[Path(line.strip()).stem].add(Path(unit).name)
+        elif unit and "/src/wavecomb/" in line:
+            found[line.partition("/src/wavecomb/")[2].strip()].add(Path(unit).name)
     return found
+
+
+@pytest.fixture(scope="module")
+def units_of(units_with: dict[str, set[str]]) -> dict[str, set[str]]:
+    """The same by each program."""
+    folder = "material/programs/"
+    return {
+        name.removeprefix(folder).removesuffix(".h"): units
+        for name, units in units_with.items()
+        if name.startswith(folder)
+    }
+
+
+def kernel_rows() -> list[tuple[str, str, str, str]]:
+    """Rows of WAVECOMB_KERNELS: kind, set, widths, widths of sanitized builds."""
+    text = MATRIX.read_text("utf-8")
+    rows = re.findall(r"^ *X\((\w+), (\w+), (\w+), (\w+), \"", text, re.MULTILINE)
+    assert {row[0] for row in rows} == {"program", "light", "plain"}
+    return rows
 
 
 @pytest.mark.parametrize("program", sorted(path.stem for path in HEADERS.glob("*.h")))
 def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], program: str) -> None:
     widths = {1, *_core.lane_widths()}
-    full = {f"{program}_{width}.cpp.o" for width in widths}
+    of_word = {"every": widths, "ends": {1, max(widths)}, "widest": {max(widths)}, "scalar": {1}}
     rows = re.findall(r"^ *X\((\w+), (\w+),", VARIANTS.read_text("utf-8"), re.MULTILINE)
     listed = re.findall(r"^ *[XP]\((\w+), ", PROGRAMS.read_text("utf-8"), re.MULTILINE)
     assert set(listed) == {path.stem for path in HEADERS.glob("*.h")}
-    rows += [(name, name) for name in listed]
-    plain = {f"plain_{name}_{max(widths)}.cpp.o" for name, of in rows if of == program}
-    assert plain
-    joint = {f"joint_{program}_{width}.cpp.o" for width in (1, max(widths))}
-    assert units_of[program] == full | plain | joint
+    members = {"programs": [program], "variants": [program]}
+    members["variants"] += [name for name, of in rows if of == program]
+    expected = {
+        f"{kind}_{member}_{width}.cpp.o"
+        for kind, among, word, _ in kernel_rows()
+        for member in members[among]
+        for width in of_word[word]
+    }
+    assert units_of[program] == expected
+
+
+BODIES = ("learn/guide.inl", "graph/run.inl", "graph/hit_point.inl", "texture/lookup.inl",
+          "surface/inputs.inl", "surface/motion.inl")  # fmt: skip
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_shared_body_is_compiled_once_per_width(
+    units_with: dict[str, set[str]], body: str
+) -> None:
+    units = {unit for unit in units_with[body] if "/tests/" not in unit}
+    widths = {1, *_core.lane_widths()}
+    few = {"learn/guide.inl": 1, "texture/lookup.inl": 1, "graph/run.inl": 1}
+    assert units >= {f"all_shared_{width}.cpp.o" for width in widths}
+    assert len(units) <= len(widths) + few.get(body, 0), units

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What the kernels of all programs call and none inlines: light sampling, textures, curves,
-/// motion, value graphs. It is compiled once for each width, in shared.lanes.cpp, and not in every
-/// program's unit.
+/// Functions that the kernels of all programs call and none inlines: light sampling, guiding,
+/// textures, curves, motion, value graphs. They are compiled once for each width, in
+/// shared.lanes.cpp, which includes the files *.inl with their bodies.
 #pragma once
 
 #include "wavecomb/graph/hit_point.h"
@@ -51,8 +51,13 @@
   KEYWORD template Vec3<F> detail::read_texture<F>(const MaterialView&,                            \
                                                    const detail::RecordReader<F>&, const Vec2<F>&, \
                                                    const Footprint<F>&, const Mask<F>&);           \
-  KEYWORD template Texel<F> detail::lookup_tiles<F>(const TextureView&, const F&, const F&,        \
-                                                    const Footprint<F>&, const Mask<F>&);          \
+  KEYWORD template Texel<F> lookup<F>(const TextureView&, const F&, const F&, const Footprint<F>&, \
+                                      const Mask<F>&);                                             \
+  KEYWORD template Texel<F> lookup<F>(const TextureView*, const UInt<F>&, const F&, const F&,      \
+                                      const Footprint<F>&, const Mask<F>&);                        \
+  KEYWORD template MovedInstance<F> moved_instance<F>(const SceneView&, const UInt<F>&, const F&,  \
+                                                      const detail::InstanceMaps<F>&,              \
+                                                      const Vec3<F>&, const Mask<F>&);             \
   KEYWORD template MovedTriangle<F> moved_triangle<F>(                                             \
       const SceneView&, const UInt<F>&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&,   \
       const detail::InstanceMaps<F>&, const Mask<F>&);                                             \

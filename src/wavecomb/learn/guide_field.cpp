@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "wavecomb/core/morton.h"
-#include "wavecomb/learn/guide.h"
+#include "wavecomb/learn/guide.inl"
 #include "wavecomb/learn/guide_directions.h"
 #include "wavecomb/learn/guide_shares.h"
 #include "wavecomb/learn/guide_table.h"

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "wavecomb/core/clock.h"
+#include "wavecomb/integrate/wave.h"
 #include "wavecomb/render/bounce_reader.h"
 #include "wavecomb/render/guide_trial.h"
 #include "wavecomb/render/pixel_order.h"

@@ -12,11 +12,14 @@
 #include <memory>
 #include <optional>
 
-#include "wavecomb/integrate/wave.h"
+#include "wavecomb/core/settings.h"
 #include "wavecomb/learn/guide_field.h"
 #include "wavecomb/render/picture_tiles.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
+
+struct WaveContext;
 
 /// What a render says of it.
 struct GuideStatistics {

@@ -6,6 +6,7 @@
 
 #include "wavecomb/accel/light_shapes.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
 namespace {

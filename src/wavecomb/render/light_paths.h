@@ -9,10 +9,12 @@
 
 #include "wavecomb/core/fixed_point.h"
 #include "wavecomb/core/settings.h"
-#include "wavecomb/integrate/wave.h"
+#include "wavecomb/film/splat_filter.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
+
+struct CameraSetup;
 
 /// How many paths start at lights for each path of a pixel, over the number of the picture's
 /// pixels: 2^exponent.

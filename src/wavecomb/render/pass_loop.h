@@ -15,22 +15,10 @@
 #include "wavecomb/render/pass_plan.h"
 #include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/render_costs.h"
+#include "wavecomb/render/render_status.h"
 #include "wavecomb/render/watch.h"
 
 namespace wavecomb {
-
-/// Where a render stands.
-struct RenderStatus {
-  uint64_t samples_done = 0;  ///< those of a checkpoint too
-  uint64_t resumed_samples = 0;
-  uint64_t samples_total = 0;  ///< in all; adaptive or timed: as expected by now
-  uint64_t rays = 0;           ///< of all kinds, since the render began or was resumed
-  uint32_t passes = 0;         ///< begun
-  uint64_t active_pixels = 0;  ///< of the pass
-  double seconds = 0;          ///< since the render began or was resumed
-  /// Mean relative error of the picture at the last look; infinite: not known.
-  double error = std::numeric_limits<double>::infinity();
-};
 
 /// Contract: run() on one thread, within the runner's arena; status() on any. What is rendered
 /// depends on film, settings and pass alone, but where there is a time limit.

@@ -8,15 +8,10 @@
 #include <vector>
 
 #include "wavecomb/integrate/wave.h"
+#include "wavecomb/render/cost_profile.h"
 #include "wavecomb/render/lane_kernels.h"
 
 namespace wavecomb {
-
-/// Costs by name of material and of texture, nanoseconds a record: a profile that a later render of
-/// the same stage can start from.
-struct CostProfile {
-  std::vector<std::pair<std::string, float>> materials, textures;
-};
 
 /// Contract: waves read `order` and `roulette` while a pass runs; between passes they are written.
 class RenderCosts {

@@ -7,7 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/film/film.h"
+#include "wavecomb/render/cost_profile.h"
+#include "wavecomb/render/learned.h"
+#include "wavecomb/render/pass_plan.h"
+#include "wavecomb/render/pick.h"
+#include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
+#include "wavecomb/render/snapshot.h"
+#include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/ray_order.h"
 
 namespace wavecomb {

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/render/render_statistics.h"
+#include "wavecomb/integrate/wave.h"
+#include "wavecomb/render/light_calibration.h"
+#include "wavecomb/render/pass_runner.h"
+#include "wavecomb/render/render_costs.h"
 
 #include <cstddef>
 

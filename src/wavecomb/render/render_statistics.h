@@ -11,14 +11,17 @@
 #include "wavecomb/integrate/statistics.h"
 #include "wavecomb/render/allotment.h"
 #include "wavecomb/render/guide_training.h"
-#include "wavecomb/render/light_calibration.h"
-#include "wavecomb/render/pass_runner.h"
-#include "wavecomb/render/render_costs.h"
+#include "wavecomb/render/sharing.h"
 #include "wavecomb/render/transport_choice.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/texture/tile_store.h"
 
 namespace wavecomb {
+
+class PassRunner;
+class RenderCosts;
+struct LightCalibration;
+struct WaveContext;
 
 /// What became of one material.
 struct MaterialStatistics {

@@ -7,22 +7,29 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/aov_film.h"
-#include "wavecomb/film/film.h"
-#include "wavecomb/integrate/ray_recorder.h"
-#include "wavecomb/render/learned.h"
-#include "wavecomb/render/pass_loop.h"
-#include "wavecomb/render/pick.h"
-#include "wavecomb/render/process_memory.h"
-#include "wavecomb/render/render_statistics.h"
-#include "wavecomb/render/snapshot.h"
-#include "wavecomb/scene/scene.h"
-#include "wavecomb/schedule/policy.h"
+#include "wavecomb/film/deep_film.h"
+#include "wavecomb/render/render_status.h"
+#include "wavecomb/render/watch.h"
 
 namespace wavecomb {
+
+class Film;
+class RayRecorder;
+class Scene;
+class SchedulingPolicy;
+struct CostProfile;
+struct LearnedPlace;
+struct PassState;
+struct Pick;
+struct RenderStatistics;
+struct SceneEdit;
+struct Snapshot;
 
 /// Names of the ids of one Cryptomatte level that a picture holds.
 struct CryptoManifest {

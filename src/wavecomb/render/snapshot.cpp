@@ -2,6 +2,7 @@
 #include "wavecomb/render/snapshot.h"
 
 #include "wavecomb/film/error_map.h"
+#include "wavecomb/film/film.h"
 
 namespace wavecomb {
 

@@ -7,10 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/render/guide_training.h"
-#include "wavecomb/render/pass_loop.h"
+#include "wavecomb/render/pass_plan.h"
 #include "wavecomb/render/render_statistics.h"
+#include "wavecomb/render/render_status.h"
 
 namespace wavecomb {
 

@@ -8,6 +8,7 @@
 
 #include "wavecomb/core/backward_automaton.h"
 #include "wavecomb/core/clock.h"
+#include "wavecomb/integrate/wave.h"
 
 namespace wavecomb {
 namespace {
