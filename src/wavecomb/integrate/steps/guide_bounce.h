@@ -3,10 +3,13 @@
 ///
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi) [wi is on the side of wo]
 ///
+/// p_bsdf is the density of the technique that the field is mixed with: of the BSDF's lobes, or of
+/// the cosine, where bounces are sampled by cosine (bounce_sampling.h).
 /// The field says nothing of the far side of a surface, so what is transmitted is the BSDF's alone;
 /// a delta lobe is chosen with a times its own probability. Both halves of MIS see p.
 #pragma once
 
+#include "wavecomb/integrate/steps/bounce_sampling.h"
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/learn/guide.h"
 
@@ -65,7 +68,7 @@ WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interacti
     if (none(guided)) return;
     const F& a = place.bsdf_share;
     const Mask<F> by_guide = guided & (r.w >= a);
-    // f |cos|, and the density of the BSDF.
+    // f |cos|, and the density without the field.
     Color<F> f_cos = b.weight * b.pdf;
     F p_bsdf = b.pdf;
     if (any(by_guide)) {
@@ -74,7 +77,8 @@ WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interacti
       const Mask<F> there = F(wi.z * wo.z) > 0.f;
       b.wi = select<F>(by_guide, wi, b.wi);
       f_cos = select<F>(by_guide, select<F>(there, e.f_cos, Color<F>(F(0.f))), f_cos);
-      p_bsdf = select(by_guide, select(there, e.pdf, F(0.f)), p_bsdf);
+      const F unguided = bounce_pdf(v, at.bsdf, wo, seen, wi, e);
+      p_bsdf = select(by_guide, select(there, unguided, F(0.f)), p_bsdf);
       b.is_delta = b.is_delta & not_(by_guide);
       b.eta = select(by_guide, F(1.f), b.eta);
     }
