@@ -212,7 +212,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   settings.check();
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
-  if (settings.transport != Transport::kAuto) return impl_->render(settings, {}, options, watch);
+  if (settings.transport != Transport::kAuto) {
+    // A light path shows light that is scattered once or more.
+    Settings used = settings;
+    if (used.max_depth == 0) used.transport = Transport::kPath;
+    return impl_->render(used, {}, options, watch);
+  }
   Impl::TrialMeans means{settings, {}};
   const TransportChoice choice = choose_transport(
       *impl_->scene, settings,

@@ -190,6 +190,10 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings,
     if (!refusal.what.empty()) choice.why = "light paths do not go with " + refusal.what;
     return !refusal.what.empty();
   };
+  if (settings.max_depth == 0) {
+    choice.why = "no light is scattered at a maximum depth of 0";
+    return choice;
+  }
   if (refused(light_path_refusal(settings)) || refused(light_path_refusal(scene))) return choice;
   try {
     (void)BackwardAutomaton(PathAutomaton(settings.expressions, scene.light_groups()));
