@@ -33,6 +33,7 @@
 
 #include "wavecomb/integrate/camera_connection.h"
 #include "wavecomb/integrate/light_path.h"
+#include "wavecomb/integrate/steps/connection.h"
 #include "wavecomb/integrate/steps/note_events.h"
 #include "wavecomb/integrate/vertex.h"
 #include "wavecomb/light/emission.h"
@@ -51,7 +52,7 @@ template <typename Bsdf, typename F, typename Interaction>
 struct LitPlace {
   const Interaction& at;
   Frame<F> frame;
-  Vec3<F> l;              ///< to the light, local
+  Vec3<F> l;              ///< to the light, as connections go (steps/connection.h), local
   F inverse_cos;          ///< 1 / |g l|
   Color<F> flux;          ///< that arrives
   F linked;               ///< F
@@ -73,6 +74,12 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
                                                          const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
+  // Towards what sent the flux, as a camera path's bounce would meet it.
+  Connection<F> c = connect_to_point<F>(at, v.path.o);
+  const Mask<F> afar = is_first & Mask<F>(v.path.receiver < UInt<F>(v.scene.lights.infinite_count));
+  c.o = select<F>(afar, at.origin(back), c.o);
+  c.d = select<F>(afar, back, c.d);
+  const F distance = select(afar, v.t, sqrt(c.distance2));
   LitPlace<Bsdf, F, Interaction> place{at,
                                        at.unbent_frame(v),
                                        {},
@@ -82,21 +89,21 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
                                        F(0.f),
                                        Mask<F>(false),
                                        Mask<F>(false)};
-  place.l = place.frame.to_local(back);
-  place.active = v.active & (cosine > 0.f) & at.is_consistent(back, place.l);
+  place.l = place.frame.to_local(c.d);
+  place.active = v.active & (cosine > 0.f) & (afar | c.valid) & at.is_consistent(c.d, place.l);
   if (const Mask<F> first = place.active & is_first; any(first)) {
-    LightReceiver<F> receiver(at.origin(back));
+    LightReceiver<F> receiver(c.o);
     if (v.scene.lights.by_tree && !Bsdf::kTransmits)
       receiver.normal = pack_normal<F>(select<F>(place.l.z < 0.f, -place.frame.n, place.frame.n));
     const LightReach<F> reach =
-        light_reach<F>(v.scene.lights, v.path.receiver, receiver, back, v.t, first);
+        light_reach<F>(v.scene.lights, v.path.receiver, receiver, c.d, distance, first);
     // Where nothing but deltas is, no light is sampled.
     place.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
     place.by_light_only = first & reach.is_delta;
   }
   if (v.settings.connects) {
     const Mask<F> links = place.active & (v.path.ratio > 0.f);
-    const F linked = F(v.t * v.t) / select(links, v.path.ratio, F(1.f));
+    const F linked = F(distance * distance) / select(links, v.path.ratio, F(1.f));
     place.linked = select(links, min(linked, F(kMostRatio)), F(0.f));
   }
   return place;
@@ -132,7 +139,7 @@ WAVECOMB_INLINE void ask_whether_seen(const Place& place, const Looker<F>& looke
                                       VertexResult<F>& out) {
   out.direct = clean<F>(light, 0.f);
   out.has_shadow = looker.sees & (max_component(out.direct) > 0.f);
-  out.shadow_o = place.at.origin(looker.w);
+  out.shadow_o = place.at.light_path_origin(looker.w);
   const Vec3<F> ray = to - out.shadow_o;
   const F length2 = length_squared(ray);
   const F size = sqrt(select(length2 > 0.f, length2, F(1.f)));
@@ -300,7 +307,7 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
   out.next.eta_scale = v.path.eta_scale;
   out.next.receiver = v.path.receiver;
   out.next.cone_width = out.next.cone_spread = F(0.f);
-  out.next.o = at.origin(d);
+  out.next.o = at.light_path_origin(d);
   const F largest = max_component(out.next.throughput);
   out.alive = place.active & goes & (b.pdf > 0.f) & at.is_consistent(d, b.wi) &
               not_(at.bends(v, place.frame, -d)) & (largest > 0.f) & is_finite(largest);

@@ -30,8 +30,6 @@
   KEYWORD template LightReach<F> light_reach<F>(const LightView&, const UInt<F>&,                  \
                                                 const LightReceiver<F>&, const Vec3<F>&, const F&, \
                                                 const Mask<F>&);                                   \
-  KEYWORD template UInt<F> chosen_light<F>(const LightView&, const LightReceiver<F>&, const F&,    \
-                                           const Mask<F>&);                                        \
   KEYWORD template Color<F> mesh_light_emission<F>(const SceneView&, const UInt<F>&,               \
                                                    const UInt<F>&, const Color<F>&,                \
                                                    const PathState<F>&, bool, const Mask<F>&);     \

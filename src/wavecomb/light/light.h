@@ -32,6 +32,7 @@ struct LightSample {
   F pdf;
   Mask<F> is_delta;
   Mask<F> valid;  ///< false: no light arrives; weight and pdf are 0, wi is finite
+  UInt<F> light;  ///< the light that was chosen, where there is one
 };
 
 /// Balance heuristic (E. Veach, "Robust Monte Carlo Methods", 1997, eq. 9.8): a / (a + b), 0 where
@@ -143,10 +144,12 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
                         Color<F>(zero),
                         zero,
                         Mask<F>(false),
-                        Mask<F>(false)};
+                        Mask<F>(false),
+                        UInt<F>(kNoLight)};
   if (view.count == 0 || none(wanted)) return result;
   const detail::LightPick<F> pick(view, to, u_pick, wanted);
   const UInt<F>& index = pick.light;
+  result.light = index;
   const Mask<F>& active = pick.active;
   const auto put = [&](const detail::KindSample<F>& s, const F& pick_pdf, const Mask<F>& lanes) {
     const F pdf = s.pdf * pick_pdf;

@@ -55,6 +55,9 @@ struct BsdfTraits {
   static const Wo& view(const Wo& wo) {
     return wo;
   }
+  /// Lanes whose light samples may lie on the other side of the surface. For programs that
+  /// transmit; a variant gives the same lanes as the whole program.
+  static bool passes_light() { return true; }
 };
 
 /// f(wo, wi) |cos theta_i| and the solid-angle density with which sample() would have chosen wi.

@@ -29,7 +29,7 @@ class WalksBelow {
   /// Walks of the reference: the path of a ray that led below a surface and hit `hit`. `keys`: of
   /// that ray, with the object. Afterwards the ray, in `path`, and its hit are those of who sees
   /// from outside where the walk has ended, if it `came_out`; false: it has ended below. Both are
-  /// as they were where the object is not met.
+  /// as they were where the object is not met, and light samples do not compete with the path.
   template <typename Hit>
   bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
             const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
@@ -39,7 +39,10 @@ class WalksBelow {
                                          std::exchange(path.cone_width, 0.f)),
                        0u, 0u, time, true);
     enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
-    if (walkers.size() == 0) return true;
+    if (walkers.size() == 0) {
+      path.pdf = 0.f;
+      return true;
+    }
     walkers.run<float>(context_.scene, *context_.accel, 1, keys, counts_.walk_steps,
                        counts_.walk_lanes,
                        [&](bool, uint32_t, const WalkEnd<float>& end, bool came) {
@@ -112,6 +115,8 @@ class WalksBelow {
     const auto leave = [&](const Mask<F>& lanes, const U& slot) {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
       path.receiver = U(0u);
+      // No light sample competes with it (steps/sample_light.h).
+      path.pdf = F(0.f);
       store_row<PathRow, F>(wave.pool.paths, slot, path, lanes);
     };
     enter<F>(walkers, keys, context_.traversal_width, leave);

@@ -135,7 +135,15 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   return s;
 }
 
-/// The origin of a ray that leaves `s` along `dir`, clear of the surface on that side.
+/// The origin of a ray that leaves `s` along `dir`, clear of the surface on that side, without the
+/// terminator vector.
+template <typename F>
+WAVECOMB_INLINE Vec3<F> clear_origin(const Surface<F>& s, const Vec3<F>& dir) {
+  return fma(s.ng, select(dot(dir, s.ng) > 0.f, s.offset, F(-s.offset)), s.p);
+}
+
+/// The origin of a ray that leaves `s` along `dir`, clear of the surface and of its terminator on
+/// that side.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> spawn_origin(const Surface<F>& s, const Vec3<F>& dir) {
   const Mask<F> outside = dot(dir, s.ng) > 0.f;

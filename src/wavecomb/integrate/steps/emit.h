@@ -76,7 +76,7 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
         mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);
   const Mask<F> emits = v.active & not_(is_black(emission));
   if (none(emits)) return Color<F>(F(0.f));
-  F light_pdf(0.f);
+  F light_pdf(0.f), others(0.f);
   if (scene.has_emissive_meshes) {
     const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
     const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
@@ -88,19 +88,17 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
                          triangle_light_pdf<F>(scene.lights, base + v.hit.prim,
                                                v.path.vertex_before(), v.path.dir, v.t, sampled),
                          F(0.f));
+    if constexpr ((kFeatures & kJoined) != 0)
+      if (v.joins_light() && v.depth > 0) [[unlikely]] {
+        const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
+        others = v.path.joined() * emission_density<F>(scene.lights, base + v.hit.prim, v.path.o,
+                                                       v.path.dir, v.t, known);
+      }
   }
   F w = bounce_weight<F>(v.path.pdf, light_pdf);
-  if constexpr ((kFeatures & kJoined) != 0) {
-    if (v.joins_light() && scene.has_emissive_meshes && v.depth > 0) [[unlikely]] {
-      const U place = placed_geometry<F>(scene, v.hit.inst, v.geom, emits);
-      const U base = gather<U>(scene.emissive_lights, place, Mask<U>(emits));
-      const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
-      const F density =
-          emission_density<F>(scene.lights, base + v.hit.prim, v.path.o, v.path.dir, v.t, known);
-      w = joint_bounce_weight<F>(v.path.pdf, light_pdf, not_(Mask<F>(v.path.pdf > 0.f)),
-                                 F(v.path.joined() * density));
-    }
-  }
+  if constexpr ((kFeatures & kJoined) != 0)
+    if (v.joins_light() && scene.has_emissive_meshes && v.depth > 0) [[unlikely]]
+      w = joint_bounce_weight<F>(v.path.pdf, light_pdf, not_(Mask<F>(v.path.pdf > 0.f)), others);
   const Color<F> e = clean<F>(at.throughput * emission * w, clamp_limit(v.settings, v.depth));
   return select<F>(emits, e, Color<F>(F(0.f)));
 }

@@ -75,6 +75,8 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   UInt<F> link_class(const Vertex<F, kFeatures>& v) const;
   /// Where a ray starts that leaves along `dir`.
   Vec3<F> origin(const Vec3<F>& dir) const;
+  /// Where a ray of a light path starts that leaves along `dir` (steps/connection.h).
+  Vec3<F> light_path_origin(const Vec3<F>& dir) const;
   /// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light
   /// leaks.
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
@@ -252,6 +254,11 @@ WAVECOMB_INLINE UInt<F> SurfaceInteraction<Bsdf, F>::link_class(
 template <typename Bsdf, typename F>
 WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::origin(const Vec3<F>& dir) const {
   return spawn_origin<F>(s, dir);
+}
+
+template <typename Bsdf, typename F>
+WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::light_path_origin(const Vec3<F>& dir) const {
+  return clear_origin<F>(s, dir);
 }
 
 template <typename Bsdf, typename F>

@@ -27,6 +27,7 @@
 /// with pi r^2 in place of 1 / (G |g w_k|). The bounce at x_k, if a delta, ends it.
 #pragma once
 
+#include "wavecomb/integrate/steps/connection.h"
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/integrate/steps/note_events.h"
 
@@ -53,15 +54,20 @@ struct JointVertex {
   F radius2;       ///< within this distance, squared
 
   /// R with this vertex for a direction `world` to the light, `local` in the frame, which light
-  /// samples or bounces take with density 1: p<- |g l| / |g w|.
+  /// samples or bounces take with density 1: p<- |g l| / |g w|. Lanes outside of `wanted` hold
+  /// anything.
   template <typename Bsdf, uint32_t kFeatures, typename Interaction>
   WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
-                            const Vec3<F>& world, const Vec3<F>& local) const {
+                            const Vec3<F>& world, const Vec3<F>& local,
+                            const Mask<F>& wanted) const {
     const F turn = abs(dot(at.s.ng, world)) * inverse_cos;
     F r = ratio * turn;
     if (v.depth > 0) {
-      const F back = at.bsdf.eval(at.bsdf.view(local), wo).pdf;
-      r *= select(merges, F(1.f), back);
+      const Mask<F> bounces = wanted & not_(merges) & (r > 0.f);
+      if (any(bounces)) {
+        const F back = at.bsdf.eval(at.bsdf.view(local), wo).pdf;
+        r *= select(bounces, back, F(1.f));
+      }
     }
     return v.settings.connects ? fma(linked, turn, r) : r;
   }
@@ -126,16 +132,14 @@ WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Inter
   ConnectionOffer<F>& offer = *v.offer;
   const Mask<F> wanted = offer.wanted & v.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
-  // From where light samples are taken.
-  const Vec3<F> way = offer.to - at.origin(-v.path.dir);
-  const F distance2 = length_squared(way);
-  const Vec3<F> w = way * F(1.f / sqrt(select(distance2 > 0.f, distance2, F(1.f))));
+  const Connection<F> c = connect_to_point<F>(at, offer.to);
+  const Vec3<F>& w = c.d;
   const Vec3<F> wi = frame.to_local(w);
   const BsdfEval<F> e = at.bsdf.eval(seen, wi);
-  const Mask<F> shown = wanted & (distance2 > 0.f) & at.is_consistent(w, wi);
+  const Mask<F> shown = wanted & c.valid & at.is_consistent(w, wi);
   const Color<F> light = at.throughput * e.f_cos * offer.vertices;
-  offer.row = {at.origin(w), e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
-               joint.template towards<Bsdf>(v, at, wo, w, wi)};
+  offer.row = {c.o, e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
+               joint.template towards<Bsdf>(v, at, wo, w, wi, shown)};
   if (v.wants_events()) [[unlikely]]
     offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, wo, wi);
 }
@@ -145,8 +149,9 @@ template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& at,
                              const JointVertex<F>& joint, const Vec3<F>& wo, const Vec3<F>& world,
                              const BsdfSample<F>& b) {
-  const F by_density =
-      joint.template towards<Bsdf>(v, at, wo, world, b.wi) / select(b.pdf > 0.f, b.pdf, F(1.f));
+  const Mask<F> by_pdf = not_(b.is_delta) & (b.pdf > 0.f);
+  const F by_density = joint.template towards<Bsdf>(v, at, wo, world, b.wi, by_pdf) /
+                       select(b.pdf > 0.f, b.pdf, F(1.f));
   F r = by_density;
   if (any(b.is_delta)) {
     const F z = abs(b.wi.z) * F(b.eta * b.eta);

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "wavecomb/integrate/steps/bounce_sampling.h"
+#include "wavecomb/integrate/steps/connection.h"
 #include "wavecomb/integrate/steps/guide_bounce.h"
 #include "wavecomb/integrate/steps/interact.h"
 #include "wavecomb/integrate/steps/join.h"
@@ -50,7 +51,7 @@ WAVECOMB_INLINE F joint_light_weight(const Vertex<F, kFeatures>& v, const Intera
   const F density = emission_density<F>(lights, light, from, l.wi, l.distance, l.valid);
   const Mask<F> point = l.is_delta & (l.distance < kFarAway);
   const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
-  const F by_path = F(joint.template towards<Bsdf>(v, at, wo, l.wi, wi) * density) / nee;
+  const F by_path = F(joint.template towards<Bsdf>(v, at, wo, l.wi, wi, l.valid) * density) / nee;
   return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
 }
 
@@ -59,12 +60,13 @@ namespace detail {
 /// A point of a light that a vertex may ask for.
 template <typename F>
 struct LightCandidate {
+  Vec3<F> origin;  ///< of the shadow ray
   Vec3<F> wi;
   F distance;
-  Color<F> c;            ///< what it brings if it is seen, over its density
-  F w;                   ///< its MIS weight, which is in c
-  Mask<F> valid;         ///< it may bring something; else c is anything
-  UInt<F> light;         ///< where somebody asks
+  Color<F> c;     ///< what it brings if it is seen, over its density
+  F w;            ///< its MIS weight, which is in c
+  Mask<F> valid;  ///< it may bring something; else c is anything
+  UInt<F> light;
   UInt<F> shadow_set;    ///< of linked lights
   ShadowReach<F> reach;  ///< of lights with effects
 };
@@ -77,20 +79,20 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
     const LightReceiver<F>& receiver, const UInt<F>& link, const Mask<F>& lit) {
   using U = UInt<F>;
   const LightView& lights = v.scene.lights;
-  const LightSample<F> l = sample_light<F>(lights, receiver, r.x, r.y, r.z, lit);
+  const LightConnection<F> c = connect_to_light<Bsdf, F>(v, at, receiver, r, lit);
+  const LightSample<F>& l = c.light;
   const Vec3<F> wi = frame.to_local(l.wi);
   const BsdfEval<F> e = at.bsdf.eval(seen, wi);
   const F p_bounce =
       mixed_pdf<Bsdf, F>(v, place, l.wi, wi, wo, bounce_pdf(v, at.bsdf, wo, seen, wi, e));
   F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
-  U light(kNoLight), set(0u);
+  const U& light = l.light;
+  U set(0u);
   const bool has_effects = v.has(kMeshLights) && lights.has_effects;
-  if (v.joins_light() || has_effects || v.has_links() || v.wants_lights()) [[unlikely]]
-    light = chosen_light<F>(lights, receiver, r.x, lit);
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     if (v.joins_light()) [[unlikely]]
-      w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, receiver.p);
+      w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, c.origin);
   ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
   if (has_effects) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);
@@ -105,14 +107,12 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
     w = select(shines_on<F>(lights, link, light, lit), w, F(0.f));
     set = shadow_set<F>(lights, light, lit);
   }
-  return {l.wi,
-          l.distance,
-          at.throughput * f_cos * l.weight * w,
-          w,
-          Mask<F>(lit & l.valid & at.is_consistent(l.wi, wi)),
-          light,
-          set,
-          reach};
+  Mask<F> valid = lit & l.valid & at.is_consistent(l.wi, wi);
+  // What enters a subsurface body there is the random walk's to find (medium/walk.h).
+  if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks)
+    valid = valid & not_(at.bsdf.enters(wo, wi));
+  return {c.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
+          light,    set,  reach};
 }
 
 /// How many points of lights a vertex on a fibre looks at.
@@ -151,6 +151,7 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
     const Mask<F> takes = u < q;
     u = select(takes, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));
     g = select(takes, h, g);
+    kept.origin = select<F>(takes, other.origin, kept.origin);
     kept.wi = select<F>(takes, other.wi, kept.wi);
     kept.distance = select(takes, other.distance, kept.distance);
     kept.c = select<F>(takes, other.c, kept.c);
@@ -163,13 +164,6 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
   }
   kept.c = kept.c * F(sum / select(g > 0.f, F(g * kN), F(1.f)));
   return kept;
-}
-
-/// The random number that points are chosen with; none of the sampler's.
-template <typename F>
-inline F candidate_number(const SampleKey<F>& key, uint32_t depth) {
-  using U = UInt<F>;
-  return unit_float<F>(hash_u32<U>(key.pixel_hash, U(key.sample + 0x7f4a7c15u * (depth + 1))));
 }
 
 }  // namespace detail
@@ -185,7 +179,6 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   const LightView& lights = v.scene.lights;
   const Mask<F> lit = v.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
-  // Light is gathered where reflected rays will start, so that both techniques agree.
   receiver.p = at.origin(-v.path.dir);
   const auto candidate = [&](const Sample4<F>& u) {
     return detail::light_candidate<Bsdf, F>(v, at, frame, wo, seen, u, place, joint, receiver,
@@ -194,17 +187,17 @@ WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interacti
   detail::LightCandidate<F> one = candidate(r);
   if constexpr (Bsdf::kOnFibre)
     if (lights.count > 1)
-      one = detail::resample<F>(one, r, detail::candidate_number<F>(v.key, v.depth), candidate);
+      one = detail::resample<F>(one, r, candidate_number<F>(v.key, v.depth), candidate);
   out.direct = clean<F>(one.c, clamp_limit(v.settings, v.depth + 1));
   out.has_shadow = one.valid & (max_component(out.direct) > 0.f);
   if (v.has_links()) [[unlikely]]
     out.shadow_set = one.shadow_set;
   if (v.wants_lights()) {
     v.aovs->lit_by = one.light;
-    v.aovs->lit_at = receiver.p;
+    v.aovs->lit_at = one.origin;
     v.aovs->light_weight = one.w;
   }
-  out.shadow_o = at.origin(one.wi);
+  out.shadow_o = one.origin;
   out.shadow_d = one.wi;
   out.shadow_tfar = one.distance * kShadowReach;
   if (v.has(kMeshLights) && lights.has_effects) [[unlikely]] {

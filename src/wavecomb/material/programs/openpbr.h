@@ -101,6 +101,14 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return walks_ & (wo.z > 0.f) & (wi.z < 0.f);
   }
 
+  /// Lanes whose light samples may lie on the other side of the surface.
+  Mask<F> passes_light() const {
+    Mask<F> passes(false);
+    if constexpr (kBack) passes = passes | not_(is_black(back_));
+    if constexpr (Base::kGlass) passes = passes | (base_.glass > 0.f);
+    return passes;
+  }
+
   /// A coat or a fuzz is seen from outside alone.
   Mask<F> is_layered() const {
     Mask<F> layered(false);

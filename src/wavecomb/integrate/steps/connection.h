@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Connections of a vertex with a light or with another vertex: origin, direction, distance and
+/// density.
+///
+/// A ray that leaves the surface at p starts at one of two origins, of which its side decides:
+///   o+ = p + terminator + offset n  outside,   o- = p - offset n  inside   (surface/surface.h).
+/// Bounces therefore estimate two integrals over solid angle, one about each origin,
+///   sum over s of  int_{s} f(wo, wi) |cos theta_i| L(o_s, wi) dwi,
+/// and emission that a bounce meets is weighted with the density of a light sample as seen from o_s
+/// (PathState::o). Light sampling estimates the same two integrals: a sample belongs to the side s
+/// that it lies on as seen from o_s. Direction, distance, density and shadow ray are those of o_s,
+/// so that densities of both techniques are of the same measure and their weights add up to 1.
+///
+/// Where p is not lifted the two origins differ by the rounding of p alone. One sample, from the
+/// viewer's side, then serves both, and only the length of its shadow ray depends on its side.
+/// Where p is lifted, the same random numbers are used from both origins. Both samples may lie on
+/// their sides; then one of them, chosen evenly, counts twice.
+///
+/// A vertex of a light path at p' arrives at p, not at o_s. It uses the connection from o_s to p',
+/// as a camera path's bounce does which meets p': light paths start at p', without its terminator.
+#pragma once
+
+#include "wavecomb/core/sampler.h"
+#include "wavecomb/integrate/path_state.h"
+#include "wavecomb/light/light.h"
+
+namespace wavecomb {
+
+/// A ray from the surface of a vertex to a point.
+template <typename F>
+struct Connection {
+  Vec3<F> o, d;
+  F distance2;
+  Mask<F> valid;  ///< the point lies on the same side of the surface as seen from `o`
+};
+
+/// The connection of the vertex `at` with the point `to`.
+template <typename F, typename Interaction>
+WAVECOMB_INLINE Connection<F> connect_to_point(const Interaction& at, const Vec3<F>& to) {
+  const Vec3<F> from_surface = to - at.s.p;
+  Connection<F> c;
+  c.o = at.origin(from_surface);
+  const Vec3<F> way = to - c.o;
+  c.distance2 = length_squared(way);
+  const Mask<F> apart = c.distance2 > 0.f;
+  c.d = way * F(1.f / sqrt(select(apart, c.distance2, F(1.f))));
+  const Mask<F> outside = dot(from_surface, at.s.ng) > 0.f, seen = dot(c.d, at.s.ng) > 0.f;
+  c.valid = apart & ((outside & seen) | not_(Mask<F>(outside | seen)));
+  return c;
+}
+
+/// A light sample and the origin of its shadow ray, from which its direction, distance and density
+/// are seen.
+template <typename F>
+struct LightConnection {
+  LightSample<F> light;
+  Vec3<F> origin;
+};
+
+/// A random number of a vertex that the sampler does not give.
+template <typename F>
+inline F candidate_number(const SampleKey<F>& key, uint32_t depth) {
+  using U = UInt<F>;
+  return unit_float<F>(hash_u32<U>(key.pixel_hash, U(key.sample + 0x7f4a7c15u * (depth + 1))));
+}
+
+namespace detail {
+
+template <typename F>
+inline LightSample<F> select_light(const Mask<F>& m, const LightSample<F>& a,
+                                   const LightSample<F>& b) {
+  const auto masks = [&](const Mask<F>& x, const Mask<F>& y) {
+    return Mask<F>((m & x) | (not_(m) & y));
+  };
+  return {select<F>(m, a.wi, b.wi),
+          select(m, a.distance, b.distance),
+          select<F>(m, a.weight, b.weight),
+          select(m, a.pdf, b.pdf),
+          masks(a.is_delta, b.is_delta),
+          masks(a.valid, b.valid),
+          select(Mask<UInt<F>>(m), a.light, b.light)};
+}
+
+}  // namespace detail
+
+/// Chooses a light and a point of it by the numbers `r`. `receiver.p` is the origin of rays towards
+/// the viewer.
+template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
+WAVECOMB_INLINE LightConnection<F> connect_to_light(const Vertex<F, kFeatures>& v,
+                                                    const Interaction& at,
+                                                    const LightReceiver<F>& receiver,
+                                                    const Sample4<F>& r, const Mask<F>& lit) {
+  const LightView& lights = v.scene.lights;
+  LightConnection<F> c{sample_light<F>(lights, receiver, r.x, r.y, r.z, lit), receiver.p};
+  if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits) {
+    const Vec3<F>& through = v.path.dir;
+    const auto outside = [&](const Vec3<F>& d) { return Mask<F>(dot(d, at.s.ng) > 0.f); };
+    const Mask<F> viewed_inside = outside(through);
+    const auto crosses = [&](const Vec3<F>& d) {
+      const Mask<F> out = outside(d);
+      return Mask<F>((out & viewed_inside) | not_(Mask<F>(out | viewed_inside)));
+    };
+    const Vec3<F> far = at.origin(through);
+    LightSample<F>& near = c.light;
+    const Mask<F> crossing = crosses(near.wi);
+    const F closer = dot(Vec3<F>(far - receiver.p), near.wi);
+    c.origin = select<F>(crossing, far, receiver.p);
+    const F distance = near.distance;
+    near.distance = select(crossing, max(F(distance - closer), F(0.f)), distance);
+    if constexpr (Bsdf::kHasTerminator) {
+      const Mask<F> lifted =
+          lit & Mask<F>(at.bsdf.passes_light()) & (length_squared(at.s.terminator) > 0.f);
+      if (any(lifted)) {
+        LightReceiver<F> beyond = receiver;
+        beyond.p = far;
+        LightSample<F> other = sample_light<F>(lights, beyond, r.x, r.y, r.z, lifted);
+        near.distance = select(lifted, distance, near.distance);
+        near.valid = near.valid & not_(Mask<F>(lifted & crossing));
+        other.valid = other.valid & lifted & crosses(other.wi);
+        const Mask<F> both = near.valid & other.valid;
+        const Mask<F> takes =
+            other.valid & (not_(near.valid) | (candidate_number<F>(v.key, v.depth) < 0.5f));
+        near = detail::select_light<F>(takes, other, near);
+        near.weight = near.weight * select(both, F(2.f), F(1.f));
+        c.origin = select<F>(lifted, select<F>(takes, far, receiver.p), c.origin);
+      }
+    }
+  }
+  return c;
+}
+
+}  // namespace wavecomb
