@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdShade
 
-from wavecomb.picture.working_space import from_rec709
+from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd import mtlx
 from wavecomb.usd.graphs.attributes import with_attributes
 from wavecomb.usd.graphs.node import GraphTooLarge
+from wavecomb.usd.looks.emission import mean_emission
 from wavecomb.usd.looks.network import shader_id
 from wavecomb.usd.looks.preview import PreviewReader
 from wavecomb.usd.looks.surface import (
@@ -149,6 +150,7 @@ class MaterialTable:
         self.glows = False
         """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
         self._emitting: set[int] = set()
+        self._emission: dict[int, tuple[Surface, float]] = {}
         self.cloudy: list[str] = []
         """Names of materials in use that refract and scatter inside."""
 
@@ -211,6 +213,7 @@ class MaterialTable:
         number = self._add(surface)
         if brightest > 0:
             self._emitting.add(number)
+            self._emission[number] = (surface, brightest)
             self.glows = self.glows or brightest >= LAMP
         return number
 
@@ -252,6 +255,7 @@ class MaterialTable:
             self._names.append(surface.name)
             if brightest > 0:
                 self._emitting.add(number)
+                self._emission[number] = (surface, 0.0)
         # Holding the surface keeps its address from being used again.
         self._surface_ids[id(surface)] = (surface, number)
         return number
@@ -300,6 +304,17 @@ class MaterialTable:
         if faces is None or not self._emitting:
             return material in self._emitting
         return bool(np.isin(faces, list(self._emitting)).any())
+
+    def mean_emission(self, material: int) -> float:
+        """Mean luminance of what a material emits over its surface; 0 where it is no lamp.
+
+        Textures count by the mean of their files; primvars by their highest value.
+        """
+        surface, highest = self._emission.get(material, (None, 0.0))
+        if surface is None or max(highest, surface.brightest()) < LAMP:
+            return 0.0
+        rgb = mean_emission(surface, self._textures)
+        return max(float(rgb @ np.array(LUMINANCE)), highest)
 
     def plain(
         self,

@@ -335,6 +335,27 @@ class TextureTable:
         path, space, wrap_s, wrap_t, _ = key
         return self._prepared(path, read_image(path), space, wrap_s, wrap_t)
 
+    def mean(self, number: int) -> NDArray[np.float64]:
+        """(4,) Linear mean of a texture's file, read once more; 1 where there is no file."""
+        key = next((key for key, known in self._ids.items() if known == number), ())
+        if len(key) == 3:  # of tiles
+            means = [self.mean(tile) for _, tile in key[1]]
+            return np.asarray(np.mean(means, axis=0)) if means else np.ones(4)
+        if len(key) != 5:
+            return np.ones(4)
+        try:
+            ready = self.again(number)
+        except (TextureError, OSError, ValueError):
+            return np.ones(4)
+        pixels = ready.pixels
+        values = pixels.astype(np.float32) / (255.0 if pixels.dtype == np.uint8 else 1.0)
+        colours = 3 if values.shape[2] >= 3 else 1
+        if ready.srgb and pixels.dtype == np.uint8:
+            values[..., :colours] = to_linear(values[..., :colours])
+        found = np.nan_to_num(values).mean(axis=(0, 1), dtype=np.float64)
+        alpha = found[colours] if len(found) > colours else 1.0
+        return np.array([*np.broadcast_to(found[:colours], 3), alpha])
+
     def missing(self) -> int:
         """Texture id of the checker that stands for a texture that cannot be read."""
         key = ("", "checker")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -24,6 +24,9 @@ MOST_STEPS = 64
 
 _MANY_BOXES = 1024
 """More are made one before others are added."""
+
+_MOST_SHOWN = 2048
+"""Boxes that are kept apart."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,19 @@ class Place:
         return Place(middle, _resampled(inner, count) @ _resampled(outside, count))
 
 
+@dataclass(frozen=True)
+class Emitter:
+    """An emissive mesh in its group's space.
+
+    Attributes:
+        centre: (3,) middle of its bounds.
+        areas: By material id, the area of faces with it.
+    """
+
+    centre: NDArray[np.float64]
+    areas: Mapping[int, float]
+
+
 @dataclass
 class Group:
     """Meshes, lights, volumes and instances that are placed together.
@@ -69,6 +85,8 @@ class Group:
         surfaced: The same of groups that hold surfaces to be refined.
         holds_placed: Whether lights or volumes are in it, or in what is placed in it.
         sampled_lamp: A mesh light in it that cannot move.
+        emitters: Emissive meshes in it, of stages without lights.
+        shown: The first boxes, none of which are joined.
     """
 
     name: str
@@ -84,6 +102,8 @@ class Group:
     sampled_lamp: Sdf.Path | None = None
     outlines: list[NDArray[np.float64]] = field(default_factory=list)
     outlined: int = 0
+    emitters: list[Emitter] = field(default_factory=list)
+    shown: list[NDArray[Any]] = field(default_factory=list)
 
     @property
     def empty(self) -> bool:
@@ -93,6 +113,8 @@ class Group:
     def grow(self, bounds: NDArray[Any]) -> None:
         """Makes the bounds hold others (2, 3) too."""
         self.boxes.append(bounds)
+        if len(self.shown) < _MOST_SHOWN:
+            self.shown.append(bounds)
         whole = self.bounds if len(self.boxes) > _MANY_BOXES else None
         if whole is not None:
             self.boxes = [whole]
@@ -169,6 +191,11 @@ def placed_volumes(group: Group, limit: int) -> list[tuple[Volume, Matrices]]:
     """All volumes of a group and of what is placed in it, at most ``limit``."""
     found = _placed(group, limit, lambda one: [(v, Place(m)) for v, m in one.volumes])
     return [(volume, place.middle) for volume, place in found]
+
+
+def placed_emitters(group: Group, limit: int) -> list[tuple[Emitter, Place]]:
+    """All emitters of a group and of what is placed in it, at most ``limit``."""
+    return _placed(group, limit, lambda one: [(e, Place(np.eye(4))) for e in one.emitters])
 
 
 def _placed(

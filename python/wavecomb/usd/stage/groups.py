@@ -27,6 +27,7 @@ from wavecomb.usd.looks.material import (
     MaterialTable,
     bound_materials,
 )
+from wavecomb.usd.stage.emitters import emitter_of
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.group import Group, Matrices, Scope
 from wavecomb.usd.stage.identity import LightGroups
@@ -86,13 +87,18 @@ class GroupBuilder:
         progress: LoadProgress | None = None,
         framed: NDArray[np.float64] | None = None,
         detail: StrandDetail | None = None,
+        notes_emitters: bool = False,
     ) -> None:
         """Makes one for a stage.
 
         ``cache``: arrays of meshes to take from and leave there; ``progress``: is told;
         ``framed``: directions (k, 3) in which a view asks how far the world reaches; groups keep
-        outlines for it; ``detail``: of curves that are in the world itself.
+        outlines for it; ``detail``: of curves that are in the world itself; ``notes_emitters``:
+        groups keep their emissive meshes. ``emits_otherwise`` says whether there is emission that
+        is not among these: of curves, points, splats, or of materials of instances.
         """
+        self.notes_emitters = notes_emitters
+        self.emits_otherwise = False
         self.stage = stage
         self.traversal = traversal
         self.time = traversal.time
@@ -263,6 +269,12 @@ class GroupBuilder:
             or material == INHERIT_MATERIAL
             or self.materials.any_emits(material, faces)
         )
+        if self.notes_emitters and self.materials.any_emits(material, faces):
+            if isinstance(shape, MeshArrays):
+                group.emitters.append(emitter_of(shape, material, faces))
+                group.holds_placed = True
+            else:
+                self.emits_otherwise = True
         options: dict[str, Any] = {
             "material": material,
             "name": name,
@@ -363,6 +375,8 @@ class GroupBuilder:
             if child is None:
                 continue
             material = self.worn.of_instance(placed, scope)
+            if self.materials.any_emits(material, None):
+                self.emits_otherwise = True
             steps = None if placed.track is None else placed.track.steps()
             count = 0 if steps is None else len(steps)
             batch = batches.setdefault((id(child), count), (child, [], [], [], []))

@@ -45,6 +45,7 @@ from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
 from wavecomb.usd.stage.catchers import IGNORED, check_there, set_catchers
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
+from wavecomb.usd.stage.emitters import light_what_is_drawn
 from wavecomb.usd.stage.frame_cache import FrameCache
 from wavecomb.usd.stage.group import Group, changes_size, placed_lights
 from wavecomb.usd.stage.groups import DRAWN_COUNTS, GroupBuilder, LoadProgress
@@ -323,13 +324,15 @@ def _read(
     groups_of = GroupBuilder(
         stage, traversal, builder, materials, groups, report, surfaces, meshes, progress,
         framed=planes if view is None else None,
-        detail=_strand_detail(view, choice.options, report),
+        detail=_strand_detail(view, choice.options, report), notes_emitters=not has_lights,
     )  # fmt: skip
     world = groups_of.world()
-    lit = materials.glows or has_lights or groups_of.mesh_lights.any or groups_of.volumes.glow
+    lit = has_lights or groups_of.mesh_lights.any or groups_of.volumes.glow
+    if materials.glows and not lit:
+        lit = groups_of.emits_otherwise or light_what_is_drawn(world, materials)
     _hold_out(stage, choice.options.holdouts, builder)
     catchers = set_catchers(stage, choice.options, rays.catchers, builder)
-    light_paths = _add_lights(world, lit, up_axis, textures, builder, report)
+    light_paths = _add_lights(world, lit, up_axis, textures, builder, report, materials.glows)
     volumes = add_volumes(world, builder, report, textures.origin)
     say_room(volumes, choice.options.texture_limit, report)
     say_cloudy(volumes, materials.cloudy, report)
@@ -408,8 +411,12 @@ def _add_lights(
     textures: TextureTable,
     builder: _core.SceneBuilder,
     report: LoadReport,
+    glows: bool,
 ) -> tuple[str, ...]:
-    """Adds all lights, or a soft dome where nothing else gives light (``lit``); their paths."""
+    """Adds all lights, or a soft dome where nothing else gives light (``lit``); their paths.
+
+    ``glows``: whether there are emissive materials all the same.
+    """
     lights = placed_lights(world, MAX_LIGHTS + 1)
     if len(lights) > MAX_LIGHTS:
         report.warn(f"more than {MAX_LIGHTS} lights: the rest is left out")
@@ -431,7 +438,11 @@ def _add_lights(
     if lit:
         report.note("no visible light; the scene is lit by emissive materials or not at all")
         return ()
-    report.note("no light: added a soft dome")
+    if glows:
+        what = "no light but emissive materials that light too little: added a soft dome"
+        report.note(f"{what} (a light of intensity 0 keeps it off)")
+    else:
+        report.note("no light: added a soft dome")
     texture = textures.add_pixels("soft dome", from_rec709(soft_dome(), textures.working))
     builder.add_light("dome", up_rotation(up_axis), name="soft dome", texture=texture)
     return ("",)
