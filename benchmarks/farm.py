@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a farm costs: a picture in tiles by N workers against one process with N threads.
+"""Compares an image in tiles by N workers with one process with N threads.
 
 python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --rounds 3
 
@@ -50,16 +50,44 @@ def timed(*words: object) -> tuple[float, float]:
     return time.perf_counter() - start, cpu_s() - before
 
 
-def small_tasks(stage: Path, count: int) -> tuple[float, float]:
-    """Seconds, of wall and processor, of one worker for each of so many tasks of a few pixels."""
-    from wavecomb import farm
+def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
+    """Milliseconds for each of so many tiles of 8 x 8 pixels beyond rendering them.
 
+    Tiles are rendered once by one process, without a scheduler, and once by the farm, whose workers
+    have their stage open before the clock starts. Both write the same part files.
+    """
+    from wavecomb import farm
+    from wavecomb.farm import client
+    from wavecomb.farm.machine_class import machine_class
+    from wavecomb.farm.rendering import Renderer
+
+    found = {}
     with tempfile.TemporaryDirectory() as place:
-        columns = max(1, round(count**0.5))
-        options = {"size": (columns * 2, columns * 2), "spp": 1, "threads": 1, "strict": False}
-        job = farm.submit(stage, Path(place, "a.exr"), tiles=f"{columns}x{columns}", **options)
-        wall, cpu = timed("farm", "worker", job.path, "--quiet")
-        return wall / columns**2, cpu / columns**2
+        options = {"size": (400, 8 * count // 50), "spp": 1, "threads": 1}
+        jobs = [
+            farm.submit(stage, Path(place, f"{name}.exr"), tiles=f"50x{count // 50}", **options)
+            for name in "ab"
+        ]
+        renderer, tasks = Renderer(jobs[0].job, threads=1), list(jobs[0].job.tasks())
+        for task in tasks[:workers]:
+            renderer.render(task, jobs[0].part(task), machine_class())
+        start = time.perf_counter()
+        for task in tasks[workers:]:
+            renderer.render(task, jobs[0].part(task), machine_class())
+        found["rendering_ms"] = 1e3 * (time.perf_counter() - start) / (len(tasks) - workers)
+        started: list[tuple[float, int]] = []
+
+        def show(outcome: client.Outcome) -> None:
+            done = outcome.tasks_done
+            if (done >= workers and not started) or (done == len(tasks) and len(started) == 1):
+                started.append((time.perf_counter(), done))
+
+        where = client.Where("local", workers)
+        client.run(jobs[1], where, threads=1, show=show)
+        (begin, first), (end, last) = started
+        found["wall_ms"] = 1e3 * (end - begin) / (last - first)
+    found["overhead_ms"] = found["wall_ms"] - found["rendering_ms"] / workers
+    return found
 
 
 def moving(stage: Path, place: Path, frames: int) -> Path:
@@ -103,7 +131,9 @@ def main() -> None:
     parser.add_argument("--tiles", default="auto")
     parser.add_argument("--way", choices=WAYS, default="plain")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--tasks", type=int, default=0, help="small tasks to time, too")
+    parser.add_argument(
+        "--tasks", type=int, default=0, help="tiles of 8 x 8 pixels to time, a multiple of 50"
+    )
     parser.add_argument("--frames", type=int, default=0, help="of a camera that moves")
     asked = parser.parse_args()
     picture = ["--size", *asked.size, "--spp", asked.spp, "--quiet", *WAYS[asked.way]]
@@ -129,7 +159,7 @@ def main() -> None:
         "ratios": [statistics.median(one["ratios"][i] for one in rounds) for i in range(2)],
     }  # fmt: skip
     if asked.tasks:
-        out["small_task_s"] = small_tasks(asked.stage, asked.tasks)
+        out["small_tasks"] = small_tasks(asked.stage, asked.workers, asked.tasks)
     print(json.dumps(out, indent=2))
 
 

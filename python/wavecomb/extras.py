@@ -27,7 +27,10 @@ class Extra:
 EXTRAS = {
     "gui": Extra("the window", ("PySide6.QtWidgets", "pyqtgraph")),
     "denoise": Extra("denoising", ("pyoidn",)),
-    "farm": Extra("farms on Dask, certificates", ("cryptography", "distributed")),
+    "farm": Extra(
+        "farms on Dask, Open Job Description",
+        ("bokeh", "cryptography", "distributed", "openjd.model"),
+    ),
     "bench": Extra(
         "SSIM, FLIP, z-tests, reports",
         ("flip_evaluator", "jinja2", "matplotlib", "pandas", "scipy"),

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from wavecomb.farm.folder import TODO, Folder
+from wavecomb.farm import Folder
+from wavecomb.farm.assemble import finish_image
 from wavecomb.farm.rendering import Renderer
 from wavecomb.picture.image import read_layers, read_metadata
 
@@ -26,16 +27,22 @@ def cornell_in(folder: Path) -> Path:
     return path
 
 
-def work(folder: Folder, worker: str = "me") -> list[dict[str, Any]]:
-    """Does all tasks of a job in this process; what came of them."""
-    renderer, results = Renderer(folder, threads=1), []
-    while entries := folder.entries(TODO):
-        mine = folder.claim(entries[0], worker)
-        assert mine is not None
-        results.append(renderer.do(mine.task))
-        assert folder.finish(mine, results[-1])
-    renderer.close()
-    return results
+MACHINE = "wavecomb-test"
+"""Class of machines in tests that render in this process."""
+
+
+def render_all(folder: Folder, image: int = 0, looks: int = 0) -> None:
+    """Renders all tiles of an image in this process."""
+    renderer = Renderer(folder.job, threads=1, learned=folder.learned())
+    for task in folder.job.tasks_of(image):
+        renderer.render(task, folder.part(task), MACHINE, looks)
+
+
+def work(folder: Folder) -> None:
+    """Renders all images of a job in this process, and writes them."""
+    for image in range(len(folder.job.images)):
+        render_all(folder, image)
+        assert finish_image(folder, image, MACHINE)["files"]
 
 
 def same(one: Path, two: Path, but: tuple[str, ...] = TIMES) -> None:

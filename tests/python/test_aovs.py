@@ -303,7 +303,7 @@ def test_split_files_are_all_there_or_none(picture: wavecomb.Picture, tmp_path: 
         (["--aov", "light_rim"], "the scene has no light group 'rim'"),
         (["--aov", "crypto", "--compression", "dwaa"], "compression dwaa would spoil Crypto"),
         (["--aov", "position", "--compression", "dwaa"], "compression dwaa would spoil position"),
-        (["--tile", "20"], "tiles of 20 pixels: must be a multiple of 16"),
+        (["--exr-tile", "20"], "tiles of 20 pixels: must be a multiple of 16"),
     ],
 )
 def test_refused_in_one_line(stage: Path, tmp_path: Path, options: list[str], message: str) -> None:

@@ -53,7 +53,7 @@ def same(a: Path, b: Path) -> bool:
     "words",
     [
         (),
-        ("--tile", "32"),
+        ("--exr-tile", "32"),
         ("--half", "--compression", "piz"),
         ("--aov", "position", "--aov", "light_groups"),
     ],

@@ -1,31 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A job in its parts: tiles, states of tasks, leases, blocks of pixels, assembled pictures."""
+"""A job in its parts: tiles, keys, part files, assembled images, jobs that are damaged."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import os
-import time
-from concurrent.futures import ThreadPoolExecutor
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from farm_jobs import cornell_in, same, work
+from farm_jobs import MACHINE, cornell_in, left_behind, render_all, same, work
 from parts import needs
 
 import wavecomb
 from wavecomb.errors import WavecombError
-from wavecomb.farm import Folder, repair, retry, status, submit
-from wavecomb.farm.assemble import check_cover
-from wavecomb.farm.folder import BUSY, DONE, FAILED, TODO, Entry
-from wavecomb.farm.leases import Beat, take_back
-from wavecomb.farm.part import DamagedPart, NarrowBorder, load_part
+from wavecomb.farm import Folder, status, submit
+from wavecomb.farm.assemble import NarrowBorder, check_cover, finish_image, is_finished, join
+from wavecomb.farm.job import Job, Task
+from wavecomb.farm.part import DamagedPart, has_part, load_part, read_part
+from wavecomb.farm.planning import refresh, with_files
 from wavecomb.farm.rendering import Renderer
-from wavecomb.farm.spec import Spec, Task
-from wavecomb.farm.tiling import border, choose_tiles, grown, looks, most_looks, tiles_of
+from wavecomb.farm.tiling import (
+    border,
+    choose_tiles,
+    grown,
+    layout,
+    looks,
+    most_looks,
+    parse_tile,
+    tiles_of,
+)
 from wavecomb.picture.image import read_layers
 from wavecomb.run.aovs import names
 
@@ -38,8 +45,9 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def job(stage: Path, folder: Path, **options: Any) -> Folder:
-    options = {"size": (40, 24), "spp": 4, "tiles": "3x2", "strict": False, **options}
-    return submit(stage, folder / "a.exr", **options)
+    options = {"size": (40, 24), "spp": 4, "tiles": "3x2", **options}
+    name = "a.#.exr" if "frames" in options else "a.exr"
+    return submit(stage, folder / name, **options)
 
 
 # ---- tiles ---------------------------------------------------------------------------------------
@@ -56,21 +64,33 @@ def test_tiles_cover_a_region(region: tuple[int, int, int, int], tiles: tuple[in
     [
         ([(0, 0, 4, 2)], "no tile has the pixel 0, 2"),
         ([(0, 0, 4, 3), (0, 2, 4, 4)], "lies over another"),
-        ([(0, 0, 4, 4), (0, 0, 5, 4)], "leaves the picture"),
+        ([(0, 0, 4, 4), (0, 0, 5, 4)], "leaves the image"),
     ],
 )
-def test_a_cover_that_is_none(tiles: list[Any], said: str) -> None:
+def test_a_cover_with_a_fault(tiles: list[Any], said: str) -> None:
     with pytest.raises(WavecombError, match=said):
         check_cover((0, 0, 4, 4), tiles)
 
 
 def test_tiles_that_are_chosen() -> None:
     full = [(0, 0, 1920, 1080)]
-    assert choose_tiles(full, 48, 4, False) == (1, 1), "whole frames are shared out"
+    assert choose_tiles(full, 48, 4, False) == (1, 1), "whole frames are distributed"
     columns, rows = choose_tiles(full, 1, 4, False)
     assert 12 <= columns * rows <= 24 and columns > rows
     assert choose_tiles(full, 1, 4, True) == (1, 1)
     assert choose_tiles([(0, 0, 100, 60)], 1, 64, False) == (1, 1), "not below 64 pixels"
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 12, 97])
+def test_a_layout_has_as_many_tiles_as_asked_for(count: int) -> None:
+    region = (0, 0, 192, 108)
+    assert len(tiles_of(region, layout(count, region))) == count
+    assert parse_tile(f"{count}/{count}") == (count - 1, count)
+    with pytest.raises(WavecombError, match="do not fit into 2 x 2 pixels"):
+        layout(5, (0, 0, 2, 2))
+    for text in ("0/4", "5/4", "x", "1", "-1/4", "1/4\n"):
+        with pytest.raises(WavecombError, match="must be I/N"):
+            parse_tile(text)
 
 
 def test_a_border_is_good_for_all_looks(stage: Path) -> None:
@@ -82,81 +102,214 @@ def test_a_border_is_good_for_all_looks(stage: Path) -> None:
     assert grown((4, 0, 8, 4), 3, (0, 0, 9, 9)) == (1, 0, 9, 7)
 
 
-# ---- states of tasks -----------------------------------------------------------------------------
-
-
-def test_one_of_many_gets_a_task(stage: Path, tmp_path: Path) -> None:
-    folder = job(stage, tmp_path)
-    entry = folder.entries(TODO)[0]
-    with ThreadPoolExecutor(8) as pool:
-        got = list(pool.map(lambda i: folder.claim(entry, f"w{i}"), range(8)))
-    assert sum(mine is not None for mine in got) == 1
-    assert folder.counts() == {TODO: 6, BUSY: 1, DONE: 0, FAILED: 0}
-
-
-def test_three_tries_and_the_rest_goes_on(stage: Path, tmp_path: Path) -> None:
-    folder = job(stage, tmp_path)
-    first = folder.entries(TODO)[0].task
-    for attempt in (1, 2, 3):
-        entry = next(e for e in folder.entries(TODO) if e.task == first)
-        assert entry.attempt == attempt
-        mine = folder.claim(entry, "w")
-        assert mine is not None and folder.fail(mine, f"reason {attempt}")
-    assert folder.ids(FAILED) == {first.id} and not folder.is_over()
-    for entry in folder.entries(TODO):
-        if not entry.task.is_join:
-            mine = folder.claim(entry, "w")
-            assert mine is not None and folder.finish(mine, {})
-    assert folder.is_over(), "the assembly waits for a tile that failed"
-    found = status(folder)
-    assert found["state"] == "failed"
-    assert (
-        found["failed"][0]["error"] == "reason 3" and "tile 1 of 6" in found["failed"][0]["title"]
-    )
-    assert folder.logs(first.id).count("failed on w: reason") == 3
-    assert retry(folder) == [first] and folder.entries(TODO)[0] == Entry(first, 1)
-
-
-def test_a_lease_that_ran_out(stage: Path, tmp_path: Path) -> None:
-    """Of a worker that hangs; what it says when it wakes up counts no more."""
-    folder = job(stage, tmp_path)
-    slow, quick = Beat(folder, {}, "slow"), Beat(folder, {}, "quick")
-    mine = folder.claim(folder.entries(TODO)[0], slow.name)
-    assert mine is not None and take_back(folder, quick.now()) == []
-    file = folder.path / "workers" / "slow.json"
-    past = time.time() - folder.spec.lease_s - 1
-    os.utime(file, (past, past))
-    assert take_back(folder, quick.now()) == [mine]
-    assert not folder.finish(mine, {}) and not folder.fail(mine, "late")
-    assert folder.entries(TODO)[0].attempt == 2
-
-
-def test_a_worker_that_is_no_more(stage: Path, tmp_path: Path) -> None:
-    """Its tasks need not wait for the lease: whoever is on its machine sees it."""
-    folder = job(stage, tmp_path)
-    beat = Beat(folder, {}, "gone")
-    mine = folder.claim(folder.entries(TODO)[0], beat.name)
-    assert take_back(folder) == []
-    beat.note(pid=2**22 - 1)
-    assert take_back(folder) == [mine]
+# ---- jobs ----------------------------------------------------------------------------------------
 
 
 def test_a_folder_is_whole_or_absent(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path)
-    assert Folder(folder.path).spec == folder.spec
-    assert [entry.task for entry in folder.entries(TODO)] == folder.spec.tasks()
+    assert Folder(folder.path).job == folder.job
+    assert len(list(folder.job.tasks())) == folder.job.task_count() == 6
     with pytest.raises(WavecombError, match="is there already"):
         job(stage, tmp_path)
-    assert sorted(os.listdir(tmp_path)) == ["a.farm"]
-    text = json.loads((folder.path / "job.json").read_text())
-    (folder.path / "job.json").write_text(json.dumps({**text, "format": 99}))
-    with pytest.raises(WavecombError, match="format 99"):
-        Folder(folder.path)
+    assert sorted(os.listdir(tmp_path)) == ["a.farm"] and os.listdir(folder.path) == ["job.json"]
     with pytest.raises(WavecombError, match="is no folder of a job"):
         Folder(tmp_path)
 
 
-# ---- pictures ------------------------------------------------------------------------------------
+def test_an_old_job_is_refused_in_one_line(tmp_path: Path) -> None:
+    old = {"kind": "wavecomb-farm-job", "format": 1, "id": "x", "version": "0.1.0", "shots": []}
+    (tmp_path / "job.json").write_text(json.dumps(old))
+    with pytest.raises(WavecombError) as caught:
+        Folder(tmp_path)
+    said = str(caught.value)
+    assert "job.json: is a job of format 1" in said and "\n" not in said
+    assert said.endswith("submit the job again")
+
+
+CHANGES: dict[str, Any] = {
+    "no shots": {"shots": []},
+    "no images": {"images": []},
+    "no tiles": {"tiles": [0, 1]},
+    "too many tiles": {"tiles": [10_000, 1]},
+    "tiles that are no numbers": {"tiles": ["3", 2]},
+    "one tile number": {"tiles": [3]},
+    "an image of no shot": {"images": [[7, None]]},
+    "a negative shot": {"images": [[-1, None]]},
+    "a frame that is none": {"images": [[0, "one"]]},
+    "a frame that is not finite": {"images": [[0, float("inf")]]},
+    "no tries": {"tries": 0},
+    "no patience": {"hang_s": 0},
+    "files that are none": {"files": [3]},
+    "files without hashes": {"files": [{"path": "x"}]},
+    "a tone map that is none": {"tone_map": "loud"},
+    "a field too few": {"stage": ...},
+    "too many tasks": {"images": [[0, n] for n in range(40_000)], "tiles": [6, 1]},
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_damaged_job_is_one_line(stage: Path, tmp_path: Path, change: str) -> None:
+    folder = job(stage, tmp_path)
+    value = {**json.loads((folder.path / "job.json").read_text()), **CHANGES[change]}
+    value = {name: entry for name, entry in value.items() if entry is not ...}
+    (folder.path / "job.json").write_text(json.dumps(value))
+    with pytest.raises(WavecombError, match=r"job\.json: is damaged: ") as caught:
+        Folder(folder.path)
+    assert "\n" not in str(caught.value) and "submit the job again" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"width": 0}, {"width": 1 << 20}, {"region": [5, 5, 5, 9]}, {"region": [0, 0, 99, 9]},
+     {"height": None}, {"region": "x"}],
+)  # fmt: skip
+def test_a_shot_that_is_damaged(stage: Path, tmp_path: Path, settings: dict[str, Any]) -> None:
+    folder = job(stage, tmp_path)
+    value = json.loads((folder.path / "job.json").read_text())
+    value["shots"][0]["settings"] |= settings
+    with pytest.raises(WavecombError, match="x: is damaged"):
+        Job.of(value, "x")
+
+
+def test_a_job_reads_back_as_it_is(stage: Path, tmp_path: Path) -> None:
+    folder = job(stage, tmp_path, frames="1-2")
+    found = folder.job
+    again = Job.of(json.loads(json.dumps(found.as_json())), "x")
+    assert again == found and again.id == found.id
+    assert found.title(1, 3) == "frame 2, tile 4 of 6" and found.title(0) == "frame 1"
+    assert dataclasses.replace(found, tiles=(100, 1)).tile_count(0) == 40
+
+
+def test_what_a_farm_refuses(stage: Path, tmp_path: Path) -> None:
+    for options, said in (
+        ({"time_limit": 5.0}, "--time-limit"),
+        ({"noise": 0.1, "spp": 64}, "--noise 0.1: is of the whole picture"),
+        ({"allocate": "error", "spp": 64}, "--allocate error"),
+        ({"roulette": "cost-aware", "costs": "measured"}, "--costs measured"),
+    ):
+        with pytest.raises(WavecombError, match=said):
+            job(stage, tmp_path, **options)
+    assert job(stage, tmp_path, noise=0.1, spp=64, tiles="auto").job.tiles == (1, 1)
+
+
+# ---- keys ----------------------------------------------------------------------------------------
+
+
+def test_a_key_names_all_that_decides_pixels(stage: Path, tmp_path: Path) -> None:
+    found = job(stage, tmp_path, frames="1-2").job
+    task = Task(0, 0)
+    key = found.part_key(task, MACHINE)
+    shot = found.shots[0]
+    others = [
+        found.part_key(Task(0, 1), MACHINE),
+        found.part_key(Task(1, 0), MACHINE),
+        found.part_key(task, "another machine"),
+        dataclasses.replace(found, version="0").part_key(task, MACHINE),
+        dataclasses.replace(found, files=()).part_key(task, MACHINE),
+        dataclasses.replace(found, learned="x").part_key(task, MACHINE),
+        dataclasses.replace(found, costs={"m": {"a": 1.0}}).part_key(task, MACHINE),
+        dataclasses.replace(
+            found, shots=(dataclasses.replace(shot, settings={**shot.settings, "seed": 9}),)
+        ).part_key(task, MACHINE),
+        dataclasses.replace(
+            found, shots=(dataclasses.replace(shot, aovs=(*shot.aovs, "uv")),)
+        ).part_key(task, MACHINE),
+    ]
+    assert len({key, *others}) == len(others) + 1
+    threads = dataclasses.replace(shot, settings={**shot.settings, "threads": 7})
+    more = dataclasses.replace(found, shots=(threads,), exposure=1.0, tries=9)
+    assert more.part_key(task, MACHINE) == key, "these change no pixel of a part"
+    assert more.output_key(0) != found.output_key(0)
+
+
+def test_a_stage_file_that_changes_changes_keys(stage: Path, tmp_path: Path) -> None:
+    here = tmp_path / "cornell.usdc"
+    shutil.copy(stage, here)
+    folder = job(here, tmp_path)
+    key = folder.job.part_key(Task(0, 0), MACHINE)
+    assert refresh(folder, with_files(folder.job)) == 0
+    with here.open("ab") as file:
+        file.write(b"\0")
+    assert refresh(folder, with_files(folder.job)) == 1
+    assert Folder(folder.path).job.part_key(Task(0, 0), MACHINE) != key
+
+
+# ---- parts ---------------------------------------------------------------------------------------
+
+
+def test_a_tile_holds_its_own_pixels(stage: Path, tmp_path: Path) -> None:
+    folder = job(stage, tmp_path, size=(400, 400), spp=1, tiles="4x4")
+    task = Task(0, 5)
+    Renderer(folder.job, threads=1).render(task, folder.part(task), MACHINE)
+    part = read_part(folder.part(task))
+    assert part.layers["beauty"].shape == (100, 100, 3)
+    assert part.layers["samples"].dtype == np.uint32
+    whole = wavecomb.render(stage, size=(400, 400), spp=1).stats["memory_bytes"]["film"]
+    assert part.stats["memory_bytes"]["film"] < whole / 12
+
+
+def damages(good: bytes, other: bytes) -> dict[str, bytes | None]:
+    """What may have become of a part's file."""
+    middle = len(good) // 2
+    return {
+        "missing": None,
+        "empty": b"",
+        "cut short": good[:middle],
+        "without its last byte": good[:-1],
+        "zeroed": bytes(len(good)),
+        "zeroed at its end": good[:middle] + bytes(len(good) - middle),
+        "another tile": other,
+        "no image": b"x" * len(good),
+        "one bit": good[:-9] + bytes([good[-9] ^ 1]) + good[-8:],
+    }
+
+
+def test_a_part_counts_only_if_it_is_right(stage: Path, tmp_path: Path) -> None:
+    folder = job(stage, tmp_path)
+    render_all(folder)
+    task, tile = Task(0, 2), folder.job.rectangles(0)[2]
+    file, key = folder.part(task), folder.job.part_key(task, MACHINE)
+    assert load_part(file, key, tile).tile == tile
+    assert not has_part(file, folder.job.part_key(task, "another machine"), tile)
+    assert not has_part(file, key, tile, looks=3), "its border is too narrow"
+    good = file.read_bytes()
+    for what, data in damages(good, folder.part(Task(0, 1)).read_bytes()).items():
+        file.unlink(missing_ok=True)
+        if data is not None:
+            file.write_bytes(data)
+        assert not has_part(file, key, tile), what
+        with pytest.raises(DamagedPart):
+            load_part(file, key, tile)
+        assert finish_image(folder, 0, MACHINE) == {"again": [2], "looks": 0}, what
+        assert not (tmp_path / "a.exr").exists()
+        assert status(folder).tasks_done == 5, what
+    file.write_bytes(good)
+    assert finish_image(folder, 0, MACHINE)["files"] and status(folder).state == "done"
+
+
+def test_bits_of_a_part_that_flip_anywhere_are_found(stage: Path, tmp_path: Path) -> None:
+    """Or they are in bytes that no reader looks at, and the pixels are right."""
+    folder = job(stage, tmp_path, size=(8, 8), spp=1, tiles="1x1")
+    render_all(folder)
+    file = folder.part(Task(0, 0))
+    good, first = file.read_bytes(), read_part(file)
+    found, steps = 0, range(0, len(good), max(1, len(good) // 200))
+    for place in steps:
+        file.write_bytes(good[:place] + bytes([good[place] ^ 0x10]) + good[place + 1 :])
+        try:
+            part = read_part(file, (8, 8))
+        except DamagedPart:
+            found += 1
+            continue
+        if part.key != first.key:
+            found += 1
+            continue
+        for name, layer in part.layers.items():
+            assert layer.tobytes() == first.layers[name].tobytes(), (place, name)
+    assert found > 0.8 * len(steps)
+
+
+# ---- images --------------------------------------------------------------------------------------
 
 ALL = [*(name for name in names() if name != "cost"), "light_groups"]
 """Costs are of the clock."""
@@ -164,7 +317,9 @@ KINDS: dict[str, dict[str, Any]] = {
     "plain": {},
     "all layers": {"aovs": ALL, "spp": 16},
     "a region": {"region": (7, 3, 33, 20), "aovs": ALL},
+    "a region in one tile": {"region": (7, 3, 33, 20), "tiles": "1x1"},
     "a crop": {"region": (7, 3, 33, 20), "crop": True, "aovs": ["crypto", "depth"]},
+    "one tile": {"tiles": "1x1", "aovs": ALL},
     "errors": {"error": True, "spp": 32},
     "adaptive": {"adaptive": 0.03, "spp": 48, "size": (96, 64)},
     "learned": {"guiding": "on", "roulette": "efficient", "spp": 160},
@@ -173,39 +328,40 @@ KINDS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_tiles_are_the_picture(stage: Path, tmp_path: Path, kind: str) -> None:
+def test_tiles_are_the_image(stage: Path, tmp_path: Path, kind: str) -> None:
     """Bit for bit, with all that the header says."""
     options = {"size": (40, 24), "spp": 4, **KINDS[kind]}
     folder = job(stage, tmp_path, **options, file={"half": False, "compression": "zip"})
     work(folder)
+    options.pop("tiles", None)
     whole = wavecomb.render(stage, **options)
     whole.save(tmp_path / "whole.exr")
     same(tmp_path / "a.exr", tmp_path / "whole.exr")
-    assert not list((folder.path / "parts").iterdir()), "tiles go when their picture is there"
-    assert status(folder)["state"] == "done"
+    assert not list((folder.path / "parts").iterdir()), "tiles go when their image is written"
+    assert status(folder).state == "done" and not left_behind(tmp_path)
     if kind == "adaptive":
         assert len(np.unique(whole.samples)) > 2, "or nothing is tested"
 
 
 @pytest.mark.slow
-def test_a_border_that_was_too_narrow(
-    stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_border_that_was_too_narrow(stage: Path, tmp_path: Path) -> None:
     """Is found out, and made wider."""
     options = {"size": (64, 48), "spp": 48, "adaptive": 0.03}
     folder = job(stage, tmp_path, **options)
-    monkeypatch.setattr("wavecomb.farm.rendering.most_looks", lambda settings: 1)
-    with pytest.raises(NarrowBorder, match="is good for 1 looks at errors"):
-        work(folder)
-    assert folder.give_back(folder.entries(BUSY)[0])
-    assert len(repair(folder)) == 6
-    work(folder)
+    render_all(folder, looks=1)
+    parts = (read_part(folder.part(task)) for task in folder.job.tasks_of(0))
+    with pytest.raises(NarrowBorder, match="is wide enough for 1 looks at errors"):
+        join(folder.job, 0, parts)
+    found = finish_image(folder, 0, MACHINE)
+    assert found["again"] == list(range(6)) and found["looks"] > 5
+    render_all(folder, looks=found["looks"])
+    assert finish_image(folder, 0, MACHINE)["files"]
     wavecomb.render(stage, **options).save(tmp_path / "whole.exr")
     same(tmp_path / "a.exr", tmp_path / "whole.exr")
 
 
 @needs("pyoidn")
-def test_denoised_once_when_it_is_whole(stage: Path, tmp_path: Path) -> None:
+def test_an_image_is_denoised_when_it_is_whole(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path, denoise=True, png=str(tmp_path / "a.png"))
     work(folder)
     whole = wavecomb.render(
@@ -218,85 +374,23 @@ def test_denoised_once_when_it_is_whole(stage: Path, tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
-def test_a_tile_holds_its_own_pixels(stage: Path, tmp_path: Path) -> None:
-    folder = job(stage, tmp_path, size=(400, 400), spp=1, tiles="4x4")
-    renderer = Renderer(folder, threads=1)
-    task = Task(0, "0005")
-    renderer.do(task)
-    part = load_part(folder.part(task), folder.spec.id, task)
-    assert part.layers["beauty"].shape == (100, 100, 3)
-    whole = wavecomb.render(stage, size=(400, 400), spp=1).stats["memory_bytes"]["film"]
-    assert part.stats["memory_bytes"]["film"] < whole / 12
-
-
-def test_tiles_that_are_damaged(stage: Path, tmp_path: Path) -> None:
-    folder = job(stage, tmp_path)
-    renderer = Renderer(folder, threads=1)
-    for entry in folder.entries(TODO)[:6]:
-        mine = folder.claim(entry, "w")
-        assert mine is not None
-        folder.finish(mine, renderer.do(mine.task))
-    join = Task(0, "join")
-    file = folder.part(Task(0, "0002"))
-    good = file.read_bytes()
-    file.write_bytes(good[: len(good) // 2])
-    with pytest.raises(DamagedPart, match="rendered again"):
-        renderer.do(join)
-    assert repair(folder) == [Task(0, "0002")]
-    file.unlink()
-    with pytest.raises(DamagedPart, match="is not there"):
-        renderer.do(join)
-    file.write_bytes(folder.part(Task(0, "0001")).read_bytes())
-    with pytest.raises(WavecombError, match=r"is task 000000\.0001 of job"):
-        renderer.do(join)
-    assert not (tmp_path / "a.exr").exists()
-
-
-def test_resume_renders_what_is_missing(stage: Path, tmp_path: Path) -> None:
-    folder = submit(
-        stage, tmp_path / "a.#.exr", frames="1-3", size=(16, 16), spp=1, tiles="2x1", strict=False
-    )
+def test_an_image_counts_only_with_the_bytes_that_were_written(stage: Path, tmp_path: Path) -> None:
+    """A truncated, zeroed or replaced file of an image is found, whatever kind it is."""
+    files = {"png": str(tmp_path / "a.png"), "stats": str(tmp_path / "a.json")}
+    folder = job(stage, tmp_path, file={"split": True}, aovs=["depth", "normal"], **files)
     work(folder)
-    assert repair(folder) == []
-    (tmp_path / "a.2.exr").unlink()
-    again = repair(folder)
-    assert [task.picture for task in again] == [1, 1, 1]
-    work(folder)
-    assert (tmp_path / "a.2.exr").exists()
-
-
-def test_what_a_farm_refuses(stage: Path, tmp_path: Path) -> None:
-    for options, said in (
-        ({"time_limit": 5.0}, "--time-limit"),
-        ({"noise": 0.1, "spp": 64}, "--noise 0.1: is of the whole picture"),
-        ({"allocate": "error", "spp": 64}, "--allocate error"),
-        ({"roulette": "cost-aware", "costs": "measured"}, "--costs measured"),
-    ):
-        with pytest.raises(WavecombError, match=said):
-            job(stage, tmp_path, **options)
-    assert job(stage, tmp_path, noise=0.1, spp=64, tiles="auto").spec.tiles == (1, 1)
-
-
-def test_a_job_says_what_it_is(stage: Path, tmp_path: Path) -> None:
-    folder = job(stage, tmp_path)
-    spec = folder.spec
-    assert Spec.of(json.loads(json.dumps(spec.as_json())), "x") == spec
-    assert [spec.title(task) for task in spec.tasks()][::6] == ["tile 1 of 6", "assembly"]
-    with pytest.raises(WavecombError, match="x: is damaged"):
-        Spec.of({**spec.as_json(), "pictures": 3}, "x")
-    assert dataclasses.replace(spec, tiles=(100, 1)).tile_count(0) == 40
-
-
-def test_a_page_that_needs_nothing_else(stage: Path, tmp_path: Path) -> None:
-    """Valid, names what failed in full, and loads itself anew while work goes on."""
-    html5lib = pytest.importorskip("html5lib")
-    from wavecomb.farm.page import page
-
-    folder = job(stage, tmp_path)
-    mine = folder.claim(folder.entries(TODO)[2], "w")
-    assert mine is not None and folder.fail(mine, "a <b> & c", is_final=True)
-    text = page(status(folder), 3)
-    html5lib.HTMLParser(strict=True).parse(text)
-    assert "a &lt;b&gt; &amp; c" in text and 'http-equiv="refresh"' in text
-    assert text.count('class="todo"') == 5 and text.count('class="failed"') == 1
-    assert "http://" not in text and "https://" not in text and "<script" not in text
+    written = sorted(file for file in tmp_path.iterdir() if file.is_file())
+    assert len(written) == 5, written
+    other = tmp_path / "a.depth.exr"
+    for file in written:
+        good = file.read_bytes()
+        for what, data in damages(good, other.read_bytes() + b"x").items():
+            file.unlink(missing_ok=True)
+            if data is not None:
+                file.write_bytes(data)
+            assert not is_finished(folder, 0), (file, what)
+        file.write_bytes(good)
+        assert is_finished(folder, 0)
+    assert status(folder).state == "done"
+    (folder.record(0)).write_text("[]")
+    assert not is_finished(folder, 0)

@@ -51,7 +51,7 @@ def aov_options(command: F) -> F:
 
 
 def file_options(command: F) -> F:
-    """--half, --compression, --tile and --split-aovs."""
+    """--half, --compression, --exr-tile and --split-aovs."""
     for option in (
         click.option(
             "--split-aovs",
@@ -60,7 +60,8 @@ def file_options(command: F) -> F:
             help="A file for each AOV, FILE.NAME.exr; the beauty is in FILE.exr.",
         ),
         click.option(
-            "--tile",
+            "--exr-tile",
+            "tile",
             type=click.IntRange(min=0),
             default=0,
             metavar="N",

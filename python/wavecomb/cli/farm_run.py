@@ -1,181 +1,142 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Works on a job with processes of this machine, and shows how far it is."""
+"""Works on a job and shows how far it is."""
 
 from __future__ import annotations
 
 import contextlib
-import os
+import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from wavecomb.cli.options import warn
 from wavecomb.errors import WavecombError
-from wavecomb.run.progress import progress_console
+from wavecomb.run.progress import Interrupt, progress_console, time_text
 
 if TYPE_CHECKING:
-    from wavecomb.farm.engines import Engine
-    from wavecomb.farm.folder import Folder
+    from wavecomb.farm.client import Outcome
+    from wavecomb.farm.clusters import Where
+    from wavecomb.farm.job import Folder
 
-_SHOW_S = 1.0
-KINDS = "local[:N]|ssh:HOSTS|dask:ADDRESS|slurm[:N]|none"
+_SHOW_S = 0.5
 
-
-def engine_options(command: Any) -> Any:
-    """Adds ``--on`` and certificates: ``engine``, ``tls_ca``, ``tls_cert``, ``tls_key``."""
-    for option in (
-        click.option(
-            "--on", "engine", default="local", metavar=KINDS,
-            help="Who renders: N workers on this machine, or one on each of HOSTS, with commas "
-            "between them, or one on each worker of a Dask cluster, or N that Slurm starts, until "
-            "all is done; or whoever runs `wavecomb farm worker`.  "
-            "[default: local: one worker on all cores]",
-        ),
-        click.option("--tls-ca", type=click.Path(), metavar="FILE",
-                     help="Who signed certificates, for dask:tls://HOST:PORT."),
-        click.option("--tls-cert", type=click.Path(), metavar="FILE", help="One's own."),
-        click.option("--tls-key", type=click.Path(), metavar="FILE", help="Its key."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
-
-
-def chosen_engine(text: str, ca: str | None, cert: str | None, key: str | None) -> Engine:
-    """What these options say. Raises WavecombError."""
-    from wavecomb.farm.dask_engine import Tls
-    from wavecomb.farm.engines import parse_engine
-
-    for path in (ca, cert, key):
-        if path is not None and not os.path.isfile(path):
-            raise WavecombError(f"{path}: no such file")
-    return parse_engine(text, Tls(ca, cert, key))
-
-
-PAGE = click.option(
-    "--page", is_flag=False, flag_value="0", default=None, metavar="[PORT]",
-    help="Serves a page, to this machine alone, that shows tiles as they arrive, the picture so "
-    "far, workers and logs.",
+ON = click.option(
+    "--on", default="local", metavar="local[:N]|dask:ADDRESS|slurm[:N]|none",
+    help="Where to render: N workers on this machine, the workers of a Dask cluster, N workers "
+    "that Slurm starts, or nowhere: only write the job.  [default: local: one worker on all cores]",
+)  # fmt: skip
+DASHBOARD = click.option(
+    "--dashboard", type=click.IntRange(0, 65535), is_flag=False, flag_value=0, default=None,
+    metavar="[PORT]",
+    help="Serve Dask's dashboard to this machine, and print its address.",
 )  # fmt: skip
 
 
-@contextlib.contextmanager
-def served(folder: Folder, page: str | None, *, err: bool = False) -> Iterator[None]:
-    """Serves the page of a job meanwhile, and says where; None: it does not.
-
-    Raises:
-        WavecombError: It cannot, or is asked to serve others.
-    """
-    if page is None:
-        yield
-        return
-    from wavecomb.farm.server import Server, parse_address
-
-    with Server(folder, *parse_address(page)) as server:
-        click.echo(f"page {server.url}", err=err)
-        yield
-
-
-def run_local(
+def run_job(
     folder: Folder,
-    engine: Engine,
-    threads: int,
+    where: Where,
     *,
-    page: str | None = None,
+    threads: int = 0,
+    dashboard: int | None = None,
     as_json: bool = False,
     quiet: bool = False,
 ) -> None:
-    """Has an engine work until nothing is left to do, and says what came of it.
+    """Has a cluster work on a job until all is done, and reports the result.
 
     Args:
         folder: The job's.
-        engine: Who works.
-        threads: Of each worker; 0: as is best.
-        page: As of ``served``; its address goes to standard error where a program reads the rest.
-        as_json: For programs.
-        quiet: Only errors.
+        where: The cluster.
+        threads: Of each local worker; 0 means: as is best.
+        dashboard: Port of Dask's dashboard; None means: there is none.
+        as_json: Progress and the result as a line of JSON each, for programs.
+        quiet: Only warnings and errors.
 
     Raises:
-        WavecombError: Tasks failed, or no worker may work on the job.
+        WavecombError: Tasks failed, or there are no workers.
         click.exceptions.Exit: Somebody stopped it.
     """
-    from wavecomb.farm.folder import say
-    from wavecomb.farm.state import status
+    from wavecomb.farm.client import run
 
-    if not (as_json or quiet):
-        tasks = sum(folder.counts().values())
-        many = f"{engine.count} workers" if engine.count > 1 else "a worker"
-        many = many if engine.count else "all workers of the cluster"
-        click.echo(f"job {folder.path}: {tasks} tasks for {many}")
-    local = engine.runner(folder, threads)
+    silent = as_json or quiet
+    if not silent:
+        click.echo(f"job {folder.path}: {folder.job.task_count()} tasks")
     started = time.monotonic()
-    with served(folder, page, err=as_json), _shown(folder, quiet or as_json) as look:
-        local.run(look)
-    state = status(folder, tasks=False)
+    with Interrupt() as interrupt, _shown(silent, as_json) as show:
+        out = run(
+            folder, where, threads=threads, dashboard=dashboard, show=show,
+            warn=lambda line: warn([line]), say=lambda line: click.echo(line, err=True),
+            is_stopped=lambda: interrupt.requested,
+        )  # fmt: skip
     if as_json:
-        click.echo(say(state))
-    if local.stopped is not None:
+        click.echo(json.dumps({"job": str(folder.path), **out.as_dict()}))
+    if out.stopped and out.state != "done":
         click.echo(
-            f"stopped: {_pictures(state)}; `wavecomb farm resume {folder.path}` goes on", err=True
+            f"stopped: {how_far(out)}; `wavecomb farm resume {folder.path}` continues", err=True
         )
-        raise click.exceptions.Exit(128 + local.stopped)
-    failed = state["failed"]
-    if failed:
-        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        raise click.exceptions.Exit(128 + (interrupt.signal or 2))
+    if out.failed:
+        title, line = out.failed[0]
+        more = f" and {len(out.failed) - 1} more" if len(out.failed) > 1 else ""
         raise WavecombError(
-            f"{_pictures(state)}; failed: {failed[0]['title']}: {failed[0]['error']}{more} "
-            f"(`wavecomb farm status {folder.path}` names all)"
+            f"{how_far(out)}; failed: {title}: {line}{more} (`wavecomb farm resume {folder.path}` "
+            "tries again)"
         )
-    if state["state"] != "done":
-        why = local.errors[0] if local.errors else f"{_pictures(state)}, and nobody works on it"
-        raise WavecombError(why)
-    if not (as_json or quiet):
-        from wavecomb.run.progress import time_text
-
-        click.echo(f"{_pictures(state)} in {time_text(time.monotonic() - started)}")
+    if out.state != "done":
+        raise WavecombError(f"{how_far(out)}; `wavecomb farm resume {folder.path}` continues")
+    if not silent:
+        click.echo(f"{how_far(out)} in {time_text(time.monotonic() - started)}")
 
 
-def _pictures(state: dict[str, Any]) -> str:
-    pictures = state["pictures"]
-    return f"{pictures['done']} of {pictures['all']} pictures are written"
+def how_far(out: Outcome) -> str:
+    """How much of a job is done."""
+    words = f"{out.images_done} of {out.images} images are written"
+    if out.images_done < out.images:
+        words += f", {out.tasks_done} of {out.tasks} tiles are rendered"
+    return words
 
 
 @contextlib.contextmanager
-def _shown(folder: Folder, silent: bool) -> Any:
-    """Gives what shows the progress of a job when it is called: a bar, where there is a console."""
+def _shown(silent: bool, as_json: bool) -> Any:
+    """Gives what shows how far a job is: a bar on a console, or lines of JSON for programs."""
+    if as_json:
+        yield _limited(lambda out: click.echo(json.dumps({"progress": out.as_dict()})))
+        return
     console = None if silent else progress_console()
     if console is None:
-        yield lambda: None
+        yield lambda out: None
         return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
     with Progress(
-        TextColumn("tasks"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[figures]}"),
-        console=console,
+        TextColumn("tiles"), BarColumn(), TaskProgressColumn(),
+        TextColumn("{task.fields[figures]}"), TimeRemainingColumn(), console=console,
         transient=True,
-    ) as bar:
-        yield _looker(folder, bar)
+    ) as bar:  # fmt: skip
+        task = bar.add_task("", total=None, figures="")
+
+        def show(out: Outcome) -> None:
+            failed = f", {len(out.failed)} failed" if out.failed else ""
+            figures = f"{out.images_done} of {out.images} images{failed}"
+            bar.update(task, completed=out.tasks_done, total=out.tasks, figures=figures)
+
+        yield show
 
 
-def _looker(folder: Folder, bar: Any) -> Callable[[], None]:
-    from wavecomb.farm.folder import BUSY, DONE, FAILED
+def _limited(show: Callable[[Outcome], None]) -> Callable[[Outcome], None]:
+    """At most one call in ``_SHOW_S``."""
+    due = [0.0]
 
-    task, due = bar.add_task("", total=None, figures=""), [0.0]
+    def limited(out: Outcome) -> None:
+        if time.monotonic() >= due[0]:
+            due[0] = time.monotonic() + _SHOW_S
+            show(out)
 
-    def look() -> None:
-        if time.monotonic() < due[0]:
-            return
-        due[0] = time.monotonic() + _SHOW_S
-        counts = folder.counts()
-        failed = f", {counts[FAILED]} failed" if counts[FAILED] else ""
-        bar.update(
-            task,
-            completed=counts[DONE],
-            total=sum(counts.values()),
-            figures=f"{counts[DONE]} done, {counts[BUSY]} at work{failed}",
-        )
-
-    return look
+    return limited

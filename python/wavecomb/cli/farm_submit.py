@@ -1,26 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb farm submit``."""
+"""``wavecomb farm submit``, and the hidden ``farm plan`` that reads the stage for it."""
 
 from __future__ import annotations
 
+import base64
+import json
 import os
+import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from wavecomb.cli.farm_run import PAGE, chosen_engine, engine_options, run_local
+from wavecomb import processes
+from wavecomb.cli.farm_run import DASHBOARD, ON, run_job
+from wavecomb.cli.farm_tiles import check_options, job_of
 from wavecomb.cli.frames import frame_options
-from wavecomb.cli.options import StageOptions, examples, stage_options
-from wavecomb.cli.planning import Asked, Prepared, prepare
+from wavecomb.cli.options import examples, isolation_options, stage_options
+from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.render import picture_options
 from wavecomb.cli.row_options import Real
+from wavecomb.cli.sandbox import enter_to_read, enter_to_render
 from wavecomb.cli.setting_options import SettingCommand
 from wavecomb.errors import WavecombError
-from wavecomb.run.learned import BEFORE
 
-if TYPE_CHECKING:
-    from wavecomb.farm.spec import Spec
+_PLAN_S = 4 * 3600.0
+"""For all files of a stage to be read and hashed."""
 
 
 @click.command(
@@ -29,42 +34,27 @@ if TYPE_CHECKING:
     epilog=examples(
         "wavecomb farm submit shot.usd -o out/shot.####.exr --frames 1-48 --on local:4",
         "wavecomb farm submit shot.usd -o shot.exr --size 3840 2160 --tiles 8x4 --on local:4",
-        "wavecomb farm submit shot.usd -o /share/shot.exr --job /share/shot.farm --on none",
+        "wavecomb farm submit /share/shot.usd -o /share/shot.exr --on dask:tls://HOST:8786",
     ),
 )
 @stage_options
 @frame_options
-@engine_options
+@ON
 @click.option(
     "--tiles",
     default="auto",
     metavar="auto|NxM",
-    help="Columns and rows of pixels that each picture is cut into.  [default: auto: whole "
-    "pictures where there are enough of them]",
-)
-@click.option(
-    "--chunk",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Pictures that a worker takes one after another, with the stage open.  [default: auto]",
+    help="Columns and rows of tiles that each image is cut into.  [default: auto: whole images "
+    "where there are two for each worker]",
 )
 @click.option("--job", metavar="DIR", help="The job's folder.  [default: NAME.farm beside -o]")
 @click.option(
     "--tries", type=click.IntRange(1, 100), default=3, metavar="N",
-    help="Of a task that fails.  [default: 3]",
+    help="How often a task that fails is tried.  [default: 3]",
 )  # fmt: skip
 @click.option(
-    "--lease", type=Real(1), default=60.0, metavar="S",
-    help="A worker without a sign of life for so long loses its task.  [default: 60]",
-)  # fmt: skip
-@click.option(
-    "--hang", type=Real(1), default=1800.0, metavar="S",
-    help="A render that says nothing for so long is ended.  [default: 1800]",
-)  # fmt: skip
-@click.option(
-    "--slow", type=Real(0), default=3.0, metavar="X",
-    help="A task that takes X times as long as others is begun elsewhere, too, where nothing else "
-    "is left to do; 0: never.  [default: 3]",
+    "--hang", "hang_s", type=Real(1), default=1800.0, metavar="S",
+    help="Restart a worker that makes no progress for S seconds.  [default: 1800]",
 )  # fmt: skip
 @click.option(
     "--strict/--no-strict",
@@ -72,160 +62,127 @@ if TYPE_CHECKING:
     help="Whether a texture or layer that is missing is an error.  [default: strict]",
 )
 @click.option(
-    "--assets",
-    type=click.Choice(["shared", "copy"]),
-    default="shared",
-    help="Whether workers see the files of the stage, or those that lack them get copies through "
-    "the job's folder.  [default: shared]",
-)
-@click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="A folder that lies elsewhere for workers that do not have it: of the stage and all files "
-    "that it names, and of the pictures.",
+    help="Folder FROM lies at TO on workers that do not have FROM: the stage, all files that it "
+    "names, and the images.",
 )  # fmt: skip
 @click.option(
     "--isa",
     metavar="NAME",
-    help="Library that all workers use (x86-64-v3 ...): machines of several kinds are one class "
-    "then, if their probe pictures agree.",
+    help="Library that all workers load (x86-64-v3 ...), so that older and newer machines can "
+    "render the same bits.",
 )
-@PAGE
+@DASHBOARD
 @click.option("--json", "as_json", is_flag=True, help="For programs.")
 @picture_options
 def submit_command(
-    engine: str,
-    tls_ca: str | None,
-    tls_cert: str | None,
-    tls_key: str | None,
-    tiles: str,
-    chunk: int | None,
-    job: str | None,
-    tries: int,
-    lease: float,
-    hang: float,
-    slow: float,
-    strict: bool,
-    assets: str,
-    maps: tuple[str, ...],
-    isa: str | None,
-    page: str | None,
-    as_json: bool,
-    **options: Any,
+    on: str, job: str | None, dashboard: int | None, as_json: bool, **options: Any
 ) -> None:
-    """Write a folder with tasks that render STAGE, and work on it.
+    """Render STAGE on a Dask cluster, or on several processes of this machine.
 
-    Options are those of `wavecomb render`. Pictures are, bit for bit, those of one process. Ctrl-C
-    keeps what is done, and `wavecomb farm resume` goes on. docs/farm.md says more.
+    Options are those of `wavecomb render`. Images are, bit for bit, those of one process. Ctrl-C
+    keeps what is done, and `wavecomb farm resume` continues. docs/farm.md says more.
     """
-    from wavecomb.farm.assets import ask_assets
+    from wavecomb.farm.clusters import parse_where
+    from wavecomb.farm.job import Folder, Job
     from wavecomb.farm.maps import parse_maps
-    from wavecomb.farm.server import parse_address
-    from wavecomb.farm.submitting import complete, create, default_folder
+    from wavecomb.farm.planning import default_folder
     from wavecomb.farm.tiling import parse_tiles
 
-    who = chosen_engine(engine, tls_ca, tls_cert, tls_key)
-    if page is not None:
-        parse_address(page)
-        if who.kind == "none":
-            raise WavecombError("--page: is for who works here; `wavecomb farm status --serve`")
-    cut = parse_tiles(tiles)
-    every = options["every"]
-    options["every"] = None
-    asked = Asked.take(options)
-    _check_options(asked)
-    if isa is not None:
+    where = parse_where(on)
+    parse_tiles(options["tiles"])
+    parse_maps(options["maps"])
+    if options["isa"] is not None:
         from wavecomb.isa import ISAS
 
-        if isa not in ISAS:
-            raise WavecombError(f"--isa {isa}: there are {', '.join(ISAS)}")
+        if options["isa"] not in ISAS:
+            raise WavecombError(f"--isa {options['isa']}: there are {', '.join(ISAS)}")
+    check_options(options)
+    path = job or default_folder(options["output"], options["stage"], options["output_dir"])
+    if os.path.lexists(path):
+        raise WavecombError(
+            f"{path}: is there already: `wavecomb farm resume` continues a job, and --job names "
+            "another folder"
+        )
+    told = ask_plan({**options, "workers": where.workers})
+    learned = None if told["learned"] is None else base64.b64decode(told["learned"])
+    folder = Folder.create(path, Job.of(told["job"], path), learned)
+    if where.kind == "none":
+        tasks = folder.job.task_count()
+        said = {"job": str(folder.path), "tasks": tasks}
+        click.echo(json.dumps(said) if as_json else f"job {folder.path}: {tasks} tasks")
+        return
+    run_job(folder, where, dashboard=dashboard, as_json=as_json, quiet=options["quiet"])
+
+
+def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
+    """Has a child process read the stage, so that a crash in a library is one line.
+
+    Args:
+        request: Options of ``farm submit``, or {"again": a job as JSON}.
+
+    Returns:
+        ``job`` as JSON, and ``learned``: base64 or None.
+
+    Raises:
+        WavecombError: What the child says.
+    """
+    words = processes.command("wavecomb", "farm", "plan", parent=0)
+    try:
+        done = subprocess.run(
+            words, input=json.dumps(request), capture_output=True, text=True, timeout=_PLAN_S
+        )
+    except subprocess.TimeoutExpired:
+        raise WavecombError(
+            f"the files of the stage were not read within {_PLAN_S / 3600:.0f} hours"
+        ) from None
+    lines = done.stderr.strip().splitlines()
+    if done.returncode:
+        raise WavecombError((lines[-1] if lines else "the stage was not read")[len("error: ") :])
+    for line in lines:
+        click.echo(line, err=True)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+@click.command("plan", hidden=True)
+@isolation_options
+def plan_command() -> None:
+    """Read a request of ``ask_plan`` on standard input and answer on standard output."""
+    from wavecomb.farm.job import Job
+    from wavecomb.farm.maps import parse_maps
+    from wavecomb.farm.planning import complete, with_files
+    from wavecomb.farm.tiling import parse_tiles
+
+    request = _tuples(json.load(sys.stdin))
+    if "again" in request:
+        enter_to_read(())
+        job = with_files(Job.of(request["again"], "the job"))
+        click.echo(json.dumps({"job": job.as_json(), "learned": None}))
+        return
+    own = {
+        name: request.pop(name)
+        for name in ("tiles", "tries", "hang_s", "strict", "maps", "isa", "workers")
+    }
+    asked = Asked.take(request)
+    enter_to_render(
+        asked.written(), asked.output, asked.output_dir, asked.frames, asked.source.frame,
+        split=asked.layers.split, gpu=False,
+    )  # fmt: skip
     prepared = prepare(asked)
     asked = prepared.asked
-    spec = _spec(
-        prepared, asked, every=every or 120.0, tries=tries, lease_s=lease, hang_s=hang,
-        slow=slow, strict=strict, assets=assets, maps=parse_maps(maps), isa=isa,
-    )  # fmt: skip
     learned = prepared.learning.given
-    spec = complete(spec, tiles=cut, workers=who.count, chunk=chunk, is_taught=learned is not None)
-    listed = ask_assets(asked.stage, _stage_words(asked.source)) if strict else None
-    path = job or default_folder(asked.output, asked.stage, asked.output_dir)
-    folder = create(spec, path, listed, learned=learned)
-    threads = int(spec.shots[0].settings.get("threads") or 0)
-    if who.kind == "none":
-        _say_folder(folder, as_json)
-        return
-    run_local(folder, who, threads, page=page, as_json=as_json, quiet=asked.quiet)
-
-
-def _check_options(asked: Asked) -> None:
-    """Raises WavecombError for options of ``render`` that a farm does without."""
-    purpose = asked.purpose
-    for option, given, instead in (
-        ("--checkpoint", purpose.checkpoint, "a job keeps checkpoints of its own (--every)"),
-        ("--resume", purpose.resume, "`wavecomb farm resume` goes on with a job"),
-        ("--preview", purpose.preview, "`wavecomb farm status` shows how far it is"),
-        ("--costs", asked.costs_file, "a file would be written by all workers; give --costs model"),
-        (
-            "--learn-from",
-            asked.learn_from if asked.learn_from == BEFORE else None,
-            "frames go to any worker in any order; give a file",
-        ),
-        (
-            "--learn-to",
-            asked.learn_to,
-            "a render keeps it, of one picture, and --learn-from gives it to the job",
-        ),
-        ("--deep", asked.deep, "tiles of deep pictures are not put together; give it to render"),
-        ("--film-memory", asked.film_memory, "--tiles say what a worker holds"),
-        ("--progress", purpose.progress if purpose.progress == "json" else None, "give --json"),
-    ):
-        if given is not None:
-            raise WavecombError(f"{option}: is not for a farm: {instead}")
-
-
-def _stage_words(source: StageOptions) -> list[str]:
-    """Options of ``farm assets`` that open the stage in the same way."""
-    words = []
-    for variant in source["variants"]:
-        words += ["--variant", variant]
-    if source["session_layer"] is not None:
-        words += ["--session-layer", source["session_layer"]]
-    return words
-
-
-def _spec(prepared: Prepared, asked: Asked, **more: Any) -> Spec:
-    """The job, still without tiles and chunks."""
-    from wavecomb.farm.spec import Spec
-    from wavecomb.farm.submitting import new_id, shot_of
-
-    shots, pictures = [], []
-    for index, (plan, numbers, job) in enumerate(prepared.jobs):
-        source = plan.source(prepared.source)
-        loading = source.for_load(None)
-        shots.append(
-            shot_of(
-                job.settings.to_dict(), job.aovs, loading, plan.names.output, plan.names.png,
-                plan.names.stats,
-            )
-        )  # fmt: skip
-        for frame in (source.frame,) if numbers is None else numbers:
-            names = plan.names if numbers is None else plan.names.at(frame or 0.0)
-            if not (asked.skip_existing and all(map(os.path.exists, names.all()))):
-                pictures.append((index, frame))
-    first = prepared.jobs[0][2]
-    return Spec(
-        id=new_id(), stage=asked.stage, folder=os.getcwd(), shots=tuple(shots),
-        pictures=tuple(pictures), file=asked.layers.file_options(), exposure=asked.exposure,
-        tone_map=asked.tone_map, denoise=asked.purpose.denoise, costs=first.profile,
-        command=("wavecomb", *sys.argv[1:]), **more,
+    job = job_of(
+        prepared, asked, tries=own["tries"], hang_s=own["hang_s"], strict=own["strict"],
+        maps=parse_maps(own["maps"]), isa=own["isa"],
     )  # fmt: skip
+    job = complete(job, tiles=parse_tiles(own["tiles"]), workers=own["workers"], learned=learned)
+    text = None if learned is None else base64.b64encode(learned).decode()
+    click.echo(json.dumps({"job": job.as_json(), "learned": text}))
 
 
-def _say_folder(folder: Any, as_json: bool) -> None:
-    from wavecomb.farm.folder import say
-
-    tasks = sum(folder.counts().values())
-    if as_json:
-        click.echo(say({"job": str(folder.path), "tasks": tasks}))
-        return
-    click.echo(f"job {folder.path}: {tasks} tasks")
-    click.echo(f"work on it with: wavecomb farm worker {folder.path}")
+def _tuples(value: Any) -> Any:
+    """Lists as tuples, as click gives them, but in jobs, which are JSON."""
+    if isinstance(value, dict):
+        return {key: v if key == "again" else _tuples(v) for key, v in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value

@@ -9,6 +9,7 @@ import click
 
 from wavecomb.cli.aovs import aov_options
 from wavecomb.cli.done import Done
+from wavecomb.cli.farm_tiles import TILE, check_tile, render_tile, tile_name
 from wavecomb.cli.frames import frame_options, open_frames, render_sequence
 from wavecomb.cli.job import how_far
 from wavecomb.cli.options import examples, isolation_options, stage_options
@@ -91,13 +92,15 @@ picture_options = add_options(
         "wavecomb render shot.usd -o shot.exr --spp 4096 --checkpoint shot.ckpt",
         "wavecomb render shot.usd -o shot.exr --resume shot.ckpt",
         "wavecomb render shot.usd -o shot.exr --policy adaptive --costs shot-costs.json",
+        "wavecomb render shot.usd -o shot.exr --size 7680 4320 --tile 3/8",
     ),
 )
 @stage_options
 @frame_options
 @isolation_options
+@TILE
 @picture_options
-def render_command(**options: Any) -> None:
+def render_command(part: str | None, **options: Any) -> None:
     """Render STAGE to an OpenEXR file, or its frames to one each.
 
     The file has the layers beauty (R, G, B), albedo, normal, depth and samples, or those that --aov
@@ -105,14 +108,23 @@ def render_command(**options: Any) -> None:
     SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
     all. docs/render.md and docs/aovs.md say more.
     """
+    chosen_tile = None if part is None else check_tile(part, options)
     asked = Asked.take(options)
+    written = asked.written()
+    if chosen_tile is not None:
+        written = (*written, tile_name(str(asked.output), *chosen_tile))
     enter_to_render(
-        asked.written(), asked.output, asked.output_dir, asked.frames, asked.source.frame,
+        written, asked.output, asked.output_dir, asked.frames, asked.source.frame,
         split=asked.layers.split, gpu=asked.purpose.denoise,
     )  # fmt: skip
     prepared = prepare(asked)
     asked = prepared.asked
     purpose, costs_file, stage = asked.purpose, asked.costs_file, asked.stage
+    if chosen_tile is not None:
+        files = render_tile(prepared, asked, chosen_tile)
+        if not asked.quiet:
+            click.echo(f"wrote {', '.join(files)}" if files else "all images are there")
+        return
     jobs, source, resumed, reporter = (
         prepared.jobs, prepared.source, prepared.resumed, prepared.reporter,
     )  # fmt: skip

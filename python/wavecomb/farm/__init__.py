@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A job on many workers: one picture, the same bits (docs/farm.md).
+"""Renders a job on many workers: the same bits as one process (docs/farm.md).
 
 >>> from wavecomb import farm
 >>> job = farm.submit("shot.usd", "out/shot.####.exr", frames="1-48")  # doctest: +SKIP
 >>> farm.run(job, workers=4)  # doctest: +SKIP
->>> farm.status(job)["state"]  # doctest: +SKIP
+>>> farm.status(job).state  # doctest: +SKIP
 'done'
 """
 
@@ -14,18 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from wavecomb.farm.api import run, submit
-    from wavecomb.farm.checking import repair, retry
-    from wavecomb.farm.folder import Folder
-    from wavecomb.farm.state import status
+    from wavecomb.farm.client import status
+    from wavecomb.farm.job import Folder
 
-__all__ = ["Folder", "repair", "retry", "run", "status", "submit"]
+__all__ = ["Folder", "run", "status", "submit"]
 
 _HOMES = {
-    "Folder": "wavecomb.farm.folder",
-    "repair": "wavecomb.farm.checking",
-    "retry": "wavecomb.farm.checking",
+    "Folder": "wavecomb.farm.job",
     "run": "wavecomb.farm.api",
-    "status": "wavecomb.farm.state",
+    "status": "wavecomb.farm.client",
     "submit": "wavecomb.farm.api",
 }
 
@@ -34,5 +31,7 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+        value = getattr(import_module(_HOMES[name]), name)
+        globals()[name] = value
+        return value
     raise AttributeError(f"module 'wavecomb.farm' has no attribute {name!r}")

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.engines import Engine
-from wavecomb.farm.folder import Folder
+from wavecomb.farm.job import Folder, Job, Task
 from wavecomb.farm.maps import parse_maps
-from wavecomb.farm.spec import Spec
-from wavecomb.farm.submitting import complete, create, default_folder, new_id, shot_of
-from wavecomb.farm.tiling import parse_tiles
+from wavecomb.farm.planning import complete, default_folder, shot_of
+from wavecomb.farm.tiling import parse_tile, parse_tiles
 from wavecomb.load_options import LoadOptions, split
 
 
@@ -26,7 +24,6 @@ def submit(
     tiles: str = "auto",
     job: str | os.PathLike[str] | None = None,
     workers: int = 0,
-    chunk: int | None = None,
     size: tuple[int, int] | None = None,
     spp: int = 64,
     aovs: Iterable[str] | None = None,
@@ -35,40 +32,40 @@ def submit(
     denoise: bool = False,
     file: dict[str, Any] | None = None,
     strict: bool = True,
-    assets: str = "shared",
     maps: Iterable[str] = (),
+    tries: int = 3,
+    hang_s: float = 1800.0,
     **options: Any,
 ) -> Folder:
-    """Writes the folder of a job. ``run``, or `wavecomb farm worker`, works on it.
+    """Writes the folder of a job, which ``run`` or `wavecomb farm resume` renders.
 
     Args:
         stage: A file.
-        output: The picture's file, for frames with a place for them: shot.####.exr.
-        frames: As of ``render_frames``; None: one picture.
+        output: The image's file, for frames with a place for them: shot.####.exr.
+        frames: As of ``render_frames``; None means: one image.
         tiles: "auto", or columns and rows such as "4x3".
-        job: The folder; None: beside the output.
-        workers: That are expected; 0: nobody knows.
-        chunk: Pictures that a worker takes one after another; None: as is best.
-        size: As of ``render``, like spp and aovs.
-        spp: Likewise.
-        aovs: Likewise.
-        png: Picture for display, too.
-        stats: Statistics as JSON, too.
-        denoise: Whether pictures get the layer ``denoised``.
+        job: The folder; None means: beside the output.
+        workers: How many are expected; 0 means: nobody knows.
+        size: As of ``render``.
+        spp: As of ``render``.
+        aovs: As of ``render``.
+        png: A PNG for display.
+        stats: Statistics as JSON.
+        denoise: Whether images get the layer ``denoised``.
         file: half, compression, tile and split of ``Picture.save``.
-        strict: Whether a file that is missing is an error.
-        assets: "shared", or "copy": workers that lack files of the stage get them from the folder.
+        strict: Whether a missing file is an error.
         maps: "FROM=TO": folders that lie elsewhere for workers that do not have them.
+        tries: How often a task is tried.
+        hang_s: A worker without progress for so many seconds is restarted.
         **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
 
     >>> job = submit("shot.usd", "shot.exr", tiles="8x4", spp=256)  # doctest: +SKIP
     >>> run(job, workers=4)  # doctest: +SKIP
 
     Raises:
-        WavecombError: Something is no good, or cannot be rendered on a farm.
+        WavecombError: An option is invalid, or a farm cannot render it.
     """
     from wavecomb.api import _asked_for
-    from wavecomb.farm.assets import ask_assets
     from wavecomb.run import aovs as aov_names
     from wavecomb.run.frame_names import has_place, parse_frames
     from wavecomb.run.settings import DEFAULT_SIZE, prepare
@@ -93,64 +90,125 @@ def submit(
         raise WavecombError("policy: a farm takes the name of one, not an object of this process")
     LoadOptions.of(None, loading).check()
     kept = names if not denoise else aov_names.expand(tuple(aovs or aov_names.DEFAULT))
-    shot = shot_of(chosen.to_dict(), kept, loading, name, png, stats)
-    spec = Spec(
-        id=new_id(), stage=stage, folder=os.getcwd(), shots=(shot,),
-        pictures=tuple((0, frame if number is None else number) for number in numbers),
-        file=file or {}, denoise=denoise, costs=profile, strict=strict, command=("wavecomb.farm",),
-        assets=assets, maps=parse_maps(maps),
+    done = Job(
+        stage=stage, folder=os.getcwd(),
+        shots=(shot_of(chosen.to_dict(), kept, loading, name, png, stats),),
+        images=tuple((0, frame if number is None else number) for number in numbers),
+        file=file or {}, denoise=denoise, costs=profile, strict=strict, maps=parse_maps(maps),
+        tries=tries, hang_s=hang_s,
     )  # fmt: skip
-    spec = complete(spec, tiles=parse_tiles(tiles), workers=workers, chunk=chunk)
-    if assets not in ("shared", "copy"):
-        raise WavecombError(f"assets: must be shared or copy, not {assets}")
-    listed = ask_assets(stage, _words(loading)) if strict else None
-    return create(spec, os.fspath(job or default_folder(name, stage)), listed)
-
-
-def _words(loading: dict[str, Any]) -> list[str]:
-    words = []
-    for key, value in (loading.get("variants") or {}).items():
-        words += ["--variant", f"{key}={value}"]
-    if loading.get("session_layer") is not None:
-        words += ["--session-layer", os.fspath(loading["session_layer"])]
-    return words
+    done = complete(done, tiles=parse_tiles(tiles), workers=workers)
+    return Folder.create(os.fspath(job or default_folder(name, stage)), done)
 
 
 def run(
     job: Folder | str | os.PathLike[str],
     workers: int = 1,
     *,
+    on: str | None = None,
     threads: int = 0,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[], bool | None] = lambda: None,
 ) -> list[Path]:
-    """Works on a job with processes of this machine until nothing is left to do.
+    """Renders what is missing of a job.
 
     Args:
         job: Of ``submit``, or a folder.
-        workers: How many processes.
-        threads: Of each; 0: as the job says, else its share of the cores.
-        progress: Called now and then.
+        workers: How many processes of this machine.
+        on: What `--on` says, in place of ``workers``: "dask:tls://HOST:8786".
+        threads: Of each process; 0 means: as the job says, else its share of the cores.
+        progress: Called now and then; True means: stop.
 
     Returns:
-        The pictures' files.
+        The images' files.
 
     Raises:
         WavecombError: Tasks failed; the others are done.
-        KeyboardInterrupt: Somebody stopped it; what was done is kept.
+        KeyboardInterrupt: ``progress`` stopped it; what was done is kept.
     """
-    from wavecomb.farm.state import status
+    from wavecomb.farm.client import run as run_job
+    from wavecomb.farm.clusters import parse_where
 
     folder = job if isinstance(job, Folder) else Folder(job)
-    wanted = threads or int(folder.spec.shots[0].settings.get("threads") or 0)
-    engine = Engine("local", workers).runner(folder, wanted)
-    engine.run(progress)
-    if engine.stopped is not None:
+    where = parse_where(on or f"local:{workers}")
+    stopped = [False]
+
+    def is_stopped() -> bool:
+        stopped[0] = stopped[0] or progress() is True
+        return stopped[0]
+
+    out = run_job(folder, where, threads=threads, is_stopped=is_stopped)
+    if out.failed:
+        title, line = out.failed[0]
+        raise WavecombError(f"{title}: {line}")
+    if out.stopped:
         raise KeyboardInterrupt
-    found = status(folder, tasks=False)
-    if found["failed"]:
-        one = found["failed"][0]
-        raise WavecombError(f"{one['title']}: {one['error']}")
-    if found["state"] != "done":
-        raise WavecombError(engine.errors[0] if engine.errors else "nobody works on the job")
-    spec = folder.spec
-    return [Path(spec.place(spec.names(i)["output"])) for i in range(len(spec.pictures))]
+    of = folder.job
+    return [Path(of.place(of.names(image)["output"])) for image in range(len(of.images))]
+
+
+def render_task(folder: Folder, image: int, tile: str) -> list[str]:
+    """Renders one tile of a job in this process, unless it is there.
+
+    Args:
+        folder: The job's.
+        image: From 1.
+        tile: "3/8", the third of eight.
+
+    Returns:
+        Warnings about the stage.
+
+    Raises:
+        WavecombError: There is no such task, or it cannot be rendered.
+    """
+    from wavecomb.api import import_usd
+    from wavecomb.farm.machine_class import machine_class
+    from wavecomb.farm.part import has_part
+    from wavecomb.farm.rendering import Renderer, check_files, looks_for, use_job_maps
+
+    job = folder.job
+    number, count = parse_tile(tile)
+    if image > len(job.images):
+        raise WavecombError(f"--image {image}: the job has {len(job.images)}")
+    if count != job.tile_count(image - 1):
+        raise WavecombError(f"--tile {tile}: images of this job have {job.tile_count(image - 1)}")
+    task, machine = Task(image - 1, number), machine_class()
+    rectangle = job.rectangles(task.image)[number]
+    looks = looks_for(job.shot(task.image)) if count > 1 else 0
+    key = job.part_key(task, machine)
+    if has_part(folder.part(task), key, rectangle, looks):
+        return []
+    import_usd()
+    use_job_maps(job)
+    check_files(job)
+    renderer = Renderer(job, learned=folder.learned())
+    renderer.render(task, folder.part(task), machine, looks)
+    return list(renderer.warnings)
+
+
+def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
+    """Joins the tiles of all images that are not finished, in this process.
+
+    Returns:
+        Files that were written, and a line for each image that lacks tiles.
+    """
+    from wavecomb.farm.assemble import finish_image, is_finished, machine_of
+
+    job, written, lacking = folder.job, [], []
+    for image in range(len(job.images)):
+        if is_finished(folder, image):
+            continue
+        machines = [machine_of(folder, task) for task in job.tasks_of(image)]
+        best = max(machines, key=machines.count)
+        missing = [tile for tile, machine in enumerate(machines) if machine != best or not machine]
+        if missing:
+            more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+            lacking.append(
+                f"{job.title(image, missing[0])}{more}: not rendered, or damaged, or of another "
+                "class of machines"
+            )
+            continue
+        found = finish_image(folder, image, best)
+        if found.get("again"):
+            lacking.append(f"{job.title(image)}: tiles must be rendered again: give it to resume")
+        written += found.get("files", [])
+    return written, lacking

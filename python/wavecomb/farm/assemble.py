@@ -1,50 +1,61 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tiles to a picture: the one that one machine would have rendered, bit for bit."""
+"""Joins tiles to the image that one process would have rendered, bit for bit, and writes it."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import shutil
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.folder import Folder
-from wavecomb.farm.part import NarrowBorder, Part, load_part
-from wavecomb.farm.spec import Shot, Spec
+from wavecomb.farm.job import Folder, Job, Shot, Task, write_json
+from wavecomb.farm.part import AOV, DamagedPart, Part, has_part, load_part, read_part
 from wavecomb.farm.tiling import Rectangle
 from wavecomb.picture.rendered import Picture
 from wavecomb.run.bands import sum_stats
+from wavecomb.run.stats import write_stats
 
-_AOV = "aov."
+_MORE_LOOKS = 4
+"""Looks at errors beyond those that were seen, where a border was too narrow."""
 
 
-def assemble(folder: Folder, picture: int) -> Picture:
-    """A picture of its tiles, without what is made of it afterwards (``denoised``).
+class NarrowBorder(WavecombError):
+    """Borders of adaptive tiles were too narrow: the tiles must be rendered again.
+
+    Attributes:
+        passes: The most passes that a tile took.
+    """
+
+    def __init__(self, message: str, passes: int) -> None:
+        super().__init__(message)
+        self.passes = passes
+
+
+def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
+    """Joins tiles, which are read one at a time, without what denoising adds.
 
     Raises:
         DamagedPart: A tile is missing or damaged.
-        WavecombError: The tiles do not cover the picture, each pixel once, or do not fit.
+        NarrowBorder: Borders of adaptive tiles were too narrow.
+        WavecombError: The tiles do not cover the image, each pixel once, or do not fit together.
     """
-    spec = folder.spec
-    tasks = spec.parts_of(picture)
-    rectangles = spec.rectangles(picture)
-    shot = spec.shot(tasks[0])
+    shot, rectangles = job.shot(image), job.rectangles(image)
     check_cover(shot.region, rectangles)
-    parts = (load_part(folder.part(task), spec.id, task) for task in tasks)
-    return join(spec, shot, zip(parts, rectangles, strict=True))
-
-
-def join(spec: Spec, shot: Shot, parts: Iterable[tuple[Part, Rectangle]]) -> Picture:
-    """A picture of parts, which are read one at a time, and where each has to lie."""
     x0, y0, _, _ = window = _window(shot)
     whole: dict[str, NDArray[Any]] = {}
     kept: list[Part] = []
     manifests: dict[str, dict[str, int]] = {}
-    for part, rectangle in parts:
+    for part, rectangle in zip(parts, rectangles, strict=True):
         if part.tile != rectangle:
-            raise WavecombError(f"{part.name}: lies at {part.tile}, and has to lie at {rectangle}")
+            raise WavecombError(f"{part.name}: lies at {part.tile} and must lie at {rectangle}")
         if not kept:
             whole = {name: _room(part, name, window) for name in part.layers}
         if part.layers.keys() != whole.keys():
@@ -58,13 +69,12 @@ def join(spec: Spec, shot: Shot, parts: Iterable[tuple[Part, Rectangle]]) -> Pic
         part.layers.clear()
         kept.append(part)
     _check_looks(kept)
-    named: dict[str, Any] = {n: array for n, array in whole.items() if not n.startswith(_AOV)}
-    aovs = {name[len(_AOV) :]: array for name, array in whole.items() if name.startswith(_AOV)}
+    named: dict[str, Any] = {n: array for n, array in whole.items() if not n.startswith(AOV)}
     return Picture(
         **{"albedo": None, "normal": None, "depth": None, **named},
-        stats=_stats(spec, shot, kept),
+        stats=_stats(job, shot, kept),
         costs=kept[-1].costs,
-        aovs=aovs,
+        aovs={n[len(AOV) :]: array for n, array in whole.items() if n.startswith(AOV)},
         # In the order of bytes, as the core sorts names.
         manifests={
             level: dict(sorted(names.items(), key=lambda one: one[0].encode()))
@@ -84,7 +94,7 @@ def check_cover(region: Rectangle, tiles: Sequence[Rectangle]) -> None:
     seen = np.zeros((y1 - y0, x1 - x0), np.uint8)
     for left, top, right, bottom in tiles:
         if not (x0 <= left < right <= x1 and y0 <= top < bottom <= y1):
-            raise WavecombError(f"tile {(left, top, right, bottom)} leaves the picture {region}")
+            raise WavecombError(f"tile {(left, top, right, bottom)} leaves the image {region}")
         block = seen[top - y0 : bottom - y0, left - x0 : right - x0]
         if block.any():
             raise WavecombError(f"tile {(left, top, right, bottom)} lies over another one")
@@ -95,19 +105,19 @@ def check_cover(region: Rectangle, tiles: Sequence[Rectangle]) -> None:
 
 
 def _window(shot: Shot) -> Rectangle:
-    """Pixels that the file holds."""
+    """The pixels that the image's file holds."""
     if shot.settings.get("crop") and shot.settings.get("region") is not None:
         return shot.region
     return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
 def _room(part: Part, name: str, window: Rectangle) -> NDArray[Any]:
-    """An array for a whole picture; pixels outside of the region hold what those do."""
+    """An array for a whole image; pixels outside the region hold the value without samples."""
     layer, empty = part.layers[name], part.empty.get(name)
     x0, y0, x1, y1 = window
     room: NDArray[Any] = np.empty((y1 - y0, x1 - x0, *layer.shape[2:]), layer.dtype)
     if empty is not None:
-        room[:] = empty[0, 0]
+        room[:] = empty
     return room
 
 
@@ -115,22 +125,148 @@ def _check_looks(parts: Sequence[Part]) -> None:
     """Raises NarrowBorder where a border was too narrow for what happened in another tile.
 
     If no tile took more passes than each border allows for, all decisions are those of the whole
-    picture: each is right within its tile as long as what it depends on was rendered.
+    image: each is right within its tile as long as the pixels that it depends on were rendered.
     """
     most = max(part.passes for part in parts)
     for part in parts:
         if 0 < part.looks < most:
             raise NarrowBorder(
-                f"{part.name}: its border is good for {part.looks} looks at errors, and a tile "
-                f"took {most}: all are rendered again with wider ones",
+                f"{part.name}: its border is wide enough for {part.looks} looks at errors, and a "
+                f"tile took {most}: all tiles must be rendered again with wider borders",
                 most,
             )
 
 
-def _stats(spec: Spec, shot: Shot, parts: Sequence[Part]) -> dict[str, Any]:
+def _stats(job: Job, shot: Shot, parts: Sequence[Part]) -> dict[str, Any]:
     """The statistics of tiles as those of one render."""
     out = sum_stats([part.stats for part in parts], shot.settings)
     del out["bands"]
     out["tiles"] = len(parts)
-    out["stage"] = spec.stage
+    out["stage"] = job.stage
     return out
+
+
+# ---- files ---------------------------------------------------------------------------------------
+
+
+def write_image(job: Job, image: int, picture: Picture, threads: int) -> list[str]:
+    """Writes PNG, statistics and at last the EXR, each whole or not at all.
+
+    Args:
+        job: The job.
+        image: Index of the image.
+        picture: Of ``join``.
+        threads: For denoising.
+
+    Returns:
+        The files.
+    """
+    if job.denoise:
+        picture = picture.with_denoised(threads=threads)
+    # The header says the settings of the whole image.
+    settings = dict(job.shot(image).settings)
+    picture = replace(picture, stats={**picture.stats, "settings": settings})
+    names = {kind: job.place(name) for kind, name in job.names(image).items()}
+    os.makedirs(os.path.dirname(names["output"]) or os.curdir, exist_ok=True)
+    written = []
+    if "png" in names:
+        picture.save(names["png"], exposure=job.exposure, tone_map=job.tone_map)  # type: ignore[arg-type]
+        written.append(names["png"])
+    if "stats" in names:
+        write_stats(names["stats"], picture.stats)
+        written.append(names["stats"])
+    return [str(name) for name in picture.save(names["output"], **job.file)] + written
+
+
+def write_record(folder: Folder, image: int, files: Sequence[str]) -> None:
+    """Notes the bytes with which an image was written, for ``is_finished``."""
+    file = folder.record(image)
+    file.parent.mkdir(exist_ok=True)
+    sums = {os.path.basename(name): file_hash(name) for name in files}
+    write_json(file, {"key": folder.job.output_key(image), "files": sums})
+
+
+def is_finished(folder: Folder, image: int, *, quick: bool = False) -> bool:
+    """Whether all files of an image are there, of this job, with the bytes that were written.
+
+    Args:
+        folder: The job's.
+        image: Index of the image.
+        quick: Whether it is enough that the files are there.
+    """
+    job = folder.job
+    try:
+        record = json.loads(folder.record(image).read_text(encoding="utf-8"))
+        if record["key"] != job.output_key(image):
+            return False
+        where = {os.path.basename(name): job.place(name) for name in job.names(image).values()}
+        beside = os.path.dirname(job.place(job.names(image)["output"]))
+        if not where.keys() <= record["files"].keys():
+            return False
+        for name, wanted in record["files"].items():
+            path = where.get(name, os.path.join(beside, name))
+            if not os.path.isfile(path) or not (quick or file_hash(path) == wanted):
+                return False
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+    return True
+
+
+def file_hash(path: str | os.PathLike[str]) -> str:
+    """SHA-256 of a file."""
+    found = hashlib.sha256()
+    with Path(path).open("rb") as file:
+        while block := file.read(1 << 20):
+            found.update(block)
+    return found.hexdigest()
+
+
+# ---- a job's images ------------------------------------------------------------------------------
+
+
+def machine_of(folder: Folder, task: Task) -> str:
+    """Class of the machine that rendered a tile; empty: there is no such part of this job."""
+    file = folder.part(task)
+    if not file.exists():
+        return ""
+    try:
+        part = read_part(file)
+    except DamagedPart:
+        return ""
+    return part.machine if part.key == folder.job.part_key(task, part.machine) else ""
+
+
+def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> dict[str, Any]:
+    """Joins the tiles of an image, writes its files, and removes the tiles.
+
+    Args:
+        folder: The job's.
+        image: Index of the image.
+        machine: Class of the machines that rendered the tiles.
+        threads: For denoising.
+
+    Returns:
+        ``files``; or ``again``, tiles that must be rendered first, and ``looks``, the looks at
+        errors that their borders must allow for, or 0.
+    """
+    job = folder.job
+    tasks = list(zip(job.tasks_of(image), job.rectangles(image), strict=True))
+    parts = (load_part(folder.part(t), job.part_key(t, machine), tile) for t, tile in tasks)
+    try:
+        picture = join(job, image, parts)
+    except NarrowBorder as error:
+        again = [task.tile for task, _ in tasks]
+        return {"again": again, "looks": error.passes + _MORE_LOOKS}
+    except DamagedPart:
+        if is_finished(folder, image):
+            return {"files": []}  # another client finished it and removed the tiles
+        again = [
+            task.tile
+            for task, tile in tasks
+            if not has_part(folder.part(task), job.part_key(task, machine), tile)
+        ]
+        return {"again": again, "looks": 0}
+    files = write_image(job, image, picture, threads)
+    write_record(folder, image, files)
+    shutil.rmtree(folder.parts(image), ignore_errors=True)
+    return {"files": files}

@@ -1,57 +1,52 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Classes of machines: those that give the same bits.
+"""Classes of machines that render the same bits.
 
-Two machines are of one class where they have the same version, the same native libraries, and the
-same bits in a small probe picture: Embree chooses its instructions by itself, and its last bits
-differ between them (docs/decisions/isa.md).
+Two machines are of one class if they have the same version, instruction set and native libraries,
+and render the same bits in a small probe image: Embree chooses its instructions by itself, and its
+last bits differ between them (docs/decisions/isa.md).
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from wavecomb.farm.files import read_json, write_json
-from wavecomb.farm.folder import Folder
 from wavecomb.version import version
 
-_WORDS = {
-    "version": "Wavecomb",
-    "isa": "instruction set",
-    "library": "native library",
-    "probe": "probe picture",
-}
-"""What makes a class, and what people call it."""
+PREFIX = "wavecomb-"
 _LIBRARIES = re.compile(r"lib(embree|tbb)[^/]*\.so")
+_OTHERS = re.compile(r"/(?!wavecomb\.)[^/]+\.libs/[^/]*$")
 
 
-def machine_class() -> dict[str, str]:
-    """The class of this machine."""
+@functools.cache
+def machine_class() -> str:
+    """The class of this machine: its instruction set, and a hash of all that makes its bits.
+
+    It is the name of a Dask resource.
+    """
     from wavecomb import _core
 
-    return {
-        "version": version(),
-        "isa": str(_core.build_info()["isa"]),
-        "library": library_hash(),
-        "probe": probe_hash(),
-    }
+    isa = re.sub(r"[^A-Za-z0-9-]", "-", str(_core.build_info()["isa"]))
+    facts = "\n".join((version(), isa, library_hash(), probe_hash()))
+    return f"{PREFIX}{isa}-{hashlib.sha256(facts.encode()).hexdigest()[:12]}"
 
 
 def library_hash() -> str:
-    """A hash of the native libraries that rendering is done by: ours, Embree, oneTBB."""
+    """A hash of the native libraries that render: ours, Embree, oneTBB."""
     from wavecomb import _core
 
     files = {os.path.realpath(str(_core.__file__))}
     with contextlib.suppress(OSError):
         lines = Path("/proc/self/maps").read_text(errors="replace").splitlines()
         mapped = {line.split(maxsplit=5)[-1] for line in lines if " /" in line}
+        # Wheels of other packages bring their own copies, which Wavecomb does not use.
+        mapped = {path for path in mapped if not _OTHERS.search(path)}
         files |= {path for path in mapped if _LIBRARIES.match(os.path.basename(path))}
     told = hashlib.sha256()
     for path in sorted(files, key=os.path.basename):
@@ -60,9 +55,9 @@ def library_hash() -> str:
 
 
 def probe_hash() -> str:
-    """A hash of a small picture: rough metal and glass over a floor, an area light, a sky.
+    """A hash of a small image: rough metal and glass over a floor, an area light, a sky.
 
-    Every library takes part in it: hierarchies, lanes, lights and BSDFs.
+    It needs every library: hierarchies, lanes, lights and BSDFs.
     """
     from wavecomb import _core
 
@@ -95,22 +90,3 @@ def probe_hash() -> str:
     if result.depth is not None:
         told.update(result.depth.tobytes())
     return told.hexdigest()[:16]
-
-
-def refusal(folder: Folder, mine: Mapping[str, Any], worker: str) -> str | None:
-    """Why this machine may not work on a job; None: it may.
-
-    The first worker of a job decides over its class.
-    """
-    file = folder.path / "class.json"
-    if not file.exists():
-        write_json(file, dict(mine), only_new=True)
-    wanted = read_json(file)
-    for key, word in _WORDS.items():
-        if mine.get(key) != wanted.get(key):
-            more = "; --isa of `farm submit` widens a class" if key != "version" else ""
-            return (
-                f"{worker} is of another class: its {word} is {mine.get(key)}, that of the job is "
-                f"{wanted.get(key)}, so its pictures would differ in their last bits{more}"
-            )
-    return None

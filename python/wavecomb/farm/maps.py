@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from wavecomb.errors import WavecombError
 
 Pair = tuple[str, str]
-"""What is named in a job and its stage, and where it lies here; both absolute."""
+"""A folder as a job and its stage name it, and where it lies here; both absolute."""
 
-VARIABLE = "WAVECOMB_FARM_MAPS"
-"""Those of this worker, for its renderer: JSON."""
+VARIABLE = "WAVECOMB_PATH_MAPS"
+"""Maps of a process as JSON; ``usd.stage.path_maps`` reads them."""
 
 
 def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
@@ -23,7 +23,7 @@ def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
     (('/Volumes/share', '/share'),)
 
     Raises:
-        WavecombError: One is none.
+        WavecombError: A text is no such pair.
     """
     found = []
     for text in texts:
@@ -34,16 +34,23 @@ def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
     return tuple(found)
 
 
-def set_own(pairs: Iterable[Pair]) -> None:
+def use_maps(pairs: Iterable[Pair]) -> None:
     """Has this process, and those that it starts, use maps of this machine."""
-    os.environ[VARIABLE] = json.dumps(list(pairs))
+    found = list(pairs)
+    if found:
+        os.environ[VARIABLE] = json.dumps(found)
+
+
+def own_maps() -> list[Pair]:
+    """The maps of this process."""
+    text = os.environ.get(VARIABLE)
+    return [(str(named), str(lies)) for named, lies in json.loads(text)] if text else []
 
 
 def here(pairs: Iterable[Pair]) -> list[Pair]:
-    """Maps that hold on this machine: its own, and of a job's those whose FROM is not there."""
-    text = os.environ.get(VARIABLE)
-    own = [(str(named), str(lies)) for named, lies in json.loads(text)] if text else []
-    return own + [pair for pair in pairs if not os.path.exists(pair[0])]
+    """Maps that hold on this machine: its own, and those of a job whose FROM is not there."""
+    found = own_maps()
+    return found + [p for p in pairs if p not in found and not os.path.exists(p[0])]
 
 
 def place(path: str, pairs: Iterable[Pair]) -> str:

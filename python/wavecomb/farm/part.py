@@ -1,71 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tiles of pictures on disk: exact blocks of all layers, and what is known of them.
+"""Rendered tiles on disk: an OpenEXR file whose header has a key and a checksum.
 
-A file is a NumPy archive that is not compressed: ``header``, JSON as bytes, and an array for each
-layer, as the core gave it. No pixel is shared by two tiles, so pixels are final values: what a
-whole picture holds at these places, bit for bit.
+The channels are all layers of the tile as floats, without loss. Attributes of the header:
+
+- ``wavecomb:part_key``: hash of all that decides the pixels (``Job.part_key``);
+- ``wavecomb:part_facts``: JSON; which layers the channels are, and what else the image needs;
+- ``wavecomb:part_checksum``: SHA-256 of the facts and the pixels.
+
+A part counts only if its key is the expected one and its checksum is right.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
 import os
-from collections.abc import Mapping
+import secrets
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.spec import Task
 from wavecomb.farm.tiling import Rectangle
-from wavecomb.picture.archive import ArchiveError, read_archive
-from wavecomb.picture.files import replacing
+from wavecomb.picture.files import one_line, problem_of, reason
 from wavecomb.picture.rendered import Picture
 from wavecomb.run.stats import plain
 
-KIND = "wavecomb-farm-part"
-FORMAT = 1
 _LAYERS = ("beauty", "albedo", "normal", "depth", "samples", "error", "variance")
-_AOV = "aov."
-_EMPTY = "empty."
+AOV = "aov."
+_KEY, _FACTS, _CHECKSUM = (f"wavecomb:part_{name}" for name in ("key", "facts", "checksum"))
+_EXACT = 1 << 24
+"""Whole numbers up to here are exact as floats; ``MAX_SPP`` is no more."""
 
 
 class DamagedPart(WavecombError):
-    """A tile's file is absent or damaged: the tile has to be rendered again."""
-
-
-class NarrowBorder(DamagedPart):
-    """Borders of adaptive tiles were too narrow.
-
-    Attributes:
-        passes: The most that a tile took.
-    """
-
-    def __init__(self, message: str, passes: int) -> None:
-        super().__init__(message)
-        self.passes = passes
+    """A tile's file is missing, damaged or of another key: the tile must be rendered again."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A tile.
+    """A rendered tile.
 
     Attributes:
-        name: Of its file.
-        tile: Where it lies.
-        layers: Arrays of the picture by name, AOVs with "aov." before it.
-        empty: Of each the value of a pixel without samples, where the picture has such.
+        name: Its file.
+        key: As in the header.
+        tile: Its pixels in the image.
+        layers: Arrays of the image by name; AOVs begin with "aov.".
+        empty: For each layer the value of a pixel without samples, where the image has such.
         stats: As ``make_stats`` gave them.
         metadata: As ``Picture.metadata``.
         manifests: As ``Picture.manifests``.
         costs: As ``Picture.costs``.
-        passes: Passes over the pixels, which are looks at errors in an adaptive render.
-        looks: Looks that its border allows for.
+        passes: Passes over the pixels; each is a look at errors in an adaptive render.
+        looks: Looks at errors that the border around the tile allows for.
+        machine: Class of the machine that rendered it.
+        job: The job as JSON, in parts that belong to no job's folder.
+        number: Index of the tile.
     """
 
     name: str
+    key: str
     tile: Rectangle
     layers: dict[str, NDArray[Any]]
     empty: dict[str, NDArray[Any]]
@@ -75,104 +74,225 @@ class Part:
     costs: dict[str, dict[str, float]]
     passes: int
     looks: int
+    machine: str
+    job: dict[str, Any] | None
+    number: int
 
 
 def layers_of(picture: Picture) -> dict[str, NDArray[Any]]:
-    """All arrays of a picture, under names of a part."""
+    """All arrays of an image under the names of a part."""
     found = {name: getattr(picture, name) for name in _LAYERS}
-    found |= {_AOV + name: array for name, array in picture.aovs.items()}
+    found |= {AOV + name: array for name, array in picture.aovs.items()}
     return {name: array for name, array in found.items() if array is not None}
 
 
+@contextlib.contextmanager
+def replacing_quickly(path: Path) -> Iterator[Path]:
+    """Gives a temporary name beside ``path`` and renames it, for folders of many files.
+
+    Unlike ``picture.files.replacing`` it does not search the folder for leftovers of killed
+    processes: the whole folder goes when its image is finished.
+    """
+    if not path.parent.is_dir():
+        path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.stem}.{secrets.token_hex(6)}.part{path.suffix}")
+    try:
+        yield part
+        os.replace(part, path)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, f"{path}: cannot be written: {reason(error)}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink()
+
+
 def save_part(
-    path: str | os.PathLike[str],
+    path: Path,
     picture: Picture,
     *,
-    job: str,
-    task: Task,
+    key: str,
+    number: int,
     tile: Rectangle,
     rendered: Rectangle,
+    machine: str,
     looks: int = 0,
     empty: Picture | None = None,
+    job: Mapping[str, Any] | None = None,
+    replacing: Any = replacing_quickly,
 ) -> None:
-    """Writes a tile; it is on the disk, and whole, when it has its name.
+    """Writes a tile, whole or not at all.
 
     Args:
         path: The file.
         picture: What was rendered.
-        job: Id of the job.
-        task: The tile's.
-        tile: Where it lies.
-        rendered: Where the picture lies: the tile, perhaps with a border.
-        looks: Looks at errors that this border allows for.
+        key: Of ``Job.part_key``.
+        number: Index of the tile.
+        tile: Its pixels in the image.
+        rendered: The pixels that ``picture`` has: the tile, perhaps with a border.
+        machine: Class of this machine.
+        looks: Looks at errors that the border allows for.
         empty: A picture whose last pixel has no samples.
+        job: The job as JSON, for a part without a job's folder.
+        replacing: Gives the temporary name.
     """
     x, y = tile[0] - rendered[0], tile[1] - rendered[1]
     width, height = tile[2] - tile[0], tile[3] - tile[1]
-    arrays: dict[str, Any] = {
-        name: np.ascontiguousarray(array[y : y + height, x : x + width])
-        for name, array in layers_of(picture).items()
+    arrays = {
+        name: array[y : y + height, x : x + width] for name, array in layers_of(picture).items()
     }
-    if empty is not None:
-        arrays |= {_EMPTY + name: array[-1:, -1:] for name, array in layers_of(empty).items()}
-    header = {
-        "kind": KIND, "format": FORMAT, "job": job, "task": task.id, "tile": list(tile),
+    facts = {
+        "tile": list(tile), "number": number, "machine": machine, "looks": looks, "job": job,
+        "layers": [[name, a.dtype.name, list(a.shape[2:])] for name, a in arrays.items()],
+        "empty": {} if empty is None else {
+            name: array[-1, -1].tobytes().hex() for name, array in layers_of(empty).items()
+        },
         "stats": plain(picture.stats), "metadata": _metadata_text(picture.metadata),
         "manifests": picture.manifests, "costs": plain(picture.costs),
-        "passes": int(picture.stats.get("passes", 0)), "looks": looks,
+        "passes": int(picture.stats.get("passes", 0)),
     }  # fmt: skip
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    with replacing(path, durable=True) as part, part.open("wb") as file:
-        np.savez(file, **arrays)
+    pixels = np.concatenate(
+        [_as_floats(array).reshape(height, width, -1) for array in arrays.values()], axis=2
+    )
+    text = json.dumps(facts)
+    attributes = {_KEY: key, _FACTS: text, _CHECKSUM: _checksum(text, pixels)}
+    with replacing(path) as part:
+        _write(part, path, pixels, attributes)
 
 
-def load_part(path: str | os.PathLike[str], job: str, task: Task) -> Part:
-    """Reads a tile.
+def _as_floats(array: NDArray[Any]) -> NDArray[np.float32]:
+    if array.dtype == np.float32:
+        return np.ascontiguousarray(array)
+    if array.dtype != np.uint32 or (array.size and int(array.max()) > _EXACT):
+        raise WavecombError(f"a layer of {array.dtype.name} has no exact place in a part")
+    return array.astype(np.float32)
+
+
+def _checksum(facts: str, pixels: NDArray[np.float32]) -> str:
+    found = hashlib.sha256(facts.encode())
+    found.update(np.ascontiguousarray(pixels).data)
+    return found.hexdigest()
+
+
+def _write(
+    file: Path, called: Path, pixels: NDArray[np.float32], attributes: Mapping[str, str]
+) -> None:
+    import OpenImageIO as oiio
+
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, "float")
+    spec.channelnames = tuple(f"c{k:05d}" for k in range(channels))
+    spec.attribute("compression", "zips")
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    output = oiio.ImageOutput.create(str(file))
+    if output is None:
+        raise OSError(f"{called}: no writer for OpenEXR: {one_line(oiio.geterror(), str(called))}")
+    good = output.open(str(file), spec) and output.write_image(pixels)
+    why = "" if good else problem_of(output)
+    if not (output.close() and good):
+        raise OSError(
+            f"{called}: cannot be written: {one_line(why or problem_of(output), str(file))}"
+        )
+
+
+def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None) -> Part:
+    """Reads a tile and compares its checksum.
+
+    Args:
+        path: The file.
+        size: The width and height that it must have; None means any.
 
     Raises:
-        DamagedPart: It is not there, or damaged.
-        WavecombError: It is of another job or tile.
+        DamagedPart: It is not there or damaged.
     """
     name = os.fspath(path)
     try:
-        header, arrays = read_archive(name)
-        if not isinstance(header, dict) or header.get("kind") != KIND:
-            raise ArchiveError("it is of another kind")
-        if header.get("format") != FORMAT:
-            raise WavecombError(f"{name}: is of format {header.get('format')}, not {FORMAT}")
-        if header["job"] != job or header["task"] != task.id:
-            raise WavecombError(
-                f"{name}: is task {header['task']} of job {header['job']}, not {task.id} of {job}"
-            )
-        x0, y0, x1, y1 = (int(edge) for edge in header["tile"])
-        _check_arrays(arrays, (y1 - y0, x1 - x0))
+        attributes, pixels = _read(name, size)
+        text = str(attributes[_FACTS])
+        if _checksum(text, pixels) != attributes[_CHECKSUM]:
+            raise ValueError("its checksum is wrong")
+        facts = json.loads(text)
+        layers, k = {}, 0
+        for layer, kind, rest in facts["layers"]:
+            count = int(np.prod(rest, dtype=int))
+            block = pixels[:, :, k : k + count].reshape(*pixels.shape[:2], *rest)
+            layers[layer] = block if kind == "float32" else block.astype(kind)
+            k += count
+        kinds = {layer: (kind, rest) for layer, kind, rest in facts["layers"]}
+        x0, y0, x1, y1 = (int(edge) for edge in facts["tile"])
         return Part(
-            name,
-            (x0, y0, x1, y1),
-            {key: array for key, array in arrays.items() if not key.startswith(_EMPTY)},
-            {key[len(_EMPTY) :]: a for key, a in arrays.items() if key.startswith(_EMPTY)},
-            dict(header["stats"]),
-            _metadata_of(header["metadata"]),
-            {level: dict(names) for level, names in header["manifests"].items()},
-            dict(header["costs"]),
-            int(header["passes"]),
-            int(header["looks"]),
-        )
+            name=name, key=str(attributes[_KEY]), tile=(x0, y0, x1, y1), layers=layers,
+            empty={
+                layer: np.frombuffer(bytes.fromhex(data), kinds[layer][0]).reshape(kinds[layer][1])
+                for layer, data in facts["empty"].items() if layer in kinds
+            },
+            stats=facts["stats"], metadata=_metadata_of(facts["metadata"]),
+            manifests=facts["manifests"], costs=facts["costs"], passes=facts["passes"],
+            looks=facts["looks"], machine=facts["machine"], job=facts["job"],
+            number=facts["number"],
+        )  # fmt: skip
     except FileNotFoundError:
-        raise DamagedPart(f"{name}: is not there; the tile has to be rendered again") from None
-    except (ArchiveError, KeyError, TypeError, ValueError, AttributeError) as error:
-        raise DamagedPart(
-            f"{name}: is damaged: {error}; the tile has to be rendered again"
-        ) from None
+        raise DamagedPart(f"{name}: is not there; the tile must be rendered again") from None
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        why = error.args[0] if error.args else type(error).__name__
+        raise DamagedPart(f"{name}: is damaged: {why}; the tile must be rendered again") from None
 
 
-def _check_arrays(arrays: Mapping[str, NDArray[Any]], size: tuple[int, int]) -> None:
-    if not {"beauty", "samples"} <= arrays.keys():
-        raise ArchiveError("it lacks a layer")
-    for name, array in arrays.items():
-        wanted = (1, 1) if name.startswith(_EMPTY) else size
-        if array.ndim not in (2, 3) or array.shape[:2] != wanted:
-            raise ArchiveError(f"its layer {name} is of another size")
+def load_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> Part:
+    """Reads a tile that must have a key.
+
+    Args:
+        path: The file.
+        key: Of ``Job.part_key``.
+        tile: Its pixels in the image.
+        looks: Looks at errors that its border must allow for.
+
+    Raises:
+        DamagedPart: It is missing, damaged, of another key, or its border is too narrow.
+    """
+    part = read_part(path, (tile[2] - tile[0], tile[3] - tile[1]))
+    if part.key != key or part.tile != tile:
+        raise DamagedPart(f"{path}: is of other settings, files or machines than the job")
+    if part.looks < looks:
+        raise DamagedPart(f"{path}: its border is too narrow for {looks} looks at errors")
+    return part
+
+
+def has_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> bool:
+    """Whether ``load_part`` would give a tile."""
+    if not path.exists():
+        return False
+    try:
+        load_part(path, key, tile, looks)
+    except DamagedPart:
+        return False
+    return True
+
+
+def _read(name: str, size: tuple[int, int] | None) -> tuple[dict[str, Any], NDArray[np.float32]]:
+    import OpenImageIO as oiio
+
+    with open(name, "rb") as file:  # its errors have numbers, which those of OpenImageIO lack
+        if file.read(4) != b"\x76\x2f\x31\x01":
+            raise ValueError("it is no OpenEXR file")
+    source = oiio.ImageInput.open(name)
+    if source is None:
+        raise ValueError(one_line(problem_of(oiio), name))
+    try:
+        spec = source.spec()
+        if spec.depth > 1 or spec.deep or (size and (spec.width, spec.height) != size):
+            raise ValueError("it has another size")
+        attributes = {one.name: one.value for one in spec.extra_attribs}
+        order = sorted(range(spec.nchannels), key=lambda k: spec.channelnames[k])
+        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+        if pixels is None:
+            raise ValueError(one_line(problem_of(source), name))
+    finally:
+        source.close()
+    shaped = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, spec.nchannels)
+    return attributes, shaped if order == list(range(len(order))) else shaped[:, :, order]
 
 
 def _metadata_text(metadata: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a farm cannot do, said when a job is submitted."""
+"""Settings that a farm refuses when a job is submitted."""
 
 from __future__ import annotations
 

@@ -1,207 +1,132 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the tasks of a job; the stage stays open from task to task."""
+"""Renders tiles of a job; the stage and the renderer stay loaded from tile to tile."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import assemble
-from wavecomb.farm.at_hand import stage_place
-from wavecomb.farm.files import read_json, write_json
-from wavecomb.farm.folder import Folder
-from wavecomb.farm.output import write_picture
-from wavecomb.farm.part import NarrowBorder, save_part
-from wavecomb.farm.spec import Shot, Task
+from wavecomb.farm.assemble import file_hash
+from wavecomb.farm.job import Job, Shot, StageFile, Task
+from wavecomb.farm.maps import here, use_maps
 from wavecomb.farm.tiling import Rectangle, border, grown, most_looks
 from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run.bands import without_samples
-from wavecomb.run.checkpoint import Checkpoint, check_fits, load_checkpoint, make_header
-from wavecomb.run.learned import load_learned
 from wavecomb.run.sequence import Frames
 from wavecomb.run.settings import check_memory
-from wavecomb.run.watcher import CheckpointSink, Reporter, Watcher
+from wavecomb.run.watcher import Reporter, Watcher
 
 if TYPE_CHECKING:
-    from wavecomb._core import Settings, Snapshot
+    from pathlib import Path
+
+    from wavecomb._core import Settings
     from wavecomb.usd import LoadedStage
 
 _ABSENT = re.compile(r"(texture|MaterialX file|IES profile) .* cannot be read|cannot open layer")
-"""Of warnings: a file that the picture lacks."""
-_MORE_LOOKS = 4
-"""Beyond those that were seen, where a border was too narrow."""
+"""Warnings about a file that the image lacks."""
+_MOST_NAMED = 3
 
 
 class Stopped(Exception):
-    """Somebody wants the task to end; a checkpoint holds what was done, unless another did it."""
-
-
-class Absent(WavecombError):
-    """A file that the stage names is not there: trying again brings the same."""
-
-
-class _OnStop(CheckpointSink):
-    """Saves a checkpoint now and then, and where a render was stopped; not at its end.
-
-    Its header, which hashes the whole scene, is made when it is needed.
-    """
-
-    def __init__(
-        self,
-        is_stopped: Callable[[], bool],
-        is_dropped: Callable[[], bool],
-        path: str | os.PathLike[str],
-        every: float,
-        header: Callable[[], Mapping[str, Any]],
-        seconds: float,
-    ) -> None:
-        super().__init__(path, every, {}, seconds)
-        self._is_stopped = is_stopped
-        self._is_dropped = is_dropped
-        self._make_header = header
-
-    def take(self, snapshot: Snapshot) -> str | None:
-        """Writes the file, unless the render is done, or another's."""
-        if self._is_dropped():
-            return None
-        return None if snapshot.finished and not self._is_stopped() else super().take(snapshot)
-
-    def write(self, snapshot: Snapshot) -> None:
-        """All that the render holds."""
-        self._header = self._make_header()
-        super().write(snapshot)
+    """The render was cancelled."""
 
 
 class Renderer:
-    """Does tasks of one job, one after another."""
+    """Renders tiles of one job, one after another."""
 
     def __init__(
         self,
-        folder: Folder,
+        job: Job,
         *,
         threads: int = 0,
+        learned: bytes | None = None,
         reporter: Reporter | None = None,
         loading: Callable[[int, int], None] | None = None,
         is_stopped: Callable[[], bool] = lambda: False,
-        is_dropped: Callable[[], bool] = lambda: False,
-        log: Callable[[str], None] = lambda line: None,
     ) -> None:
         """Opens nothing yet.
 
         Args:
-            folder: The job's.
-            threads: 0: as the job says.
+            job: The job.
+            threads: 0 means: as the job says.
+            learned: The guiding field that all images are given.
             reporter: Shows progress.
             loading: Called while a stage is read.
-            is_stopped: Whether a task is to end early.
-            is_dropped: Whether nobody wants what was done of it.
-            log: Gets warnings.
+            is_stopped: Whether the render is to end early.
         """
-        self._folder = folder
-        self._spec = folder.spec
+        self.job = job
+        self.warnings: dict[str, None] = {}
         self._threads = threads
+        self._learned = learned
         self._reporter = reporter
         self._loading = loading
         self._is_stopped = is_stopped
-        self._is_dropped = is_dropped
-        self._log = log
         self._open: tuple[int, Frames] | None = None
         self._loaded: tuple[tuple[int, float | None], LoadedStage] | None = None
-        self._warned: set[str] = set()
-        self._given: bytes | None = None
 
     def close(self) -> None:
         """Lets the stage go."""
         self._open = self._loaded = None
 
-    def do(self, task: Task, *, copy: bool = False) -> dict[str, Any]:
-        """Does a task; gives what came of it, for its result.
+    def render(
+        self,
+        task: Task,
+        path: Path,
+        machine: str,
+        looks: int = 0,
+        *,
+        with_job: bool = False,
+        replacing: Any = None,
+    ) -> dict[str, Any]:
+        """Renders a tile to a part file.
 
         Args:
-            task: The task.
-            copy: Whether it is another's, too, whose checkpoint stays as it is.
+            task: The tile.
+            path: The part's file.
+            machine: Class of this machine.
+            looks: Looks at errors that a border must allow for; 0 means: as many as is likely.
+            with_job: Whether the part is to say what job it belongs to.
+            replacing: As of ``save_part``.
+
+        Returns:
+            Counts for progress.
 
         Raises:
-            Stopped: It was to end early, or another did it meanwhile.
-            Absent: A file is missing.
-            WavecombError: It failed.
+            Stopped: ``is_stopped`` wanted that.
+            WavecombError: The stage or the settings cannot be rendered.
         """
-        if task.is_join:
-            picture = self._assemble(task.picture)
-            self._check_wanted(task)
-            files = write_picture(self._spec, task.picture, picture, self._threads)
-            with contextlib.suppress(OSError):
-                self._looks_file(task.picture).unlink()
-            return {"files": files}
-        shot = self._spec.shot(task)
-        tile = self._spec.rectangles(task.picture)[int(task.part)]
-        settings, rendered, looks = self._settings(task.picture, shot, tile)
+        from wavecomb.farm.part import replacing_quickly, save_part
+
+        shot, tile = self.job.shot(task.image), self.job.rectangles(task.image)[task.tile]
+        settings, rendered, looks = self._settings(task.image, shot, tile, looks)
         check_memory(settings, shot.aovs)
-        picture, frames = self._render(task, shot, settings, copy)
-        self._check_wanted(task)
-        if not self._spec.is_tiled:
-            files = write_picture(self._spec, task.picture, picture, settings.threads)
-        else:
-            save_part(
-                self._folder.part(task), picture, job=self._spec.id, task=task, tile=tile,
-                rendered=rendered, looks=looks, empty=self._empty(task, shot, frames, picture),
-            )  # fmt: skip
-            files = []
-            if self._folder.is_done(self._spec.last_of(task.picture)):
-                # Another did it, and the picture is there: nobody else would remove the tile.
-                with contextlib.suppress(OSError):
-                    self._folder.part(task).unlink()
-        counts = picture.stats["counts"]
-        return {
-            "files": files, "samples": counts["samples"], "rays": counts["rays"],
-            "seconds": picture.stats["seconds"], "peak_rss_bytes": picture.stats["peak_rss_bytes"],
-        }  # fmt: skip
-
-    def _check_wanted(self, task: Task) -> None:
-        """Raises Stopped where another did a task meanwhile: what it wrote stays as it is."""
-        if self._is_dropped() or self._folder.is_done(task):
-            raise Stopped
-
-    def _assemble(self, picture: int) -> Picture:
-        try:
-            return assemble(self._folder, picture)
-        except NarrowBorder as error:
-            write_json(self._looks_file(picture), error.passes + _MORE_LOOKS)
-            self._folder.remove_parts(picture)
-            raise
-
-    def _looks_file(self, picture: int) -> Path:
-        """Says how many looks borders have to allow for, where that turned out."""
-        return self._folder.path / "parts" / f"{picture:06d}.looks"
-
-    def _looks(self, picture: int, shot: Shot) -> int:
-        if not shot.is_adaptive:
-            return 0
-        with contextlib.suppress(FileNotFoundError):
-            return int(read_json(self._looks_file(picture)))
-        return most_looks(shot.settings)
+        picture, frames = self._render(task, shot, settings)
+        save_part(
+            path, picture, key=self.job.part_key(task, machine), number=task.tile, tile=tile,
+            rendered=rendered, machine=machine, looks=looks,
+            empty=self._empty(task, shot, frames, picture),
+            job=self.job.as_json() if with_job else None,
+            replacing=replacing or replacing_quickly,
+        )  # fmt: skip
+        return {"samples": picture.stats["counts"]["samples"]}
 
     def _settings(
-        self, picture: int, shot: Shot, tile: Rectangle
+        self, image: int, shot: Shot, tile: Rectangle, looks: int
     ) -> tuple[Settings, Rectangle, int]:
-        """Settings of a tile, what is rendered of it, and the looks at errors that this allows."""
+        """Settings of a tile, the pixels that are rendered, and the looks that these allow for."""
         from wavecomb import _core
 
         chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
-        if not self._spec.is_tiled:
-            return _core.Settings(**chosen), tile, 0
-        looks = self._looks(picture, shot)
+        if self.job.tile_count(image) == 1:
+            return _core.Settings(**chosen), _whole(shot), 0
+        looks = looks_for(shot, looks)
         rendered = grown(tile, border(shot.settings, looks), shot.region)
         return _core.Settings(**{**chosen, "region": rendered, "crop": True}), rendered, looks
 
-    def _render(
-        self, task: Task, shot: Shot, settings: Settings, copy: bool
-    ) -> tuple[Picture, Frames]:
+    def _render(self, task: Task, shot: Shot, settings: Settings) -> tuple[Picture, Frames]:
         frames = self._frames(task, settings.threads)
         loaded = self._load(frames, task, shot)
         if loaded.catchers:
@@ -211,99 +136,120 @@ class Renderer:
             )
         if "light_groups" in shot.aovs:
             check_memory(settings, shot.aovs, len(loaded.scene.light_groups))
-
-        def header() -> dict[str, Any]:
-            stage, aovs = self._spec.stage, shot.aovs
-            return make_header(loaded.scene, settings, stage=stage, source={}, aovs=aovs)
-
-        before, seconds, sinks = self._checkpoint(task, header), 0.0, []
-        if before is not None:
-            seconds = before.seconds
-        if not (copy or (shot.is_adaptive and self._spec.is_tiled)):  # whose passes are counted
-            file = self._folder.checkpoint(task)
-            every, dropped = self._spec.every, self._is_dropped
-            sinks.append(_OnStop(self._is_stopped, dropped, file, every, header, seconds))
         watcher = Watcher(
-            sinks, reporter=self._reporter, is_stopped=self._is_stopped, warn=self._log
-        )
-        state = None if before is None else before.state
+            reporter=self._reporter, is_stopped=self._is_stopped,
+            warn=lambda line: self.warnings.setdefault(line),
+        )  # fmt: skip
         result = frames.render(
-            settings, costs=self._spec.costs, watcher=watcher, state=state, learned=self._learned()
+            settings, costs=self.job.costs, watcher=watcher, learned=self._learned
         )
         if result.cancelled:
             raise Stopped
-        stats = {**frames.stats(result, resumed_s=seconds), "stage": self._spec.stage}
+        stats = {**frames.stats(result), "stage": self.job.stage}
         return picture_of(result, stats, scene=loaded.scene, aovs=shot.aovs), frames
 
-    def _learned(self) -> bytes | None:
-        """What guides all pictures of the job, if it was given that."""
-        if self._given is None and self._folder.learned.exists():
-            self._given = load_learned(self._folder.learned)
-        return self._given
-
     def _load(self, frames: Frames, task: Task, shot: Shot) -> LoadedStage:
-        """The stage for a task; tiles of one picture share it."""
-        key = self._spec.pictures[task.picture]
+        """The stage for a task; tiles of one image share it."""
+        key = self.job.images[task.image]
         if self._loaded is None or self._loaded[0] != key:
             self._loaded = None
             size = int(shot.settings["width"]), int(shot.settings["height"])
-            loaded = frames.load(self._spec.frame(task), progress=self._loading, size=size)
-            self._check(loaded)
+            loaded = frames.load(self.job.frame(task.image), progress=self._loading, size=size)
+            for line in (
+                *(finding.line() for finding in loaded.report.warnings), *loaded.scene.warnings,
+            ):  # fmt: skip
+                if self.job.strict and _ABSENT.match(line):
+                    raise WavecombError(f"{line} (--no-strict renders without)")
+                self.warnings.setdefault(line)
             self._loaded = key, loaded
         return self._loaded[1]
 
     def _frames(self, task: Task, threads: int) -> Frames:
         """The stage, open, for the shot of a task."""
-        index = self._spec.pictures[task.picture][0]
+        index = self.job.images[task.image][0]
         if self._open is None or self._open[0] != index:
             self.close()
-            stage = stage_place(self._folder, self._spec.stage)
-            options = _loading(self._spec.shots[index].loading)
+            options: dict[str, Any] = {
+                name: tuple(value) if isinstance(value, list) else value
+                for name, value in self.job.shots[index].loading.items()
+            }
             if options.get("session_layer"):
-                options["session_layer"] = stage_place(self._folder, options["session_layer"])
+                options["session_layer"] = self.job.place(options["session_layer"])
+            stage = self.job.place(self.job.stage)
             self._open = index, Frames(stage, threads=threads, **options)
         return self._open[1]
 
-    def _check(self, loaded: LoadedStage) -> None:
-        """Says what is wrong with the stage, each once; a file that is missing is an error."""
-        lines = [finding.line() for finding in loaded.report.warnings]
-        for line in lines:
-            if self._spec.strict and _ABSENT.match(line):
-                raise Absent(f"{line} (--no-strict renders without)")
-            if line not in self._warned:
-                self._warned.add(line)
-                self._log(line)
-
-    def _checkpoint(self, task: Task, header: Callable[[], Mapping[str, Any]]) -> Checkpoint | None:
-        """What another began of a task; None: nothing that is of use."""
-        file = self._folder.checkpoint(task)
-        if not file.exists():
-            return None
-        try:
-            found = load_checkpoint(file)
-            check_fits(found, header())
-        except (OSError, WavecombError) as error:
-            self._log(f"begins anew: {error}")
-            return None
-        self._log(f"goes on after {found.seconds:.1f} s of rendering")
-        return found
-
     def _empty(self, task: Task, shot: Shot, frames: Frames, picture: Picture) -> Picture | None:
-        """A picture whose last pixel has no samples, where the whole one has such pixels."""
+        """A picture whose last pixel has no samples, where the whole image has such pixels."""
         cropped = shot.settings.get("region") is None or shot.settings.get("crop")
-        if cropped or int(task.part) != 0:
+        if cropped or task.tile != 0:
             return None
         from wavecomb import _core
 
         def render(settings: Settings) -> Picture:
             return picture_of(frames.render(settings), picture.stats, aovs=shot.aovs)
 
-        settings = _core.Settings(**{**shot.settings, "threads": 1})
-        return without_samples(render, settings, 2)
+        return without_samples(render, _core.Settings(**{**shot.settings, "threads": 1}), 2)
 
 
-def _loading(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of ``LoadOptions`` as they were before they were JSON."""
-    return {
-        name: tuple(value) if isinstance(value, list) else value for name, value in options.items()
-    }
+def _whole(shot: Shot) -> Rectangle:
+    """The pixels that a render of the whole image gives."""
+    if shot.settings.get("crop") and shot.settings.get("region") is not None:
+        return shot.region
+    return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
+
+
+def looks_for(shot: Shot, looks: int = 0) -> int:
+    """Looks at errors that borders allow for: those asked for, else as many as is likely."""
+    if not shot.is_adaptive:
+        return 0
+    return looks or most_looks(shot.settings)
+
+
+def list_files(
+    stage: str, variants: Mapping[str, str] | None, session_layer: str | None
+) -> tuple[tuple[StageFile, ...], tuple[str, ...]]:
+    """All files that a stage needs, with hashes, and a line for each that is missing.
+
+    Raises:
+        WavecombError: The stage cannot be opened.
+    """
+    from pathlib import Path
+
+    from wavecomb.api import import_usd
+
+    import_usd()
+    from wavecomb.usd.stage.dependencies import dependencies
+
+    session = None if session_layer is None else Path(session_layer)
+    found = dependencies(Path(stage), variants, session)
+    files = []
+    for path in found.files:
+        stat = os.stat(path)
+        files.append(StageFile(path, stat.st_size, stat.st_mtime_ns, file_hash(path)))
+    return tuple(files), found.missing
+
+
+def use_job_maps(job: Job) -> None:
+    """Has this process find the files of a job."""
+    use_maps(here(job.maps))
+
+
+def check_files(job: Job) -> None:
+    """Raises WavecombError unless this machine has the files that the job's keys are made of."""
+    lines = []
+    for one in job.files:
+        path = job.place(one.path)
+        name = one.path if path == one.path else f"{one.path} ({path})"
+        try:
+            stat = os.stat(path)
+            if (stat.st_size, stat.st_mtime_ns) == (one.bytes, one.mtime_ns):
+                continue
+            if stat.st_size != one.bytes or file_hash(path) != one.sha256:
+                lines.append(f"{name} is not what it was when the job was submitted")
+        except OSError as error:
+            lines.append(f"{name} is not on this machine: {error.strerror}")
+    if lines:
+        more = len(lines) - _MOST_NAMED
+        lines = lines[:_MOST_NAMED] + [f"and {more} more files"] * (more > 0)
+        raise WavecombError("; ".join(lines))

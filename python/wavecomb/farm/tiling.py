@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How pictures are cut into tiles: pixels, never samples."""
+"""Cuts images into tiles: pixels, never samples."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -12,17 +13,19 @@ from wavecomb.errors import WavecombError
 Rectangle = tuple[int, int, int, int]
 """x0, y0, x1, y1 in pixels of the whole picture, the end excluded."""
 
+MOST_TILES = 9999
+"""Columns or rows of an image."""
 LEAST_EDGE = 64
-"""Of tiles that are chosen by themselves, in pixels."""
+"""Pixels of the edges of tiles that ``choose_tiles`` chooses."""
 TILES_OF_A_WORKER = 4
-"""Of a picture that is shared out: so many that nobody waits long for the last."""
+"""Tiles of an image for each worker, so that workers end at about the same time."""
 _CHECK_SAMPLES = 16
-"""Of the core's looks at errors (render/pass_plan.cpp)."""
+"""Samples between two looks of the core at errors (render/pass_plan.cpp)."""
 _REACH = 4
 """Pixels that one look at errors reaches: a mean over two to each side, and marks that spread by
 two more."""
 _WINDOW = 2
-"""Pixels to each side that the layer of errors is a mean of."""
+"""Pixels to each side over which the layer of errors is a mean."""
 
 
 def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
@@ -39,7 +42,7 @@ def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
 
 
 def parse_tiles(text: str) -> tuple[int, int] | None:
-    """Columns and rows of "4x3"; None: of "auto".
+    """Columns and rows of "4x3"; None for "auto".
 
     Raises:
         WavecombError: It is neither.
@@ -52,19 +55,54 @@ def parse_tiles(text: str) -> tuple[int, int] | None:
     return int(match[1]), int(match[2])
 
 
+def parse_tile(text: str) -> tuple[int, int]:
+    """Index from 0 and count of "3/8", the third of eight tiles.
+
+    >>> parse_tile("3/8")
+    (2, 8)
+
+    Raises:
+        WavecombError: It is no such pair.
+    """
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise WavecombError(f"--tile {text}: must be I/N, tile I of N, from 1/N to N/N")
+    return int(match[1]) - 1, int(match[2])
+
+
+def layout(count: int, region: Rectangle) -> tuple[int, int]:
+    """Columns and rows of exactly ``count`` tiles, as near to squares as whole numbers allow.
+
+    >>> layout(8, (0, 0, 1920, 1080))
+    (4, 2)
+
+    Raises:
+        WavecombError: The region has too few pixels for them.
+    """
+    width, height = region[2] - region[0], region[3] - region[1]
+    fits = [
+        (n, count // n)
+        for n in range(1, count + 1)
+        if count % n == 0 and n <= min(width, MOST_TILES) and count // n <= min(height, MOST_TILES)
+    ]
+    if not fits:
+        raise WavecombError(
+            f"--tile: {count} tiles do not fit into {width} x {height} pixels; give fewer"
+        )
+    return min(fits, key=lambda one: abs(math.log((width * one[1]) / (height * one[0]))))
+
+
 def choose_tiles(
     regions: list[Rectangle], pictures: int, workers: int, whole: bool
 ) -> tuple[int, int]:
-    """Tiles of each picture where nobody said.
-
-    Whole pictures, where there are two or more for each worker: nothing is assembled then.
+    """Columns and rows for ``--tiles auto``: whole images where there are two for each worker.
 
     Args:
-        regions: Of the pictures, each size once.
-        pictures: How many there are.
-        workers: That are expected.
-        whole: Whether cutting costs more than it brings: errors are looked at, or a field of light
-            is learned for each tile.
+        regions: Of the images, each size once.
+        pictures: How many images there are.
+        workers: How many are expected.
+        whole: Whether tiles cost more than they gain: each would need a wide border, or would
+            learn a guiding field.
     """
     if workers < 2 or whole or pictures >= 2 * workers:
         return 1, 1

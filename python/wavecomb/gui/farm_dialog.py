@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QProcess, Qt, QTimer
+from PySide6.QtCore import QProcess, Qt
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QDialog,
@@ -29,9 +29,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
-"""An output file to what ``farm.from_json`` takes; raises WavecombError."""
-
-_LOOK_MS = 500
+"""From an output file to what ``farm.from_json`` takes; raises WavecombError."""
 
 
 class FarmDialog(QDialog):
@@ -66,25 +64,18 @@ class FarmDialog(QDialog):
             "farm.tiles", "Tiles", "auto", "auto, or columns and rows such as 4x3"
         )
         self.engine = self._line(
-            "farm.on", "On", "local:2", "local:N, ssh:HOSTS, dask:ADDRESS, slurm:N, or none"
+            "farm.on", "On", "local:2", "local:N, dask:ADDRESS, slurm:N, or none"
         )
         self.send = named(QPushButton("&Send"), "farm.send", "Send", "Write the job and work on it")
-        self.stop = named(
-            QPushButton("S&top"), "farm.stop", "Stop", "Workers keep what they have of their tasks"
-        )
+        self.stop = named(QPushButton("S&top"), "farm.stop", "Stop", "Finished tiles are kept")
         self.bar = named(QProgressBar(), "farm.bar", "Progress", "Tasks that are done")
         self.state = named(QLabel(), "farm.state", "State", "Where the job stands")
         self.state.setWordWrap(True)
-        self.state.setOpenExternalLinks(True)
-        self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextBrowserInteraction)
+        self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.stop.setEnabled(False)
         self.send.clicked.connect(self.begin)
         self.stop.clicked.connect(self.end)
         self._lay_out()
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LOOK_MS)
-        self._timer.timeout.connect(self.look)
-        self._page = ""
 
     def _line(self, name: str, title: str, text: str, tip: str) -> QLineEdit:
         return named(QLineEdit(text), name, title, tip)
@@ -118,7 +109,7 @@ class FarmDialog(QDialog):
         if self.frames.text().strip():
             options["frames"] = self.frames.text().strip()
             options.pop("frame", None)
-        self.folder, self._page = None, ""
+        self.folder = None
         self.say("reading the stage \u2026")
         process = self._start(["wavecomb.farm.from_json"], self._written)
         process.write(json.dumps(self._wanted).encode())
@@ -147,20 +138,20 @@ class FarmDialog(QDialog):
             return
         self.folder = Path(told["job"])
         engine = self.engine.text() or "local"
+        if engine == "none":
+            self.say(f"{self.folder}: written; `wavecomb farm resume` renders it")
+            return
         words = ["wavecomb", "farm", "resume", told["job"], "--on", engine, "--json"]
-        self._start(words if engine == "none" else [*words, "--page"], self._ended)
-        self._timer.start()
+        process = self._start(words, self._ended)
+        process.readyReadStandardOutput.connect(self.look)
 
     def _ended(self) -> None:
         assert self._process is not None
+        self.look()
         code = self._process.exitCode()
         said = bytes(self._process.readAllStandardError().data()).decode(errors="replace")
         self._let_go()
-        self._page = ""
-        if self.engine.text() != "none":
-            self._timer.stop()
-        self.look()
-        lines = [line for line in said.strip().splitlines() if not line.startswith("page ")]
+        lines = said.strip().splitlines()
         if code and lines:
             self.say(lines[-1].removeprefix("error: "))
 
@@ -172,43 +163,36 @@ class FarmDialog(QDialog):
         self.stop.setEnabled(False)
 
     def end(self) -> None:
-        """Has the job stop; `wavecomb farm resume` goes on with it."""
+        """Stops the job; `wavecomb farm resume` continues it."""
         if self._process is not None:
             self._process.terminate()
 
     def look(self) -> None:
-        """Shows where the job stands."""
-        from wavecomb.farm.folder import Folder
-        from wavecomb.farm.state import lines, status
-
-        if self.folder is None:
+        """Shows the last line of progress that the command wrote."""
+        if self._process is None:
             return
-        if self._process is not None and not self._page:
-            self._process.setReadChannel(QProcess.ProcessChannel.StandardError)
-            said = bytes(self._process.peek(4096).data()).decode(errors="replace")
-            if said.startswith("page ") and "\n" in said:
-                self._page = said.partition("\n")[0].removeprefix("page ")
-        try:
-            found = status(Folder(self.folder), tasks=False)
-        except (OSError, WavecombError) as error:
-            self.say(str(error))
-            return
-        self.bar.setMaximum(sum(found["tasks"].values()))
-        self.bar.setValue(found["tasks"]["done"])
-        text = "<br>".join(map(html.escape, lines(found)))
-        if self._page:
-            text += f'<br><a href="{html.escape(self._page)}">the live page</a>'
-        self.state.setText(text)
-        if found["state"] in ("done", "failed"):
-            self._timer.stop()
+        found = None
+        while self._process.canReadLine():
+            line = bytes(self._process.readLine().data())
+            try:
+                told = json.loads(line)
+                found = told.get("progress", told)
+            except ValueError:
+                continue
+        if found is not None:
+            tasks, images = found["tasks"], found["images"]
+            self.bar.setMaximum(tasks["all"])
+            self.bar.setValue(tasks["done"])
+            words = f"{images['done']} of {images['all']} images, "
+            words += f"{tasks['done']} of {tasks['all']} tiles"
+            self.say(f"{self.folder}: {found['state']}: {words}")
 
     def say(self, line: str) -> None:
         """A line in place of the state."""
         self.state.setText(html.escape(line))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """A job that runs is stopped, out of sight; what was done is kept."""
-        self._timer.stop()
+        """A job that runs is stopped, out of sight; finished tiles are kept."""
         if self._process is None:
             super().closeEvent(event)
             return

@@ -53,11 +53,11 @@ def test_sent_and_watched(cornell_window, qtbot, tmp_path):
     assert dialog.folder is not None, dialog.state.text()
     qtbot.waitUntil(lambda: dialog.send.isEnabled(), timeout=100000)
     assert ": done" in dialog.state.text(), dialog.state.text()
-    assert dialog.bar.value() == dialog.bar.maximum() == 3
+    assert dialog.bar.value() == dialog.bar.maximum() == 2
     folder = Folder(dialog.folder)
-    assert status(folder)["state"] == "done" and folder.spec.tiles == (2, 1)
+    assert status(folder).state == "done" and folder.job.tiles == (2, 1)
     layer = Sdf.Layer.FindOrOpen(str(tmp_path / "a.edits.usda"))
-    assert layer and folder.spec.stage == layer.realPath
+    assert layer and folder.job.stage == layer.realPath
     assert read_layers(output)["beauty"].shape == (96, 96, 3)
     # What cannot be sent is said in the dialog.
     dialog.begin()

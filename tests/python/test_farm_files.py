@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
-import json
+import os
 from pathlib import Path
 
-import forks
 import numpy as np
 import pytest
 from parts import needs
@@ -15,9 +15,8 @@ from test_texture_limit import textured, write_image
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm import submit
-from wavecomb.farm.assets import differences, list_assets
-from wavecomb.farm.folder import TODO
-from wavecomb.farm.rendering import Absent, Renderer
+from wavecomb.farm.job import Task
+from wavecomb.farm.rendering import Renderer, check_files, list_files
 
 pytestmark = needs("wavecomb._core", "MaterialX")
 
@@ -92,14 +91,14 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_all_files_are_listed(folder: Path) -> None:
-    found = list_assets(str(folder / "s.usda"))
-    assert {Path(one["path"]).name for one in found["files"]} == THERE
-    for one in found["files"]:
-        data = Path(one["path"]).read_bytes()
-        assert one["bytes"] == len(data)
-        assert one["sha256"] == hashlib.sha256(data).hexdigest()
-    missing = " ".join(found["missing"])
-    assert len(found["missing"]) == 3, missing
+    found, lacking = list_files(str(folder / "s.usda"), None, None)
+    assert {Path(one.path).name for one in found} == THERE
+    for one in found:
+        data = Path(one.path).read_bytes()
+        assert one.bytes == len(data) and one.mtime_ns == os.stat(one.path).st_mtime_ns
+        assert one.sha256 == hashlib.sha256(data).hexdigest()
+    missing = " ".join(lacking)
+    assert len(lacking) == 3, missing
     for name in ("gone.png is not there: /V/A.inputs:file", "nowhere.usda", "nowhere.mtlx"):
         assert name in missing
 
@@ -111,52 +110,51 @@ def test_files_of_other_stages_are_not_listed(folder: Path) -> None:
         '#usda 1.0\ndef "Looks" (references = @other.mtlx@</MaterialX>) {}\n'
     )
     first, second = (
-        {Path(one["path"]).name for one in list_assets(str(folder / name))["files"]}
+        {Path(one.path).name for one in list_files(str(folder / name), None, None)[0]}
         for name in ("one.usda", "s.usda")
     )
     assert first == {"one.usda", "other.mtlx", "a.png"}
     assert second == THERE
 
 
-def test_the_command_lists_them(folder: Path) -> None:
-    words = ["farm", "assets", str(folder / "s.usda")]
-    done = forks.wavecomb(*words, "--json", "--variant", "/V{x}=two")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert {Path(one["path"]).name for one in found["files"]} == THERE
-    assert len(found["missing"]) == 2
-    done = forks.wavecomb(*words)
-    assert done.returncode == 2 and "3 files are missing" in done.stderr
-    assert len(done.stdout.splitlines()) == len(THERE)
+def test_variants_decide_what_is_missing(folder: Path) -> None:
+    found, lacking = list_files(str(folder / "s.usda"), {"/V{x}": "two"}, None)
+    assert {Path(one.path).name for one in found} == THERE and len(lacking) == 2
 
 
-def test_files_that_differ(folder: Path) -> None:
-    files = list_assets(str(folder / "s.usda"))["files"]
-    assert differences(files, str) == []
-    (folder / "a.png").write_bytes(b"other")
-    (folder / "sky.png").unlink()
-    said = differences(files, str)
-    assert len(said) == 2 and "a.png is not what it was" in said[0]
-    assert "sky.png is not on this machine: No such file" in said[1]
+def test_files_that_differ(tmp_path: Path) -> None:
+    """By their bytes; those with the same size and time are not read."""
+    for name in ("a.png", "b.png"):
+        write_image(tmp_path / name, np.zeros((4, 4, 3), np.uint8))
+    stage = tmp_path / "s.usda"
+    stage.write_text("#usda 1.0\n" + textured("M", "a.png", 1) + textured("N", "b.png", 1))
+    job = submit(stage, tmp_path / "p.exr", size=(4, 4), spp=1).job
+    check_files(job)
+    os.utime(tmp_path / "a.png")
+    check_files(job)
+    good = (tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(good[:-1] + b"x")
+    (tmp_path / "b.png").unlink()
+    with pytest.raises(WavecombError) as caught:
+        check_files(job)
+    assert "a.png is not what it was when the job was submitted" in str(caught.value)
+    assert "b.png is not on this machine: No such file" in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_texture_that_goes_while_a_job_runs(tmp_path: Path) -> None:
-    """Fails its pictures by name, at once: no checker, no second try."""
+    """Fails its images by name: no checker in its place."""
     write_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
     stage = tmp_path / "s.usda"
     stage.write_text("#usda 1.0\n" + textured("M", "a.png", 1))
-    jobs = {
-        strict: submit(
-            stage, tmp_path / "p.exr", job=tmp_path / str(strict), size=(4, 4), spp=1, strict=strict
-        )
-        for strict in (True, False)
-    }
+    job = submit(stage, tmp_path / "p.exr", size=(4, 4), spp=1).job
     (tmp_path / "a.png").unlink()
-    task = jobs[True].entries(TODO)[0].task
-    with pytest.raises(Absent, match=r"texture .*a\.png cannot be read"):
-        Renderer(jobs[True]).do(task)
-    assert not (tmp_path / "p.exr").exists()
-    Renderer(jobs[False]).do(task)
-    assert (tmp_path / "p.exr").exists()
+    part = tmp_path / "part.exr"
+    with pytest.raises(WavecombError, match=r"texture .*a\.png cannot be read.*--no-strict"):
+        Renderer(job).render(Task(0, 0), part, "wavecomb-test")
+    assert not part.exists()
+    renderer = Renderer(dataclasses.replace(job, strict=False))
+    renderer.render(Task(0, 0), part, "wavecomb-test")
+    assert part.exists() and "a.png" in " ".join(renderer.warnings)
     with pytest.raises(WavecombError, match=r"a\.png"):
         submit(stage, tmp_path / "q.exr")

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tiles for sites with their own queue: ``wavecomb render --tile``, and jobs from its options."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from wavecomb.cli.options import warn
+from wavecomb.cli.planning import Asked, Prepared
+from wavecomb.errors import WavecombError
+from wavecomb.run.learned import BEFORE
+
+if TYPE_CHECKING:
+    from wavecomb.farm.job import Job
+
+_TILE = "tile-{}-of-{}"
+
+
+def tile_name(output: str, index: int, count: int) -> str:
+    """The file of a tile beside its image.
+
+    >>> tile_name("out/shot.0012.exr", 2, 8)
+    'out/shot.0012.tile-3-of-8.exr'
+    """
+    stem, ending = os.path.splitext(output)
+    return f"{stem}.{_TILE.format(index + 1, count)}{ending}"
+
+
+def tile_names(output: str) -> list[str]:
+    """The files of tiles beside an image that are there."""
+    stem, ending = os.path.splitext(output)
+    found = glob.glob(f"{glob.escape(stem)}.{_TILE.format('*', '*')}{glob.escape(ending)}")
+    end = re.compile(re.escape(f"{stem}.") + r"tile-\d+-of-\d+" + re.escape(ending), re.DOTALL)
+    return sorted(name for name in found if end.fullmatch(name))
+
+
+def check_options(options: dict[str, Any], what: str = "a farm") -> None:
+    """Raises WavecombError for options of ``render`` that a farm does without.
+
+    Args:
+        options: Of the command.
+        what: Does without them, in messages.
+    """
+    learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
+    for option, given, instead in (
+        ("--checkpoint", options["checkpoint"], "finished tiles are kept"),
+        ("--resume", options["resume"], "`wavecomb farm resume` continues a job"),
+        ("--preview", options["preview"], "`wavecomb farm status` shows how far a job is"),
+        ("--learn-from", learn_from, "frames are rendered in any order; give a file"),
+        ("--learn-to", options["learn_to"],
+         "a render writes it, of one image, and --learn-from gives it to the job"),
+        ("--deep", options["deep"], "tiles of deep images are not joined; give it to render"),
+        ("--film-memory", options["film_memory"], "tiles limit the memory of a worker"),
+        ("--progress", "json" if options["progress"] == "json" else None, "give --json"),
+    ):  # fmt: skip
+        if given is not None:
+            raise WavecombError(f"{option}: is not for {what}: {instead}")
+
+
+def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
+    """Index and count of --tile. Raises WavecombError where the other options do not allow it."""
+    from wavecomb.farm.tiling import parse_tile
+
+    if text.isdecimal():
+        raise WavecombError(f"--tile {text}: must be I/N; tiles inside the file are --exr-tile")
+    found = parse_tile(text)
+    check_options(options, "--tile")
+    if options["output"] is None:
+        raise WavecombError("--tile: needs -o, beside which the tile is written")
+    return found
+
+
+def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
+    """The job of a command's options, still without tiles and files.
+
+    Raises:
+        WavecombError: --costs names a file.
+    """
+    from wavecomb.farm.job import Job
+    from wavecomb.farm.planning import shot_of
+
+    if asked.costs_file is not None:
+        raise WavecombError(
+            "--costs: is not for a farm: all workers would write the file; give --costs model"
+        )
+    shots, images = [], []
+    for index, (plan, numbers, job) in enumerate(prepared.jobs):
+        source = plan.source(prepared.source)
+        names = plan.names
+        shots.append(
+            shot_of(
+                job.settings.to_dict(), job.aovs, source.for_load(None), names.output, names.png,
+                names.stats,
+            )
+        )  # fmt: skip
+        for frame in (source.frame,) if numbers is None else numbers:
+            here = names if numbers is None else names.at(frame or 0.0)
+            if not (asked.skip_existing and all(map(os.path.exists, here.all()))):
+                images.append((index, frame))
+    return Job(
+        stage=asked.stage, folder=os.getcwd(), shots=tuple(shots), images=tuple(images),
+        file=asked.layers.file_options(), exposure=asked.exposure, tone_map=asked.tone_map,
+        denoise=asked.purpose.denoise, costs=prepared.jobs[0][2].profile, **more,
+    )  # fmt: skip
+
+
+def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list[str]:
+    """Renders tile I of N of each frame to a file beside the image; the files.
+
+    Raises:
+        WavecombError: A farm cannot render it.
+    """
+    from wavecomb.farm.job import Task
+    from wavecomb.farm.machine_class import machine_class
+    from wavecomb.farm.planning import complete
+    from wavecomb.farm.rendering import Renderer
+    from wavecomb.farm.tiling import layout
+    from wavecomb.picture.files import replacing
+
+    index, count = tile
+    learned = prepared.learning.given
+    job = job_of(prepared, asked)
+    if len(job.shots) > 1:
+        raise WavecombError("--tile: the stage has several render products; give --product")
+    if not job.images:
+        return []
+    job = complete(job, tiles=layout(count, job.shots[0].region), learned=learned)
+    renderer, written = Renderer(job, learned=learned), []
+    for image in range(len(job.images)):
+        name = tile_name(job.names(image)["output"], index, count)
+        renderer.render(
+            Task(image, index), Path(name), machine_class(), with_job=True, replacing=replacing
+        )
+        written.append(name)
+    warn(list(renderer.warnings))
+    return written
+
+
+def assemble_tiles(output: str) -> list[str]:
+    """Joins the tiles beside an image, writes its files, and removes the tiles; the files.
+
+    Raises:
+        WavecombError: Tiles are missing, damaged, or of other settings, files or machines.
+    """
+    from wavecomb.farm.assemble import NarrowBorder, join, write_image
+    from wavecomb.farm.job import Job, Task
+    from wavecomb.farm.part import DamagedPart, read_part
+
+    names = tile_names(output)
+    if not names:
+        raise WavecombError(
+            f"{output}: has no tiles beside it; `wavecomb render -o {output} --tile I/N` makes them"
+        )
+    try:
+        first = read_part(names[0])
+        job = Job.of(first.job, names[0])
+        same = [i for i in range(len(job.images))
+                if job.part_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
+        if not same:
+            raise WavecombError(f"{names[0]}: is of another job than its header says")
+        image, count = same[0], job.tile_count(same[0])
+        wanted = [tile_name(output, index, count) for index in range(count)]
+        lacking = [name for name in wanted if name not in names]
+        if lacking:
+            more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
+            raise WavecombError(f"{output}: tiles are missing: {lacking[0]}{more}")
+
+        def parts() -> Any:
+            for index, name in enumerate(wanted):
+                part = read_part(name)
+                if part.key != job.part_key(Task(image, index), first.machine):
+                    raise WavecombError(
+                        f"{name}: is of other settings, files or machines than {names[0]}: render "
+                        "it again"
+                    )
+                yield part
+
+        picture = join(job, image, parts())
+    except NarrowBorder as error:
+        raise WavecombError(
+            f"{error}: give --tile 1/1, or --on local to `wavecomb farm submit`, which does that"
+        ) from None
+    except DamagedPart as error:
+        raise WavecombError(str(error)) from None
+    where = os.path.dirname(os.path.abspath(output))
+    if os.path.realpath(job.place(job.names(image)["output"])) != os.path.realpath(output):
+        raise WavecombError(f"{output}: the tiles in {where} are of {job.names(image)['output']}")
+    written = write_image(job, image, picture, 0)
+    for name in wanted:
+        os.unlink(name)
+    return written
+
+
+TILE = click.option(
+    "--tile",
+    "part",
+    metavar="I/N",
+    help="Render tile I of N only, to NAME.tile-I-of-N.exr; `wavecomb farm assemble NAME.exr` "
+    "joins the tiles.",
+)

@@ -1,0 +1,460 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Submits the unfinished tasks of a job to Dask and follows them to the end."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.farm.assemble import is_finished, machine_of
+from wavecomb.farm.clusters import Cluster, Where, connected
+from wavecomb.farm.job import Folder, Task, hashed
+from wavecomb.farm.machine_class import PREFIX
+from wavecomb.farm.part import has_part
+
+_TURN_S = 0.2
+_LOOK_S = 1.0
+"""Between two looks at the workers."""
+_BATCH_S = 0.5
+"""Small tiles are sent together, as many as take about this long."""
+_LEAST_BATCHES = 4
+"""For each worker, so that workers end at about the same time."""
+_NOBODY_S = 60.0
+"""For workers to come back when all are gone."""
+_ASSEMBLY_PRIORITY = 1
+
+
+@dataclass
+class Outcome:
+    """How far a job is.
+
+    Attributes:
+        tasks: How many tiles there are.
+        tasks_done: How many are rendered.
+        images: How many images there are.
+        images_done: How many are written.
+        failed: A title and a line for each tile or image that failed.
+        stopped: Whether ``is_stopped`` ended it.
+        others: Workers that were not used, since they are of another class.
+    """
+
+    tasks: int
+    images: int
+    tasks_done: int = 0
+    images_done: int = 0
+    failed: list[tuple[str, str]] = field(default_factory=list)
+    stopped: bool = False
+    others: int = 0
+
+    @property
+    def state(self) -> str:
+        """One of "done", "failed" and "unfinished"."""
+        if self.images_done == self.images:
+            return "done"
+        return "failed" if self.failed else "unfinished"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For programs."""
+        return {
+            "state": self.state, "tasks": {"all": self.tasks, "done": self.tasks_done},
+            "images": {"all": self.images, "done": self.images_done},
+            "failed": [{"title": title, "error": line} for title, line in self.failed],
+        }  # fmt: skip
+
+
+def status(folder: Folder) -> Outcome:
+    """How far a job is, by the files that are there; each is read and compared."""
+    job = folder.job
+    out = Outcome(job.task_count(), len(job.images))
+    for image in range(len(job.images)):
+        if is_finished(folder, image):
+            out.images_done += 1
+            out.tasks_done += job.tile_count(image)
+            continue
+        keys: dict[str, int] = {}
+        for task in job.tasks_of(image):
+            machine = machine_of(folder, task)
+            keys[machine] = keys.get(machine, 0) + 1
+        keys.pop("", None)
+        out.tasks_done += max(keys.values(), default=0)
+    return out
+
+
+@dataclass
+class _Batch:
+    """Tiles that are sent together; or, without tiles, the assembly of an image."""
+
+    tiles: list[Task]
+    image: int = -1
+    attempt: int = 0
+
+
+class Run:
+    """A client's work on one job."""
+
+    def __init__(
+        self,
+        folder: Folder,
+        cluster: Cluster,
+        outcome: Outcome,
+        *,
+        show: Callable[[Outcome], None],
+        warn: Callable[[str], None],
+        is_stopped: Callable[[], bool],
+    ) -> None:
+        """Arguments are those of ``run``."""
+        self._folder, self._job, self._cluster = folder, folder.job, cluster
+        self._out = outcome
+        self._show, self._warn, self._is_stopped = show, warn, is_stopped
+        self._machine = ""
+        self._ready: deque[_Batch] = deque()
+        self._tiles: deque[Task] = deque()
+        self._missing: dict[int, set[int]] = {}
+        self._looks: dict[int, int] = {}
+        self._flying: dict[Any, _Batch] = {}
+        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._attempts = 0
+        self._seconds = 0.0
+        self._warned: set[str] = set()
+        self._workers: dict[str, Any] = {}
+        self._next_look = 0.0
+        self._progressed = False
+        self._alone_since: float | None = None
+        self._full = ""
+        self._common = (str(folder.path), [list(pair) for pair in self._job.maps], self._job.id)
+
+    # ---- begin -----------------------------------------------------------------------------------
+
+    def work(self, images: list[int]) -> None:
+        """Renders what is missing of these images, and writes them."""
+        from wavecomb.farm.tasks import FarmPlugin
+
+        self._cluster.client.register_plugin(FarmPlugin(self._job.isa, self._job.hang_s))
+        if not self._wait_for_workers():
+            return
+        self._machine = self._choose_machine(images)
+        self._restart_stale()
+        for image in images:
+            shot, tiles = self._job.shot(image), self._job.rectangles(image)
+            from wavecomb.farm.rendering import looks_for
+
+            self._looks[image] = looks_for(shot) if len(tiles) > 1 else 0
+            missing = {
+                task.tile
+                for task, tile in zip(self._job.tasks_of(image), tiles, strict=True)
+                if not has_part(
+                    self._folder.part(task), self._job.part_key(task, self._machine), tile,
+                    self._looks[image],
+                )
+            }  # fmt: skip
+            self._missing[image] = missing
+            self._out.tasks_done += len(tiles) - len(missing)
+            self._tiles.extend(Task(image, tile) for tile in sorted(missing))
+            if not missing:
+                self._ready.append(_Batch([], image))
+        self._loop()
+
+    def _wait_for_workers(self) -> bool:
+        """Waits until a worker announced its class; False: somebody wants to stop."""
+        limit = self._cluster.wait_s
+        until = None if limit is None else time.monotonic() + limit
+        while not self._capacity():
+            if self._is_stopped():
+                return False
+            if until is not None and time.monotonic() > until:
+                raise WavecombError(f"{self._cluster.what}: no workers came in {limit:.0f} s")
+            self._cluster.check(False)
+            self._look(0.0)
+            time.sleep(_TURN_S)
+        return True
+
+    def _look(self, every: float = _LOOK_S) -> None:
+        """Asks the scheduler for its workers, now and then."""
+        if time.monotonic() < self._next_look:
+            return
+        self._next_look = time.monotonic() + every
+        info = self._cluster.client.scheduler_info(n_workers=-1)
+        self._workers = {} if info is None else dict(info.get("workers", {}))
+
+    def _classes(self) -> dict[str, int]:
+        """How many workers each class of machines has."""
+        found: dict[str, int] = {}
+        for facts in self._workers.values():
+            for name, amount in facts["resources"].items():
+                if name.startswith(PREFIX) and amount > 0:
+                    found[name] = found.get(name, 0) + 1
+        return found
+
+    def _capacity(self) -> int:
+        """How many workers may work on the job."""
+        found = self._classes()
+        return found.get(self._machine, 0) if self._machine else sum(found.values())
+
+    def _choose_machine(self, images: list[int]) -> str:
+        """The class of all workers of this run: the one with most parts, then most workers."""
+        time.sleep(_TURN_S if self._cluster.wait_s else 0.0)  # for those that come together
+        self._look(0.0)
+        found = self._classes()
+        parts = dict.fromkeys(found, 0)
+        if len(found) > 1:
+            for image in images:
+                for task in self._job.tasks_of(image):
+                    machine = machine_of(self._folder, task)
+                    if machine in parts:
+                        parts[machine] += 1
+        best = max(found, key=lambda name: (parts[name], found[name], name))
+        self._out.others = sum(found.values()) - found[best]
+        if self._out.others:
+            self._warn(
+                f"{self._out.others} workers are of another class of machines than {best}, so "
+                "their pixels would differ in the last bits; they are not used"
+            )
+        return best
+
+    def _restart_stale(self) -> None:
+        """Restarts workers that have read other bytes of the stage's files before."""
+        from wavecomb.farm.tasks import has_stale_files
+
+        files = [(one.path, one.sha256) for one in self._job.files]
+        client = self._cluster.client
+        told = client.run(has_stale_files, files, self._common[1], on_error="return")
+        stale = [worker for worker, is_stale in told.items() if is_stale is True]
+        if not stale:
+            return
+        try:
+            client.restart_workers(stale)
+        except ValueError:
+            raise WavecombError(
+                f"{self._cluster.what}: {stale[0]} holds an older version of the stage and has no "
+                "nanny that could restart it: restart that worker"
+            ) from None
+
+    # ---- loop ------------------------------------------------------------------------------------
+
+    def _loop(self) -> None:
+        client = self._cluster.client
+        while self._flying or self._tiles or self._ready:
+            if self._is_stopped():
+                self._out.stopped = True
+                client.cancel(list(self._flying), reason="wavecomb farm was stopped")
+                return
+            self._look()
+            while len(self._flying) < self._capacity() and self._submit():
+                pass
+            try:
+                self._take(self._ended.get(timeout=_TURN_S))
+            except queue.Empty:
+                self._check()
+            self._show(self._out)
+
+    def _check(self) -> None:
+        self._cluster.check(self._progressed)
+        self._progressed = False
+        if self._capacity():
+            self._alone_since = None
+            return
+        if self._full:
+            raise WavecombError(self._full)
+        now = time.monotonic()
+        self._alone_since = self._alone_since or now
+        if self._cluster.wait_s is not None and now - self._alone_since > _NOBODY_S:
+            raise WavecombError(f"{self._cluster.what}: all workers are gone")
+
+    def _submit(self) -> bool:
+        """Sends the next batch; False: there is none."""
+        from wavecomb.farm.tasks import assemble_image, render_tiles
+
+        if self._ready:
+            batch = self._ready.popleft()
+        elif self._tiles:
+            count = min(self._batch_size(), len(self._tiles))
+            batch = _Batch([self._tiles.popleft() for _ in range(count)])
+        else:
+            return False
+        # Two clients of one scheduler give the same name to the same work.
+        tiles = [(task.image, task.tile, self._looks[task.image]) for task in batch.tiles]
+        name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
+                       batch.attempt, self._looks.get(batch.image)])  # fmt: skip
+        what: Any = tiles if tiles else batch.image
+        future = self._cluster.client.submit(
+            render_tiles if tiles else assemble_image, *self._common, self._machine, what,
+            key=f"wavecomb-{'tiles' if tiles else 'assembly'}-{name[:32]}",
+            resources={self._machine: 1}, retries=self._job.tries - 1, pure=False,
+            priority=0 if tiles else _ASSEMBLY_PRIORITY,
+        )  # fmt: skip
+        self._flying[future] = batch
+        future.add_done_callback(self._ended.put)
+        return True
+
+    def _batch_size(self) -> int:
+        wanted = _BATCH_S / self._seconds if self._seconds else 1
+        most = len(self._tiles) / (_LEAST_BATCHES * max(1, self._capacity()))
+        return max(1, int(min(wanted, most)))
+
+    def _again(self, tiles: list[Task]) -> None:
+        """Has tiles rendered anew, each alone, before the others."""
+        self._attempts += 1
+        self._ready.extendleft(_Batch([task], attempt=self._attempts) for task in reversed(tiles))
+
+    def _take(self, future: Any) -> None:
+        """Notes how a batch ended."""
+        batch = self._flying.pop(future, None)
+        if batch is None:
+            return
+        if future.status == "finished":
+            result = future.result()
+            if result["full"]:
+                self._leave_out(result["worker"], result["full"])
+            if batch.tiles:
+                self._take_tiles(batch, result)
+            else:
+                self._take_image(batch.image, result)
+        elif future.status == "error":
+            self._take_error(batch, future.exception())
+        else:  # lost or cancelled, not by this client
+            self._cluster.check(False)
+            self._put_back(batch)
+
+    def _take_tiles(self, batch: _Batch, result: dict[str, Any]) -> None:
+        for line in result["warnings"]:
+            if line not in self._warned:
+                self._warned.add(line)
+                self._warn(line)
+        done = [Task(image, tile) for image, tile in result["done"]]
+        for task in done:
+            self._note_done(task)
+        bad = {(image, tile): line for image, tile, line in result["failed"]}
+        for (image, tile), line in bad.items():
+            self._fail(self._job.title(image, tile), line)
+        self._again([t for t in batch.tiles if t not in done and (t.image, t.tile) not in bad])
+        if done:
+            # Of the last batch: the first ones open the stage, too.
+            self._seconds = result["seconds"] / len(done)
+
+    def _note_done(self, task: Task) -> None:
+        missing = self._missing[task.image]
+        if task.tile not in missing:
+            return
+        missing.discard(task.tile)
+        self._progressed = True
+        self._out.tasks_done += 1
+        if not missing:
+            self._ready.append(_Batch([], task.image))
+
+    def _take_image(self, image: int, result: dict[str, Any]) -> None:
+        if result["full"]:
+            self._ready.appendleft(_Batch([], image, self._next_attempt()))
+            return
+        if not result["again"]:
+            self._out.images_done += 1
+            self._progressed = True
+            return
+        self._looks[image] = max(result["looks"], self._looks[image])
+        self._missing[image] |= set(result["again"])
+        self._out.tasks_done -= len(result["again"])
+        self._again([Task(image, tile) for tile in result["again"]])
+
+    def _take_error(self, batch: _Batch, error: BaseException | None) -> None:
+        from distributed import KilledWorker
+
+        if isinstance(error, KilledWorker):
+            line = f"its worker ended {self._job.tries} times: a crash, or too little memory"
+        else:
+            line = " ".join(str(error).split()) or type(error).__name__
+        if len(batch.tiles) > 1:  # others of the batch may be good
+            self._again(batch.tiles)
+        elif batch.tiles:
+            self._fail(self._job.title(batch.tiles[0].image, batch.tiles[0].tile), line)
+        else:
+            self._fail(self._job.title(batch.image), line)
+
+    def _put_back(self, batch: _Batch) -> None:
+        if batch.tiles:
+            self._again(batch.tiles)
+        else:
+            self._ready.appendleft(_Batch([], batch.image, self._next_attempt()))
+
+    def _next_attempt(self) -> int:
+        self._attempts += 1
+        return self._attempts
+
+    def _fail(self, title: str, line: str) -> None:
+        self._progressed = True
+        self._out.failed.append((title, line))
+
+    def _leave_out(self, worker: str, why: str) -> None:
+        """Takes back from a worker whose disk is full what it has not begun."""
+        self._full = why
+        self._next_look = 0.0
+        client = self._cluster.client
+        held = set(client.processing(workers=[worker]).get(worker, ()))
+        for future in [one for one in self._flying if one.key in held]:
+            batch = self._flying.pop(future)
+            client.cancel([future])
+            self._put_back(batch)
+
+
+def run(
+    folder: Folder,
+    where: Where,
+    *,
+    threads: int = 0,
+    dashboard: int | None = None,
+    show: Callable[[Outcome], None] = lambda outcome: None,
+    warn: Callable[[str], None] = lambda line: None,
+    say: Callable[[str], None] = lambda line: None,
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """Works on a job until all is done, has failed, or somebody stops it.
+
+    Only tiles whose part is missing, damaged or of another key are rendered.
+
+    Args:
+        folder: The job's.
+        where: The cluster.
+        threads: Of each local worker; 0 means: as the job says, else its share of the cores.
+        dashboard: Port of Dask's dashboard; None means: there is none.
+        show: Called with how far the job is.
+        warn: Gets each warning about the stage once.
+        say: Gets the address of the dashboard.
+        is_stopped: Whether somebody wants to stop; what is done is kept.
+
+    Raises:
+        WavecombError: The settings are invalid, or there are no workers, or no more.
+    """
+    from wavecomb import _core
+
+    job = folder.job
+    for shot in job.shots:
+        _core.Settings(**shot.settings).check()
+    outcome = Outcome(job.task_count(), len(job.images))
+    left = []
+    for image in range(len(job.images)):
+        if is_finished(folder, image):
+            outcome.images_done += 1
+            outcome.tasks_done += job.tile_count(image)
+        else:
+            left.append(image)
+    if not left:
+        return outcome
+    wanted = threads or int(job.shots[0].settings.get("threads") or 0)
+    with connected(
+        where, folder.path, threads=wanted, tries=job.tries, hang_s=job.hang_s,
+        dashboard=dashboard,
+    ) as cluster:  # fmt: skip
+        if dashboard is not None:
+            say(f"dashboard {cluster.client.dashboard_link}")
+        at_work = Run(folder, cluster, outcome, show=show, warn=warn, is_stopped=is_stopped)
+        try:
+            at_work.work(left)
+        except (OSError, RuntimeError, TimeoutError) as error:
+            if cluster.client.status == "running":
+                raise
+            raise WavecombError(f"{cluster.what}: the scheduler is gone: {error}") from None
+        outcome.stopped = outcome.stopped or is_stopped()
+    return outcome

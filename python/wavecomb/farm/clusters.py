@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Dask clusters that work on a job: what ``--on`` says.
+
+A scheduler that this process starts, and its workers, talk by TLS with a certificate that nobody
+else has: whoever reaches a Dask scheduler runs code on its workers. Workers are started isolated:
+nothing in the working folder is imported.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import json
+import logging
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.extras import needed
+from wavecomb.machine import usable_cores
+
+MOST_WORKERS = 1024
+DASK_WAIT_S = 60.0
+"""For a first worker of a cluster to come."""
+_SLURM_WORKERS = 4
+_CONNECT_S = 10.0
+_ANSWER_S = 60.0
+"""For sbatch, squeue and scancel."""
+_ASK_S = 10.0
+"""Between two questions to squeue."""
+_MOST_STARTS = 5
+"""Of workers one after another without any progress."""
+_END_S = 5.0
+_LAUNCH = (
+    "import json, os, sys; parent, sys.path[:] = json.loads(sys.argv.pop(1)); "
+    "from wavecomb.run.parents import end_with_parent; parent and end_with_parent(); "
+    "parent and os.getppid() != parent and os._exit(1); "
+    "from distributed.cli.dask_worker import main; main()"
+)
+_SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
+
+
+@dataclass(frozen=True)
+class Where:
+    """What ``--on`` says.
+
+    Attributes:
+        kind: "local", "dask", "slurm", or "none": the job is only written.
+        workers: How many, of "local" and "slurm".
+        address: Of the scheduler of "dask".
+    """
+
+    kind: str
+    workers: int = 0
+    address: str = ""
+
+
+def parse_where(text: str) -> Where:
+    """What ``--on`` says. Raises WavecombError.
+
+    >>> parse_where("local:4")
+    Where(kind='local', workers=4, address='')
+    """
+    kind, colon, rest = text.partition(":")
+    if kind == "dask" and colon:
+        return Where("dask", address=parse_address(rest))
+    if kind == "none" and not colon:
+        return Where("none")
+    if kind in ("local", "slurm") and (
+        not colon or (re.fullmatch(r"[0-9]{1,4}", rest) and 1 <= int(rest) <= MOST_WORKERS)
+    ):
+        return Where(kind, int(rest or (_SLURM_WORKERS if kind == "slurm" else 1)))
+    raise WavecombError(
+        f"--on {text}: must be local, local:N with N workers, dask:tls://HOST:PORT, slurm:N, or "
+        "none: only write the job"
+    )
+
+
+def parse_address(text: str) -> str:
+    """The address of a scheduler with its protocol.
+
+    >>> parse_address("127.0.0.1:8786"), parse_address("tls://farm:8786")
+    ('tcp://127.0.0.1:8786', 'tls://farm:8786')
+
+    Raises:
+        WavecombError: It is none, or others could reach it without a certificate.
+    """
+    kind, found, rest = text.partition("://")
+    kind, rest = (kind, rest) if found else ("tcp", text)
+    host, _, port = rest.rpartition(":")
+    good = re.fullmatch(r"[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]", host)
+    if kind not in ("tcp", "tls") or not good or not re.fullmatch("[0-9]{1,5}", port):
+        raise WavecombError(f"--on dask:{text}: must be dask:HOST:PORT or dask:tls://HOST:PORT")
+    is_loopback = host == "localhost"
+    with contextlib.suppress(ValueError):
+        is_loopback = is_loopback or ipaddress.ip_address(host.strip("[]")).is_loopback
+    if int(port) > 65535 or (kind == "tcp" and not is_loopback):
+        raise WavecombError(
+            f"--on dask:{text}: is neither an address of this machine nor tls://: whoever reaches "
+            "a Dask scheduler runs code, so set up Dask's TLS (docs/farm.md)"
+        )
+    return f"{kind}://{rest}"
+
+
+class Cluster:
+    """A connection to a scheduler, and the workers that this process started.
+
+    Attributes:
+        client: Dask's client.
+    """
+
+    wait_s: float | None = 120.0
+    """For a first worker; None means any time."""
+
+    def __init__(self, client: Any, what: str) -> None:
+        """``what``: the cluster in messages."""
+        self.client = client
+        self.what = what
+
+    def check(self, progressed: bool) -> None:
+        """Starts workers that are no more; called now and then.
+
+        Args:
+            progressed: Whether anything was finished since the last call.
+
+        Raises:
+            WavecombError: They end again and again, or the scheduler is gone.
+        """
+        if self.client.status != "running":
+            raise WavecombError(f"{self.what}: the scheduler is gone")
+
+    def close(self) -> None:
+        """Ends the workers that this process started."""
+
+
+class _Started(Cluster):
+    """Workers of a process that starts them, which is started again when it ends."""
+
+    def __init__(self, client: Any, what: str, words: list[str], log: Path) -> None:
+        super().__init__(client, what)
+        self._words, self._log = words, log
+        self._process: subprocess.Popen[bytes] | None = None
+        self._starts = 0
+        self._start()
+
+    def _start(self) -> None:
+        self._starts += 1
+        with self._log.open("wb") as log:
+            self._process = subprocess.Popen(
+                self._words, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                start_new_session=True,
+            )  # fmt: skip
+
+    def check(self, progressed: bool) -> None:
+        """Starts the workers again where they ended."""
+        super().check(progressed)
+        assert self._process is not None
+        self._starts = 1 if progressed else self._starts
+        if self._process.poll() is None:
+            return
+        if self._starts >= _MOST_STARTS:
+            said = self._log.read_text(errors="replace").strip().splitlines() or ["no reason given"]
+            raise WavecombError(f"{self.what}: workers ended {self._starts} times: {said[-1]}")
+        self._start()
+
+    def close(self) -> None:
+        """Kills them: parts are written whole or not at all."""
+        assert self._process is not None
+        self._process.kill()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_END_S)
+
+
+class _Slurm(Cluster):
+    """An array of workers in Slurm's queue; those that end are replaced."""
+
+    wait_s = None
+
+    def __init__(self, client: Any, what: str, script: Path, words: list[str], count: int) -> None:
+        super().__init__(client, what)
+        self._script, self._words, self._count = script, words, count
+        self._ids: list[str] = []
+        self._starts = 0
+        self._next = 0.0
+        self._submit(count)
+
+    def _submit(self, count: int) -> None:
+        self._starts += 1
+        said = _ask(
+            "sbatch", "--parsable", "--job-name=wavecomb", f"--array=1-{count}", "--no-requeue",
+            "--signal=TERM@30", "--output=/dev/null", str(self._script), *self._words,
+        ).strip().splitlines()  # fmt: skip
+        match = re.fullmatch(r"(\d+)(;\S+)?", said[-1] if said else "")
+        if match is None:
+            raise WavecombError(f"--on slurm: sbatch gave no job number: {' '.join(said)!r}")
+        self._ids.append(match[1])
+        self._next = time.monotonic() + _ASK_S
+
+    def check(self, progressed: bool) -> None:
+        """Replaces workers whose time in the queue is over."""
+        super().check(progressed)
+        self._starts = 0 if progressed else self._starts
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _ASK_S
+        try:
+            ids = ",".join(self._ids)
+            there = len(_ask("squeue", "--noheader", "--array", "--jobs", ids).split("\n")) - 1
+        except WavecombError as error:
+            if "Invalid job id" not in str(error):
+                return  # it is asked again
+            there = 0
+        if there >= self._count:
+            return
+        if self._starts >= _MOST_STARTS:
+            raise WavecombError(f"{self.what}: Slurm's jobs end without finishing anything")
+        self._submit(self._count - there)
+
+    def close(self) -> None:
+        """Takes them out of the queue."""
+        for number in self._ids:
+            with contextlib.suppress(WavecombError):
+                _ask("scancel", number)
+
+
+@contextlib.contextmanager
+def connected(
+    where: Where, folder: Path, *, threads: int = 0, tries: int, hang_s: float,
+    dashboard: int | None = None,
+) -> Iterator[Cluster]:  # fmt: skip
+    """A cluster, as long as the block lasts.
+
+    Args:
+        where: Which one.
+        folder: The job's, for certificates that workers on other machines must see.
+        threads: Of each local worker; 0 means: its share of the cores.
+        tries: How many workers may die with a task, in clusters that are started here.
+        hang_s: A worker without a sign of life for so many seconds is restarted, likewise.
+        dashboard: Port of Dask's dashboard on this machine; None means: there is none.
+
+    Raises:
+        WavecombError: There is no such cluster.
+    """
+    distributed = needed("distributed", "wavecomb farm", "farm")
+    needed("cryptography", "wavecomb farm", "farm")
+    _silence()
+    if where.kind == "dask":
+        with _client(distributed, where.address, None) as client:
+            found = Cluster(client, f"--on dask:{where.address}")
+            found.wait_s = DASK_WAIT_S
+            yield found
+        return
+    import dask
+
+    settings = {
+        "distributed.scheduler.allowed-failures": tries - 1,
+        "distributed.scheduler.worker-ttl": f"{hang_s} s",
+        "distributed.scheduler.work-stealing": False,
+    }
+    is_local = where.kind == "local"
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(dask.config.set(settings))
+        beside = None if is_local else folder
+        place = stack.enter_context(
+            tempfile.TemporaryDirectory(prefix=".cluster-", dir=beside, ignore_cleanup_errors=True)
+        )
+        security = distributed.Security.temporary()
+        scheduler = stack.enter_context(
+            distributed.LocalCluster(
+                n_workers=0, processes=False, protocol="tls://", security=security,
+                host="127.0.0.1" if is_local else None, silence_logs=logging.CRITICAL,
+                dashboard_address=None if dashboard is None else f"127.0.0.1:{dashboard}",
+            )
+        )  # fmt: skip
+        address = scheduler.scheduler_address
+        client = stack.enter_context(_client(distributed, address, security))
+        words = _worker_words(address, security, Path(place), os.getpid() if is_local else 0)
+        what = f"--on {where.kind}:{where.workers}"
+        cluster: Cluster
+        if is_local:
+            each = threads or max(1, usable_cores() // where.workers)
+            words += ["--host", "127.0.0.1", "--local-directory", place]
+            words += ["--nworkers", str(where.workers), "--nthreads", str(each)]
+            cluster = _Started(client, what, words, Path(place, "log"))
+        else:
+            script = Path(place, "worker.sh")
+            script.write_text(_SCRIPT)
+            cluster = _Slurm(client, what, script, words, where.workers)
+        stack.callback(cluster.close)
+        yield cluster
+
+
+@contextlib.contextmanager
+def _client(distributed: Any, address: str, security: Any) -> Iterator[Any]:
+    try:
+        client = distributed.Client(
+            address, security=security, timeout=_CONNECT_S, set_as_default=False
+        )
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        why = " ".join(str(error.__cause__ or error).split()) or type(error).__name__
+        raise WavecombError(f"--on dask:{address}: no scheduler answers: {why}") from None
+    try:
+        yield client
+    finally:
+        with contextlib.suppress(Exception):
+            client.close(timeout=_END_S)
+
+
+def _worker_words(address: str, security: Any, place: Path, parent: int) -> list[str]:
+    """The command of a worker; ``parent``: process that it must not outlive, or 0."""
+    words = [sys.executable, "-I", "-c", _LAUNCH, json.dumps([parent, _search_path()]), address]
+    for option, name in (
+        ("--tls-ca-file", "tls_ca_file"), ("--tls-cert", "tls_worker_cert"),
+        ("--tls-key", "tls_worker_key"),
+    ):  # fmt: skip
+        file = place / name
+        with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as out:
+            out.write(getattr(security, name))
+        words += [option, str(file)]
+    return [*words, "--no-dashboard", "--memory-limit", "0", "--death-timeout", "60"]
+
+
+def _search_path() -> list[str]:
+    """Where this process imports from, but for the working folder."""
+    here = os.path.realpath(os.curdir)
+    return [p for p in sys.path if os.path.isabs(p) and os.path.realpath(p) != here]
+
+
+def _silence() -> None:
+    """Has Dask's loggers say nothing: what matters becomes one line."""
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _ask(*words: str) -> str:
+    """What a command of Slurm says. Raises WavecombError."""
+    try:
+        done = subprocess.run(
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_ANSWER_S
+        )
+    except FileNotFoundError:
+        raise WavecombError(f"--on slurm: the command {words[0]} is not here") from None
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise WavecombError(f"--on slurm: {words[0]}: {error}") from None
+    if done.returncode:
+        said = done.stderr.strip().splitlines() or [f"ended with code {done.returncode}"]
+        raise WavecombError(f"--on slurm: {words[0]}: {said[-1]}")
+    return done.stdout

@@ -1,0 +1,408 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A farm job: images, their tiles and how they are rendered, kept as JSON in the job's folder.
+
+The folder holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished
+image, and ``images/IMAGE.json`` for each finished one. Nothing else records progress.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.farm.maps import Pair, here, place
+from wavecomb.farm.tiling import MOST_TILES, Rectangle, tiles_of
+from wavecomb.picture.files import replacing
+from wavecomb.run.frame_names import fill, frame_text
+from wavecomb.version import version
+
+KIND = "wavecomb-farm-job"
+FORMAT = 2
+MAX_TASKS = 200_000
+_MAX_EDGE = 65536
+JOB_FILE = "job.json"
+LEARNED_FILE = "guide.learned"
+
+
+@dataclass(frozen=True)
+class Shot:
+    """Images of one camera or render product.
+
+    Attributes:
+        settings: Of the whole image, as ``Settings.to_dict`` gives them.
+        aovs: As ``aovs.expand`` gives them.
+        loading: Fields of ``LoadOptions`` except the frame.
+        output: The image's file, with a place for the frame.
+        png: The PNG's file, or None.
+        stats: The statistics' file, or None.
+    """
+
+    settings: dict[str, Any]
+    aovs: tuple[str, ...]
+    loading: dict[str, Any]
+    output: str
+    png: str | None = None
+    stats: str | None = None
+
+    @property
+    def region(self) -> Rectangle:
+        """The pixels that are rendered."""
+        found = self.settings.get("region")
+        if found is None:
+            return 0, 0, int(self.settings["width"]), int(self.settings["height"])
+        x0, y0, x1, y1 = (int(edge) for edge in found)
+        return x0, y0, x1, y1
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether the error of a pixel decides how many samples it gets."""
+        return bool(self.settings.get("adaptive"))
+
+
+@dataclass(frozen=True)
+class StageFile:
+    """A file that the stage needs: a layer, a texture, a profile.
+
+    ``bytes`` and ``mtime_ns`` let a machine that sees the same file skip reading it.
+    """
+
+    path: str
+    bytes: int
+    mtime_ns: int
+    sha256: str
+
+
+@dataclass(frozen=True, order=True)
+class Task:
+    """One tile of one image, by their indices in the job."""
+
+    image: int
+    tile: int
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is rendered; every field is JSON.
+
+    Attributes:
+        stage: As it was given; a relative name counts from ``folder``.
+        folder: The working folder of ``farm submit``.
+        shots: See ``Shot``.
+        images: Index of the shot, and frame or None, of each image.
+        files: Files of the stage with their hashes.
+        tiles: Columns and rows of each image.
+        file: half, compression, tile and split of ``Picture.save``.
+        exposure: Of PNGs, in stops.
+        tone_map: Of PNGs.
+        denoise: Whether images get the layer ``denoised``.
+        costs: A profile of shading costs to start from.
+        learned: SHA-256 of the guiding field that all images are given, or None.
+        tries: How often a task is tried.
+        hang_s: A worker that reports no progress for so many seconds is restarted.
+        strict: Whether a missing file is an error.
+        maps: Folders that lie elsewhere on machines that do not have them under the first name.
+        isa: Library that workers must use; None means: any, but one for all.
+        version: Of Wavecomb.
+    """
+
+    stage: str
+    folder: str
+    shots: tuple[Shot, ...]
+    images: tuple[tuple[int, float | None], ...]
+    files: tuple[StageFile, ...] = ()
+    tiles: tuple[int, int] = (1, 1)
+    file: dict[str, Any] = field(default_factory=dict)
+    exposure: float = 0.0
+    tone_map: str = "clamp"
+    denoise: bool = False
+    costs: dict[str, dict[str, float]] | None = None
+    learned: str | None = None
+    tries: int = 3
+    hang_s: float = 1800.0
+    strict: bool = True
+    maps: tuple[Pair, ...] = ()
+    isa: str | None = None
+    version: str = field(default_factory=version)
+
+    def __post_init__(self) -> None:
+        """Makes room for what is computed once for each image."""
+        object.__setattr__(self, "_rectangles", {})
+        object.__setattr__(self, "_image_keys", {})
+
+    @property
+    def id(self) -> str:
+        """A hash of all that the job says."""
+        return hashed(self.as_json())
+
+    def shot(self, image: int) -> Shot:
+        """The shot of an image."""
+        return self.shots[self.images[image][0]]
+
+    def frame(self, image: int) -> float | None:
+        """The frame of an image."""
+        return self.images[image][1]
+
+    def rectangles(self, image: int) -> list[Rectangle]:
+        """The tiles of an image, row by row."""
+        known: dict[Rectangle, list[Rectangle]] = self._rectangles  # type: ignore[attr-defined]
+        region = self.shot(image).region
+        if region not in known:
+            known[region] = tiles_of(region, self.tiles)
+        return known[region]
+
+    def tile_count(self, image: int) -> int:
+        """How many tiles an image has; never more columns or rows than pixels."""
+        x0, y0, x1, y1 = self.shot(image).region
+        return min(self.tiles[0], x1 - x0) * min(self.tiles[1], y1 - y0)
+
+    def tasks_of(self, image: int) -> list[Task]:
+        """The tasks of an image."""
+        return [Task(image, tile) for tile in range(self.tile_count(image))]
+
+    def tasks(self) -> Iterator[Task]:
+        """All tasks, in the order in which they are rendered."""
+        for image in range(len(self.images)):
+            yield from self.tasks_of(image)
+
+    def task_count(self) -> int:
+        """How many tasks there are."""
+        return sum(self.tile_count(image) for image in range(len(self.images)))
+
+    def names(self, image: int) -> dict[str, str]:
+        """Files of an image by kind: output, png, stats."""
+        shot, frame = self.shot(image), self.frame(image)
+        found = {"output": shot.output, "png": shot.png, "stats": shot.stats}
+        return {
+            kind: name if frame is None else fill(name, frame)
+            for kind, name in found.items()
+            if name is not None
+        }
+
+    def place(self, name: str) -> str:
+        """Where a file of the job lies on this machine."""
+        return place(os.path.join(self.folder, name), here(self.maps))
+
+    def title(self, image: int, tile: int | None = None) -> str:
+        """An image, or a tile of it, in messages: "frame 12, tile 3 of 8"."""
+        frame = self.frame(image)
+        words = [] if frame is None else [f"frame {frame_text(frame)}"]
+        if len(self.shots) > 1:
+            words.append(f"product {self.images[image][0] + 1} of {len(self.shots)}")
+        if tile is not None and self.tile_count(image) > 1:
+            words.append(f"tile {tile + 1} of {self.tile_count(image)}")
+        return ", ".join(words) or "the image"
+
+    # ---- keys ------------------------------------------------------------------------------------
+
+    def image_key(self, image: int, machine: str) -> str:
+        """A hash of all that decides the pixels of an image.
+
+        Args:
+            image: Its index.
+            machine: Class of the machines, as ``machine_class`` gives it.
+        """
+        known: dict[tuple[int, str], str] = self._image_keys  # type: ignore[attr-defined]
+        if (image, machine) in known:
+            return known[image, machine]
+        shot = self.shot(image)
+        known[image, machine] = found = hashed(
+            {
+                "stage": self.stage, "files": [(one.path, one.sha256) for one in self.files],
+                "settings": {**shot.settings, "threads": 0}, "aovs": shot.aovs,
+                "loading": shot.loading, "frame": self.frame(image), "costs": self.costs,
+                "learned": self.learned, "version": self.version, "machine": machine,
+            }
+        )  # fmt: skip
+        return found
+
+    def part_key(self, task: Task, machine: str) -> str:
+        """A hash of all that decides the pixels of a tile."""
+        tile = self.rectangles(task.image)[task.tile]
+        return hashed({"image": self.image_key(task.image, machine), "tile": tile})
+
+    def output_key(self, image: int) -> str:
+        """A hash of all that decides the files of an image, whatever machines rendered it."""
+        return hashed(
+            {
+                "image": self.image_key(image, ""), "names": self.names(image), "file": self.file,
+                "exposure": self.exposure, "tone_map": self.tone_map, "denoise": self.denoise,
+            }
+        )  # fmt: skip
+
+    # ---- JSON ------------------------------------------------------------------------------------
+
+    def as_json(self) -> dict[str, Any]:
+        """For a file."""
+        return {"kind": KIND, "format": FORMAT, **asdict(self)}
+
+    @classmethod
+    def of(cls, value: Any, name: str) -> Job:
+        """What a file says.
+
+        Raises:
+            WavecombError: It is no job, of another format, or damaged; begins with ``name``.
+        """
+        if not isinstance(value, Mapping) or value.get("kind") != KIND:
+            raise WavecombError(f"{name}: is no job of `wavecomb farm submit`")
+        if value.get("format") != FORMAT:
+            raise WavecombError(
+                f"{name}: is a job of format {value.get('format')!s:.20}, and this version of "
+                f"Wavecomb reads format {FORMAT} only: submit the job again"
+            )
+        try:
+            return _checked(cls, value)
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            why = error.args[0] if isinstance(error, ValueError) and error.args else repr(error)
+            raise WavecombError(f"{name}: is damaged: {why}; submit the job again") from None
+
+
+def hashed(value: Any) -> str:
+    """SHA-256 of what JSON makes of a value."""
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=list)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _checked(cls: type[Job], value: Mapping[str, Any]) -> Job:
+    given = {one.name: value[one.name] for one in fields(cls)}
+    shots = tuple(_shot(one) for one in _list(given["shots"], "shots"))
+    images = []
+    for shot, frame in _list(given["images"], "images"):
+        _whole(shot, 0, len(shots) - 1, "an image's shot")
+        images.append((shot, None if frame is None else _real(frame, "an image's frame")))
+    columns, rows = (_whole(n, 1, MOST_TILES, "tiles") for n in given["tiles"])
+    files = tuple(StageFile(**one) for one in given["files"])
+    for one in files:
+        if not (isinstance(one.path, str) and isinstance(one.sha256, str)):
+            raise ValueError("files: must have path and sha256")
+    if not (isinstance(given["stage"], str) and isinstance(given["folder"], str)):
+        raise ValueError("stage and folder: must be names")
+    if given["tone_map"] not in ("clamp", "neutral"):
+        raise ValueError("tone_map: must be clamp or neutral")
+    job = cls(
+        **{
+            **given, "shots": shots, "images": tuple(images), "files": files,
+            "tiles": (columns, rows), "maps": tuple((str(a), str(b)) for a, b in given["maps"]),
+            "tries": _whole(given["tries"], 1, 100, "tries"),
+            "hang_s": _real(given["hang_s"], "hang_s", 1.0),
+            "exposure": _real(given["exposure"], "exposure"), "file": dict(given["file"]),
+        }
+    )  # fmt: skip
+    if job.task_count() > MAX_TASKS:
+        raise ValueError(f"{job.task_count():,} tasks: there may be {MAX_TASKS:,}")
+    return job
+
+
+def _shot(value: Mapping[str, Any]) -> Shot:
+    shot = Shot(**{**value, "aovs": tuple(value["aovs"])})
+    width = _whole(shot.settings["width"], 1, _MAX_EDGE, "width")
+    height = _whole(shot.settings["height"], 1, _MAX_EDGE, "height")
+    x0, y0, x1, y1 = shot.region
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise ValueError(f"region {[x0, y0, x1, y1]}: is empty or leaves the image")
+    names = [shot.output, *(one for one in (shot.png, shot.stats) if one is not None)]
+    if not all(isinstance(name, str) and name for name in (*names, *shot.aovs)):
+        raise ValueError("output, png, stats and aovs: must be names")
+    if not isinstance(shot.loading, dict):
+        raise ValueError("loading: must be an object")
+    return shot
+
+
+def _list(value: Any, what: str) -> list[Any]:
+    if not isinstance(value, list) or not value:
+        raise ValueError(f"{what}: must be a list with an entry")
+    return value
+
+
+def _whole(value: Any, least: int, most: int, what: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise ValueError(f"{what}: must be a whole number from {least} to {most}")
+    return value
+
+
+def _real(value: Any, what: str, least: float = -math.inf) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{what}: must be a number")
+    if not math.isfinite(value) or value < least:
+        raise ValueError(f"{what}: must be finite" + (f", at least {least:g}" * (least > 0)))
+    return float(value)
+
+
+class Folder:
+    """A job's folder.
+
+    Attributes:
+        path: Absolute.
+        job: What it holds.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Reads the job. Raises WavecombError where there is none."""
+        self.path = Path(os.path.abspath(path))
+        file = self.path / JOB_FILE
+        try:
+            text = file.read_text(encoding="utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            raise WavecombError(
+                f"{os.fspath(path)}: is no folder of a job; `wavecomb farm submit` makes one"
+            ) from None
+        try:
+            value = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise WavecombError(f"{file}: is damaged: {error}; submit the job again") from None
+        self.job = Job.of(value, str(file))
+
+    @classmethod
+    def create(cls, path: str | os.PathLike[str], job: Job, learned: bytes | None = None) -> Folder:
+        """Makes the folder of a job. Raises WavecombError where something has that name."""
+        folder = Path(path)
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            raise WavecombError(
+                f"{os.fspath(path)}: is there already: `wavecomb farm resume` continues a job, "
+                "and --job names another folder"
+            ) from None
+        if learned is not None:
+            from wavecomb.run.learned import save_learned
+
+            save_learned(folder / LEARNED_FILE, learned)
+        write_json(folder / JOB_FILE, job.as_json())
+        return cls(folder)
+
+    def replace(self, job: Job) -> None:
+        """Writes another description of the job in place of the present one."""
+        write_json(self.path / JOB_FILE, job.as_json())
+        self.job = job
+
+    def part(self, task: Task) -> Path:
+        """The file of a rendered tile."""
+        return self.parts(task.image) / f"{task.tile:06d}.exr"
+
+    def parts(self, image: int) -> Path:
+        """The folder of an image's rendered tiles."""
+        return self.path / "parts" / f"{image:06d}"
+
+    def record(self, image: int) -> Path:
+        """The file that says with which bytes a finished image was written."""
+        return self.path / "images" / f"{image:06d}.json"
+
+    def learned(self) -> bytes | None:
+        """The guiding field that all images are given. Raises WavecombError: it is damaged."""
+        if self.job.learned is None:
+            return None
+        from wavecomb.run.learned import load_learned
+
+        return load_learned(self.path / LEARNED_FILE)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Writes a small file, whole or not at all."""
+    with replacing(path) as part:
+        part.write_text(json.dumps(value, allow_nan=False) + "\n", encoding="utf-8")

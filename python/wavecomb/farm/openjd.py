@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Jobs as templates of Open Job Description, made through its data model.
+
+Names of the job are values of template parameters, which are never expanded, so braces and line
+breaks in them change nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.extras import needed
+from wavecomb.farm.job import Folder
+from wavecomb.picture.files import replacing
+
+_NOTICE_S = 30
+
+
+def template(folder: Folder) -> dict[str, Any]:
+    """A template of two steps: a task for each tile, then the assembly of all images.
+
+    Raises:
+        WavecombError: The data model refuses a name of the job; or images have other tiles.
+    """
+    model = needed("openjd.model", "farm export", "farm")
+    job = folder.job
+    counts = {job.tile_count(image) for image in range(len(job.images))}
+    if len(counts) > 1:
+        raise WavecombError(f"{folder.path}: images of several sizes have other tiles each")
+    count = counts.pop()
+    cancel = {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": _NOTICE_S}
+
+    def action(*arguments: str) -> dict[str, Any]:
+        words = ["-I", "-m", "wavecomb", "farm", *arguments]
+        return {"command": "{{Param.Python}}", "args": words, "cancelation": cancel}
+
+    ranges = [("Image", f"1-{len(job.images)}"), ("Tile", f"1-{count}")]
+    value = {
+        "specificationVersion": "jobtemplate-2023-09",
+        "name": "Wavecomb render",
+        "parameterDefinitions": [
+            # A PATH would have to lie in the folder of the template.
+            {"name": "Job", "type": "STRING", "default": str(folder.path)},
+            {"name": "Python", "type": "STRING", "default": sys.executable},
+        ],
+        "steps": [
+            {
+                "name": "Render",
+                "parameterSpace": {
+                    "taskParameterDefinitions": [
+                        {"name": name, "type": "INT", "range": found} for name, found in ranges
+                    ]
+                },
+                "script": {
+                    "actions": {
+                        "onRun": action(
+                            "task", "{{Param.Job}}", "--image", "{{Task.Param.Image}}", "--tile",
+                            "{{Task.Param.Tile}}/" + str(count),
+                        )
+                    }
+                },
+            },
+            {
+                "name": "Assemble",
+                "dependencies": [{"dependsOn": "Render"}],
+                "script": {"actions": {"onRun": action("assemble", "{{Param.Job}}")}},
+            },
+        ],
+    }  # fmt: skip
+    try:
+        found: dict[str, Any] = model.model_to_object(
+            model=model.decode_job_template(template=value)
+        )
+    except model.DecodeValidationError as error:
+        why = " ".join(str(error).split())
+        raise WavecombError(
+            f"{folder.path}: Open Job Description refuses this job: {why}"
+        ) from None
+    return found
+
+
+def write_template(path: str | os.PathLike[str], folder: Folder) -> None:
+    """Writes ``template`` as JSON, which `openjd run` takes."""
+    text = json.dumps(template(folder), indent=2)
+    with replacing(path) as part:
+        part.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a Dask worker runs: renders tiles, joins images, and keeps the stage between tasks.
+
+Dask sends these functions by name; their arguments and results are plain values. A worker has one
+unit of the resource ``machine_class()``, and each task needs it, so tasks run one at a time.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from distributed import WorkerPlugin, get_worker
+from distributed.utils import sync
+
+from wavecomb.errors import WavecombError
+from wavecomb.farm.maps import VARIABLE, Pair, here, place, use_maps
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_LEAST_FREE = 1 << 16
+"""Bytes; libraries do not say why they cannot write, and a disk with less room is full."""
+_LOOK_S = 1.0
+_own_maps = os.environ.get(VARIABLE)
+_kept: Any = None
+"""The ``Renderer`` of the job that this process worked on last, and the job's id."""
+_current: Any = None
+"""Dask's worker and the key of the task at hand; other threads than the task's ask for them."""
+_read: dict[str, str] = {}
+"""SHA-256 of each stage file that this process has read, which USD may still hold."""
+
+
+class Progress:
+    """When this process last made progress; the watchdog looks at it."""
+
+    def __init__(self) -> None:
+        self.at = time.monotonic()
+        self.is_busy = False
+
+    def note(self, *values: object) -> None:
+        """Notes that the task at hand made progress."""
+        self.at = time.monotonic()
+
+    def show(self, status: object) -> None:
+        """As a ``Reporter``: a render made progress."""
+        self.note()
+
+    def wrote(self, path: str) -> None:
+        """As a ``Reporter``: nothing is written meanwhile."""
+
+    def __enter__(self) -> Progress:
+        self.note()
+        self.is_busy = True
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.is_busy = False
+
+
+progress = Progress()
+
+
+class FarmPlugin(WorkerPlugin):
+    """Has a worker announce its machine class as a resource, and restart when a render hangs."""
+
+    name = "wavecomb-farm"
+
+    def __init__(self, isa: str | None, hang_s: float) -> None:
+        """Arguments are those fields of ``Job``."""
+        self._isa = isa
+        self._hang_s = hang_s
+        self._ended = threading.Event()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_isa": self._isa, "_hang_s": self._hang_s}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["_isa"], state["_hang_s"])  # type: ignore[misc]
+
+    async def setup(self, worker: Any) -> None:
+        """Renders the probe image and announces the resource."""
+        from wavecomb.isa import VARIABLE as ISA
+
+        if self._isa is not None and "wavecomb._core" not in sys.modules:
+            os.environ[ISA] = self._isa
+        from wavecomb.farm.machine_class import machine_class
+
+        await worker.set_resources(**{machine_class(): 1})
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def teardown(self, worker: Any) -> None:
+        """Ends the watchdog."""
+        self._ended.set()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(_LOOK_S):
+            if progress.is_busy and time.monotonic() - progress.at > self._hang_s:
+                os._exit(1)  # the nanny starts another worker, and Dask gives it the task
+
+
+def render_tiles(
+    folder: str, maps: list[Pair], job: str, machine: str, tiles: list[tuple[int, int, int]]
+) -> dict[str, Any]:
+    """Renders tiles of a job that are not there yet.
+
+    Args:
+        folder: The job's, as the client sees it.
+        maps: Of the job.
+        job: ``Job.id``: another job in the folder is an error.
+        machine: Class of machines; this worker's.
+        tiles: Image, tile and looks at errors of each.
+
+    Returns:
+        ``done``: image and tile of each that is there now; ``failed``: image, tile and a line of
+        each that cannot be rendered; ``full``: why nothing can be written here, or empty;
+        ``warnings``: lines; ``seconds``; ``worker``: its address.
+    """
+    from wavecomb.farm.job import Task
+    from wavecomb.farm.part import has_part
+    from wavecomb.farm.rendering import Stopped
+
+    started = time.monotonic()
+    out: dict[str, Any] = {"done": [], "failed": [], "full": "", "warnings": []}
+    out["worker"] = _begin()
+    with progress:
+        renderer, of = _renderer(folder, maps, job)
+        for image, number, looks in tiles:
+            progress.note()
+            if _is_cancelled():
+                break
+            task = Task(image, number)
+            path, key = of.part(task), of.job.part_key(task, machine)
+            tile = of.job.rectangles(image)[number]
+            try:
+                if not has_part(path, key, tile, looks):
+                    renderer.render(task, path, machine, looks)
+                out["done"].append((image, number))
+            except Stopped:
+                break
+            except WavecombError as error:
+                out["failed"].append((image, number, str(error)))
+            except OSError as error:
+                if not is_full(error, path):
+                    raise
+                out["full"] = str(error)
+                _withdraw(machine)
+                break
+    out["warnings"] = list(renderer.warnings)
+    out["seconds"] = time.monotonic() - started
+    return out
+
+
+def assemble_image(
+    folder: str, maps: list[Pair], job: str, machine: str, image: int
+) -> dict[str, Any]:
+    """Joins the tiles of an image and writes its files; arguments are those of ``render_tiles``.
+
+    Returns:
+        ``again``: tiles that must be rendered first; ``looks``: looks at errors that their borders
+        must allow for, or 0; ``full``: why nothing can be written here, or empty; ``worker``.
+    """
+    from wavecomb.farm.assemble import finish_image
+
+    out: dict[str, Any] = {"again": [], "looks": 0, "full": ""}
+    out["worker"] = _begin()
+    with progress:
+        of = _folder(folder, maps, job)
+        try:
+            out |= finish_image(of, image, machine, get_worker().state.nthreads)
+        except OSError as error:
+            if not is_full(error, Path(of.job.place(of.job.names(image)["output"]))):
+                raise
+            out["full"] = str(error)
+            _withdraw(machine)
+    return out
+
+
+def has_stale_files(files: Iterable[tuple[str, str]], maps: list[Pair]) -> bool:
+    """Whether this process read other bytes of a file: USD may hold them, so it must restart."""
+    return any(_read.get(place(path, here(maps)), sha256) != sha256 for path, sha256 in files)
+
+
+def is_full(error: OSError, path: Path) -> bool:
+    """Whether an error comes of a disk that is full, or of a quota.
+
+    Args:
+        error: With its causes.
+        path: The file that could not be written.
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.errno in _FULL:
+            return True
+        cause = cause.__cause__
+    try:
+        found = os.statvfs(path.parent)
+    except OSError:
+        return False
+    return found.f_bavail * found.f_frsize < _LEAST_FREE
+
+
+def _begin() -> str:
+    """Notes the task at hand; the address of this worker."""
+    global _current
+    worker = get_worker()
+    _current = worker, worker.get_current_task()
+    return str(worker.address)
+
+
+def _folder(folder: str, maps: list[Pair], job: str) -> Any:
+    from wavecomb.farm.job import Folder
+
+    os.environ.pop(VARIABLE, None)
+    if _own_maps is not None:
+        os.environ[VARIABLE] = _own_maps
+    use_maps(here(maps))
+    found = Folder(place(folder, here(maps)))
+    if found.job.id != job:
+        raise WavecombError(f"{found.path}: the job was changed: `wavecomb farm resume` continues")
+    return found
+
+
+def _renderer(folder: str, maps: list[Pair], job: str) -> Any:
+    """The renderer of a job and its folder; the last ones as long as the job is the same."""
+    global _kept
+    if _kept is not None and _kept[0] == job:
+        return _kept[1:]
+    if _kept is not None:
+        _kept[1].close()
+        _kept = None
+    from wavecomb.api import import_usd
+    from wavecomb.farm.rendering import Renderer, check_files
+
+    import_usd()
+    of = _folder(folder, maps, job)
+    check_files(of.job)
+    _read.update({of.job.place(one.path): one.sha256 for one in of.job.files})
+    wanted = int(of.job.shots[0].settings.get("threads") or 0)
+    renderer = Renderer(
+        of.job, threads=wanted or get_worker().state.nthreads, learned=of.learned(),
+        reporter=progress, loading=progress.note, is_stopped=_is_cancelled,
+    )  # fmt: skip
+    _kept = job, renderer, of
+    return renderer, of
+
+
+def _is_cancelled() -> bool:
+    """Whether nobody wants the task at hand any more: Dask does not stop threads."""
+    worker, key = _current
+    task = worker.state.tasks.get(key)
+    return task is None or task.state == "cancelled" or worker.status.name != "running"
+
+
+def _withdraw(machine: str) -> None:
+    """Has Dask give this worker no more tasks of the farm."""
+    worker = get_worker()
+    sync(worker.loop, worker.set_resources, **{machine: 0})
