@@ -453,8 +453,7 @@ def run(
         try:
             at_work.work(left)
         except (OSError, RuntimeError, TimeoutError) as error:
-            if cluster.client.status == "running":
-                raise
-            raise WavecombError(f"{cluster.what}: the scheduler is gone: {error}") from None
+            cluster.check(False)  # says that the scheduler is gone, if it is
+            raise WavecombError(f"{cluster.what}: {' '.join(str(error).split())}") from error
         outcome.stopped = outcome.stopped or is_stopped()
     return outcome

@@ -39,11 +39,11 @@ _ASK_S = 10.0
 _MOST_STARTS = 5
 """Of workers one after another without any progress."""
 _END_S = 5.0
-_LAUNCH = (
-    "import json, os, sys; parent, sys.path[:] = json.loads(sys.argv.pop(1)); "
+_START = (
+    "import json, os, runpy, sys; parent, sys.path[:] = json.loads(sys.argv.pop(1)); "
     "from wavecomb.run.parents import end_with_parent; parent and end_with_parent(); "
     "parent and os.getppid() != parent and os._exit(1); "
-    "from distributed.cli.dask_worker import main; main()"
+    "module = sys.argv.pop(1); runpy.run_module(module, run_name='__main__', alter_sys=True)"
 )
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 
@@ -135,7 +135,9 @@ class Cluster:
             WavecombError: They end again and again, or the scheduler is gone.
         """
         if self.client.status != "running":
-            raise WavecombError(f"{self.what}: the scheduler is gone")
+            raise WavecombError(
+                f"{self.what}: the scheduler is gone; `wavecomb farm resume` continues"
+            )
 
     def close(self) -> None:
         """Ends the workers that this process started."""
@@ -314,30 +316,25 @@ def _client(distributed: Any, address: str, security: Any) -> Iterator[Any]:
             client.close(timeout=_END_S)
 
 
-def _worker_words(address: str, security: Any, place: Path, parent: int) -> list[str]:
-    """The command of a worker; ``parent``: process that it must not outlive, or 0."""
-    words = [sys.executable, "-I", "-c", _LAUNCH, json.dumps([parent, _search_path()]), address]
-    for option, name in (
-        ("--tls-ca-file", "tls_ca_file"), ("--tls-cert", "tls_worker_cert"),
-        ("--tls-key", "tls_worker_key"),
-    ):  # fmt: skip
-        file = place / name
-        with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as out:
-            out.write(getattr(security, name))
-        words += [option, str(file)]
-    return [*words, "--no-dashboard", "--memory-limit", "0", "--death-timeout", "60"]
+def isolated(module: str, *arguments: str, parent: int = 0) -> list[str]:
+    """The command that runs a module without importing anything from the working folder.
 
-
-def _search_path() -> list[str]:
-    """Where this process imports from, but for the working folder."""
+    Args:
+        module: To run.
+        arguments: Of the module.
+        parent: Process that it must not outlive; 0 means: it is independent.
+    """
     here = os.path.realpath(os.curdir)
-    return [p for p in sys.path if os.path.isabs(p) and os.path.realpath(p) != here]
+    path = [p for p in sys.path if os.path.isabs(p) and os.path.realpath(p) != here]
+    start = json.dumps([parent, path])
+    return [sys.executable, "-I", "-c", _START, start, module, *arguments]
 
 
 def _silence() -> None:
     """Has Dask's loggers say nothing: what matters becomes one line."""
-    for name in ("distributed", "tornado", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def _ask(*words: str) -> str:
