@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import ipaddress
-import json
 import logging
 import os
 import re
@@ -23,8 +22,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
+from wavecomb.farm.worker import write_certificates
 from wavecomb.machine import usable_cores
 
 MOST_WORKERS = 1024
@@ -39,12 +40,6 @@ _ASK_S = 10.0
 _MOST_STARTS = 5
 """Of workers one after another without any progress."""
 _END_S = 5.0
-_START = (
-    "import json, os, runpy, sys; parent, sys.path[:] = json.loads(sys.argv.pop(1)); "
-    "from wavecomb.run.parents import end_with_parent; parent and end_with_parent(); "
-    "parent and os.getppid() != parent and os._exit(1); "
-    "module = sys.argv.pop(1); runpy.run_module(module, run_name='__main__', alter_sys=True)"
-)
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 
 
@@ -156,10 +151,9 @@ class _Started(Cluster):
     def _start(self) -> None:
         self._starts += 1
         with self._log.open("wb") as log:
-            self._process = subprocess.Popen(
-                self._words, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                start_new_session=True,
-            )  # fmt: skip
+            self._process = processes.popen(
+                self._words, stdin=subprocess.DEVNULL, stdout=log, stderr=log
+            )
 
     def check(self, progressed: bool) -> None:
         """Starts the workers again where they ended."""
@@ -262,19 +256,27 @@ def connected(
         return
     import dask
 
-    settings = {
+    settings: dict[str, Any] = {
         "distributed.scheduler.allowed-failures": tries - 1,
         "distributed.scheduler.worker-ttl": f"{hang_s} s",
         "distributed.scheduler.work-stealing": False,
     }
     is_local = where.kind == "local"
+    what = f"--on {where.kind}:{where.workers}"
     with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set(settings))
-        beside = None if is_local else folder
-        place = stack.enter_context(
-            tempfile.TemporaryDirectory(prefix=".cluster-", dir=beside, ignore_cleanup_errors=True)
+        place = Path(
+            stack.enter_context(
+                tempfile.TemporaryDirectory(
+                    prefix=".cluster-", dir=None if is_local else folder, ignore_cleanup_errors=True
+                )
+            )
         )
+        # Dask imports from its temporary folder, so that must not be one of all users.
+        settings["temporary-directory"] = str(place)
+        stack.enter_context(dask.config.set(settings))
         security = distributed.Security.temporary()
+        write_certificates(place, security)
+        before = list(sys.path)
         scheduler = stack.enter_context(
             distributed.LocalCluster(
                 n_workers=0, processes=False, protocol="tls://", security=security,
@@ -282,18 +284,22 @@ def connected(
                 dashboard_address=None if dashboard is None else f"127.0.0.1:{dashboard}",
             )
         )  # fmt: skip
+        sys.path[:] = before
         address = scheduler.scheduler_address
         client = stack.enter_context(_client(distributed, address, security))
-        words = _worker_words(address, security, Path(place), os.getpid() if is_local else 0)
-        what = f"--on {where.kind}:{where.workers}"
+        words = processes.command(
+            "wavecomb.farm.worker", str(place), address, "--no-dashboard", "--memory-limit", "0",
+            "--death-timeout", "60", "--local-directory", str(place),
+            parent=os.getpid() if is_local else None,
+        )  # fmt: skip
         cluster: Cluster
         if is_local:
             each = threads or max(1, usable_cores() // where.workers)
-            words += ["--host", "127.0.0.1", "--local-directory", place]
-            words += ["--nworkers", str(where.workers), "--nthreads", str(each)]
-            cluster = _Started(client, what, words, Path(place, "log"))
+            words += ["--host", "127.0.0.1", "--nworkers", str(where.workers)]
+            words += ["--nthreads", str(each)]
+            cluster = _Started(client, what, words, place / "log")
         else:
-            script = Path(place, "worker.sh")
+            script = place / "worker.sh"
             script.write_text(_SCRIPT)
             cluster = _Slurm(client, what, script, words, where.workers)
         stack.callback(cluster.close)
@@ -314,20 +320,6 @@ def _client(distributed: Any, address: str, security: Any) -> Iterator[Any]:
     finally:
         with contextlib.suppress(Exception):
             client.close(timeout=_END_S)
-
-
-def isolated(module: str, *arguments: str, parent: int = 0) -> list[str]:
-    """The command that runs a module without importing anything from the working folder.
-
-    Args:
-        module: To run.
-        arguments: Of the module.
-        parent: Process that it must not outlive; 0 means: it is independent.
-    """
-    here = os.path.realpath(os.curdir)
-    path = [p for p in sys.path if os.path.isabs(p) and os.path.realpath(p) != here]
-    start = json.dumps([parent, path])
-    return [sys.executable, "-I", "-c", _START, start, module, *arguments]
 
 
 def _silence() -> None:

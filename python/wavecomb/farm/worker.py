@@ -23,7 +23,9 @@ def write_certificates(place: Path, security: Any) -> None:
         "ca-file": security.tls_ca_file,
         "worker": {"cert": security.tls_worker_cert, "key": security.tls_worker_key},
     }
-    with os.fdopen(os.open(place / TLS_FILE, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as f:
+    with os.fdopen(
+        os.open(place / TLS_FILE, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w"
+    ) as f:
         json.dump(values, f)
 
 
