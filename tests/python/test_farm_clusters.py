@@ -294,6 +294,28 @@ def test_one_image_is_of_one_class(stage: Path, tmp_path: Path) -> None:
     same(tmp_path / "a.exr", one_process(stage, tmp_path))
 
 
+@pytest.mark.slow
+def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
+    """It gets no more tasks, and the other one renders all."""
+    folder = made(stage, tmp_path)
+    limit = "import resource\ndef dask_setup(worker):\n"
+    limit += "    resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
+    (tmp_path / "limit.py").write_text(limit)
+    with cluster(tmp_path, 1) as dask:
+        dask.add_worker("--preload", str(tmp_path / "limit.py"))
+        words = ("farm", "resume", folder.path, "--on", f"dask:{dask.address}")
+        count = "import sys, distributed as d; c = d.Client(sys.argv[1]); c.wait_for_workers(2)"
+        subprocess.run([sys.executable, "-c", count, dask.address], check=True, timeout=100)
+        done = forks.wavecomb(*words, timeout=150)
+        assert done.returncode == 0, done.stderr
+        same(tmp_path / "a.exr", one_process(stage, tmp_path))
+        (tmp_path / "a.exr").unlink()
+        dask.workers[0].kill()
+        done = forks.wavecomb(*words, timeout=150)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert "cannot be written: File too large" in done.stderr
+
+
 # ---- Slurm ---------------------------------------------------------------------------------------
 
 SBATCH = """#!/bin/sh

@@ -192,6 +192,7 @@ def _write(
     good = output.open(str(file), spec) and output.write_image(pixels)
     why = "" if good else problem_of(output)
     if not (output.close() and good):
+        file.write_bytes(bytes(pixels.nbytes))  # fails with a number that says why, if it can
         raise OSError(
             f"{called}: cannot be written: {one_line(why or problem_of(output), str(file))}"
         )
