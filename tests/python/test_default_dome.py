@@ -38,7 +38,9 @@ def Material "M" {{ token outputs:surface.connect = </M/S.outputs:surface>
 {lamp}
 """
 PANEL = """def Mesh "{name}" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
-    point3f[] points = [(-{half},5,-{half}), (-{half},5,{half}), ({half},5,{half}), ({half},5,-{half})]
+    point3f[] points = [
+        (-{half},5,-{half}), (-{half},5,{half}), ({half},5,{half}), ({half},5,-{half})
+    ]
     int[] faceVertexCounts = [4]
     int[] faceVertexIndices = [0,3,2,1]
     uniform token subdivisionScheme = "none"
@@ -100,7 +102,7 @@ def test_emissive_textures_count_by_their_means(tmp_path, bright, lit):
     assert image.set_pixels(oiio.ROI(), pixels) and image.write(str(tmp_path / "e.exr"))
     emission = "color3f inputs:emissiveColor.connect = </M/T.outputs:rgb>"
     text = ROOM.format(emission=emission, lamp=PANEL.format(name="Panel", half=1.0))
-    scene, loaded = load(tmp_path, text)
+    scene, _ = load(tmp_path, text)
     assert bool(scene.lights) != lit
 
 

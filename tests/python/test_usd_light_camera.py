@@ -318,6 +318,15 @@ def test_predicates_of_expressions(tmp_path, predicate, rules, words):
     assert words in said(loaded) and ("warning" in said(loaded)) == bool(words)
 
 
+def test_expressions_are_evaluated_at_so_many_prims(tmp_path, monkeypatch):
+    """Instances in instances are billions of prims in a few lines."""
+    monkeypatch.setattr("wavecomb.usd.stage.collections.MOST_PRIMS", 5)
+    scene, loaded = load(tmp_path, _EXPRESSIONS)
+    assert "membershipExpression beyond 5 prims (cut there)" in said(loaded)
+    first = {"/Set/heroBox", "/Set/heroBox/Inner"}
+    assert set(scene.sets[scene.lights[0]["light_link"]]) == first
+
+
 def test_expressions_behind_includes_are_told(tmp_path):
     found, loaded = light(
         tmp_path,

@@ -11,6 +11,9 @@ from wavecomb.usd.stage.report import LoadReport
 Rules = dict[str, str]
 """A rule for each path: exclude, explicit (that path alone) or expand (and all below it)."""
 
+MOST_PRIMS = 1 << 20
+"""Prims that an expression is evaluated at: instances in instances may mean billions."""
+
 _RULES = {
     Usd.Tokens.exclude: "exclude",
     Usd.Tokens.explicitOnly: "explicit",
@@ -64,7 +67,11 @@ class Collections:
     ) -> Rules | None:
         expression = collection.ResolveCompleteMembershipExpression().GetText()
         if expression not in self._by_expression:
-            self._by_expression[expression] = _evaluated(collection.GetPrim().GetStage(), query)
+            rules, is_whole = _evaluated(collection.GetPrim().GetStage(), query)
+            if not is_whole:
+                what = f"membershipExpression beyond {MOST_PRIMS} prims (cut there)"
+                self._report.missing(what, collection.GetPath())
+            self._by_expression[expression] = rules
         return self._by_expression[expression]
 
     def _warn_of_ignored(
@@ -96,8 +103,12 @@ def _is_authored(prim: Usd.Prim, name: str) -> bool:
     return any((one := prim.GetAttribute(n)) and one.HasAuthoredValue() for n in names)
 
 
-def _evaluated(stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery) -> Rules | None:
+def _evaluated(
+    stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery
+) -> tuple[Rules | None, bool]:
     """The members of a query by evaluation at each prim: a rule wherever membership changes.
+
+    Then whether all prims were asked.
 
     A point instancer counts with all that it draws: its prototypes are not asked.
     """
@@ -105,7 +116,9 @@ def _evaluated(stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery) -> Rul
     member: dict[Sdf.Path, bool] = {}
     prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     walk = iter(prims)
-    for prim in walk:
+    for count, prim in enumerate(walk):
+        if count >= MOST_PRIMS:
+            return rules, False
         if prim.IsA(UsdShade.NodeGraph):  # a material, which is nobody's member
             walk.PruneChildren()
             continue
@@ -117,4 +130,4 @@ def _evaluated(stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery) -> Rul
             walk.PruneChildren()
         else:
             member[path] = inside
-    return None if member and all(member.values()) else rules
+    return None if member and all(member.values()) else rules, True
