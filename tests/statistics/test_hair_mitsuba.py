@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from agreement import assert_agree, batches
+from references import Reference
 
 from wavecomb.scenes.hair import HEAD_LEVEL, hair_strands, head_mesh
 from wavecomb.usd.geometry.strands import lay_out
@@ -133,7 +134,8 @@ def test_hair(
         "\n".join(f"{x} {y} {z} {r}" for (x, y, z), r in zip(strand, radii, strict=True))
         for strand in points
     ]
-    file.write_text("\n\n".join(rows) + "\n")
+    text = "\n\n".join(rows) + "\n"
+    file.write_text(text)
 
     class WithFibres(MitsubaScene):
         """The stage with the fibres."""
@@ -153,7 +155,8 @@ def test_hair(
 
     recorded = stage(kind, roughness)
     recorded.build()
-    peer = WithFibres(mitsuba, recorded, PeerSettings(SIZE, SIZE, depth))
+    about = (text, roughness, Path(__file__).read_bytes())
+    peer = Reference(mitsuba, recorded, PeerSettings(SIZE, SIZE, depth), WithFibres, about)
     spp = (256 if kind == "fibre" else 128) // fewer
     ours = batches(lambda seed: beauty(recorded.scene, SIZE, spp, seed=seed, max_depth=depth), 10)
     theirs = batches(lambda seed: peer.render(spp, seed), 10, first_seed=1000)

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from agreement import assert_agree, batches
+from references import Reference
 
 pytestmark = pytest.mark.slow
 
@@ -83,7 +85,8 @@ def test_media_in_meshes(mitsuba: ModuleType, beauty: Any, fewer: int, ior: floa
             }
 
     recorded.build()
-    peer = WithMedium(mitsuba, recorded, PeerSettings(SIZE, SIZE, DEPTH))
+    about = (bound, medium, Path(__file__).read_bytes())
+    peer = Reference(mitsuba, recorded, PeerSettings(SIZE, SIZE, DEPTH), WithMedium, about)
     spp = 256 // fewer
     ours = batches(lambda seed: beauty(recorded.scene, SIZE, spp, seed=seed, max_depth=DEPTH), 10)
     theirs = batches(lambda seed: peer.render(spp, seed), 10, first_seed=1000)

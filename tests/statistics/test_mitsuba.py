@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from agreement import Agreement, assert_agree, batches
+from references import Reference
 from stages import (
     box,
     camera,
@@ -57,11 +58,11 @@ def check(mitsuba: ModuleType, beauty: Any, fewer: int) -> Check:
         tolerance: float = 0.0,
         **settings: Any,
     ) -> Agreement:
-        from mitsuba_bridge import MitsubaScene, PeerSettings
+        from mitsuba_bridge import PeerSettings
 
         spp //= fewer
         size = size or (64 if fewer == 1 else 48)
-        peer = MitsubaScene(mitsuba, recorded, PeerSettings(size, size, max_depth))
+        peer = Reference(mitsuba, recorded, PeerSettings(size, size, max_depth))
         a = batches(
             lambda seed: beauty(
                 recorded.scene, size, spp, seed=seed, max_depth=max_depth, **settings
@@ -136,12 +137,12 @@ def test_disk_light(check: Check, recorded: Any) -> None:
 
 def test_instances_of_both(mitsuba: ModuleType, generated: Any) -> None:
     """Shape groups, which benchmarks use, and flattened copies: one picture in Mitsuba."""
-    from mitsuba_bridge import MitsubaScene, PeerSettings
+    from mitsuba_bridge import PeerSettings
     from recording import record
 
     scene = record(generated("cornell-dragon"))
     pictures = [
-        batches(partial(MitsubaScene(mitsuba, scene, how).render, 64), 6, first)
+        batches(partial(Reference(mitsuba, scene, how).render, 64), 6, first)
         for first, how in (
             (0, PeerSettings(32, 32, 2)),
             (50, PeerSettings(32, 32, 2, instancing=True)),
@@ -269,12 +270,12 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
     normals); the series of further bounces gives back F^2 (1 - L) / (1 - F L) of it, with a mean
     reflectance F = 0.97, 0.81, 0.36: 0.92, 0.64, 0.12. From afar, a ball gains that.
     """
-    from mitsuba_bridge import MitsubaScene, PeerSettings
+    from mitsuba_bridge import PeerSettings
 
     gold = material("Gold", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=0.45)
     view = camera((0, 0, 60), (0, 0, 0), half=0.0165)
     scene = recorded(view, light("Dome"), gold, sphere("Ball", "Gold", rings=64))
-    peer = MitsubaScene(mitsuba, scene, PeerSettings(32, 32, 1))
+    peer = Reference(mitsuba, scene, PeerSettings(32, 32, 1))
     gain = (beauty(scene.scene, 32, 256, max_depth=1) - peer.render(256)).mean(axis=(0, 1))
     gain *= (2 * 0.0165 * 60) ** 2 / np.pi  # per area of the disk that is seen
     assert np.abs(gain - 0.0837 * np.array((0.92, 0.64, 0.12))).max() < 0.008

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reference images of Mitsuba, kept on disk by a hash of all that they depend on.
+
+The hash covers the recorded scene, the settings, the number of samples, the seed, Mitsuba's version
+and variant, and the sources that translate a scene. Images are in build/references;
+`WAVECOMB_REFERENCES=0` renders each anew, and `make clean` removes them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from parts import is_on
+
+if TYPE_CHECKING:
+    from mitsuba_bridge import MitsubaScene, PeerSettings
+    from recorded import Recorded
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "build" / "references"
+MOST_BYTES = 300_000_000
+"""Above this the images that were used longest ago are removed."""
+
+Image = NDArray[np.float32]
+
+
+class Cache:
+    """Arrays in a folder by their keys."""
+
+    def __init__(self, folder: Path, most_bytes: int = MOST_BYTES) -> None:
+        self._folder = folder
+        self._most_bytes = most_bytes
+
+    def get(self, key: str, make: Callable[[], Image]) -> Image:
+        """The array of a key, which is made if it is not there or cannot be read."""
+        path = self._folder / f"{key}.npy"
+        try:
+            found: Image = np.load(path)
+            os.utime(path)
+            return found
+        except (OSError, ValueError, EOFError):
+            pass
+        made = make()
+        self._folder.mkdir(parents=True, exist_ok=True)
+        # Whole or absent: workers of pytest share the folder.
+        handle, part = tempfile.mkstemp(dir=self._folder, suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            np.save(file, made)
+        os.replace(part, path)
+        self._prune()
+        return made
+
+    def _prune(self) -> None:
+        files = []
+        for path in self._folder.glob("*.npy"):
+            try:
+                state = path.stat()
+            except OSError:
+                continue
+            files.append((state.st_mtime, state.st_size, path))
+        total = sum(size for _, size, _ in files)
+        for _, size, path in sorted(files):
+            if total <= self._most_bytes:
+                break
+            path.unlink(missing_ok=True)
+            total -= size
+
+
+def key_of(*values: Any) -> str:
+    """A hash of values: numbers, texts, bytes, arrays, and what holds such.
+
+    Raises:
+        TypeError: A value is of another type, whose content is not known.
+    """
+    told = hashlib.sha256()
+
+    def tell(value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            told.update(f"array {value.dtype.str} {value.shape} ".encode())
+            told.update(np.ascontiguousarray(value).tobytes())
+        elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+            told.update(f"{type(value).__name__} ".encode())
+            tell({one.name: getattr(value, one.name) for one in dataclasses.fields(value)})
+        elif isinstance(value, dict):
+            told.update(f"dict {len(value)} ".encode())
+            for name in sorted(value):
+                tell(name)
+                tell(value[name])
+        elif isinstance(value, (list, tuple)):
+            told.update(f"list {len(value)} ".encode())
+            for one in value:
+                tell(one)
+        elif isinstance(value, np.generic):
+            tell(value.item())
+        elif isinstance(value, bytes):
+            told.update(f"bytes {len(value)} ".encode() + value)
+        elif value is None or isinstance(value, (bool, int, float, str)):
+            told.update(f"{type(value).__name__} {len(repr(value))} {value!r} ".encode())
+        else:
+            raise TypeError(f"the content of a {type(value).__name__} is not known")
+
+    for value in values:
+        tell(value)
+    return told.hexdigest()
+
+
+@cache
+def _sources() -> str:
+    """A hash of what translates a scene."""
+    peers = ROOT / "benchmarks" / "peers"
+    files = [peers / "recorded.py", *sorted(peers.glob("mitsuba_*.py"))]
+    return key_of({file.name: file.read_bytes() for file in files})
+
+
+class Reference:
+    """A recorded scene as Mitsuba renders it; Mitsuba gets it when an image is not kept."""
+
+    def __init__(
+        self,
+        mitsuba: ModuleType,
+        recorded: Recorded,
+        settings: PeerSettings,
+        kind: type[MitsubaScene] | None = None,
+        about: object = (),
+    ) -> None:
+        """Takes the arguments of a ``MitsubaScene``.
+
+        Args:
+            mitsuba: The module.
+            recorded: The scene.
+            settings: Size and depth.
+            kind: A class derived from ``MitsubaScene``, with what ours has no words for.
+            about: All that such a class adds.
+        """
+        from mitsuba_bridge import MitsubaScene
+        from recorded import Recorded
+
+        self._kind = kind or MitsubaScene
+        self._arguments = (mitsuba, recorded, settings)
+        self._peer: MitsubaScene | None = None
+        self._is_kept = "WAVECOMB_REFERENCES" not in os.environ or is_on("WAVECOMB_REFERENCES")
+        self._key = ""
+        if self._is_kept:
+            # Not what only the recording has, such as the scene that it built.
+            names = [one.name for one in dataclasses.fields(Recorded)]
+            content = {name: getattr(recorded, name) for name in names}
+            # A texture's name is the path of its file, which lies in a temporary folder.
+            content["textures"] = [
+                {key: value for key, value in one.items() if key != "name"}
+                for one in recorded.textures
+            ]
+            tool = [mitsuba.__version__, mitsuba.variant(), _sources()]
+            self._key = key_of(tool, content, settings, about)
+
+    def render(self, spp: int, seed: int = 0) -> Image:
+        """The image of some samples a pixel."""
+        if not self._is_kept:
+            return self._render(spp, seed)
+        key = key_of(self._key, spp, seed)
+        return Cache(FOLDER).get(key, lambda: self._render(spp, seed))
+
+    def _render(self, spp: int, seed: int) -> Image:
+        if self._peer is None:
+            self._peer = self._kind(*self._arguments)
+        return self._peer.render(spp, seed)
