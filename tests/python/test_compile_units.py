@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from collections import defaultdict
@@ -23,12 +24,20 @@ VARIANTS = ROOT / "src" / "wavecomb" / "scene" / "material_parts.h"
 
 
 @pytest.fixture(scope="module")
-def units_with() -> dict[str, set[str]]:
+def units_with(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
     """Objects of the library and the module by each source of the core that they include."""
     ninja = Path(sys.executable).with_name("ninja")
     if not ninja.exists() or not (BUILD / ".ninja_deps").exists():
         not_here("the library was not built by make build")
-    deps = subprocess.run([ninja, "-C", BUILD, "-t", "deps"], capture_output=True, text=True)
+    # Ninja repairs logs that it opens, and another one may be at work: make test builds the C++
+    # tests meanwhile.
+    folder = tmp_path_factory.mktemp("build")
+    for entry in BUILD.iterdir():
+        if entry.name.startswith(".ninja_"):
+            shutil.copyfile(entry, folder / entry.name)
+        else:
+            (folder / entry.name).symlink_to(entry)
+    deps = subprocess.run([ninja, "-C", folder, "-t", "deps"], capture_output=True, text=True)
     found: dict[str, set[str]] = defaultdict(set)
     unit = ""
     for line in deps.stdout.splitlines():
