@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wavecomb.bench.figures_style import FAINT, INK, Drawn, clipped, figure, plain_logarithm
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
 
 ROW = 0.21
@@ -46,6 +47,38 @@ class Panel:
 
     title: str
     rows: Sequence[Row]
+
+
+def panels_of(
+    table: pd.DataFrame,
+    by: str,
+    name: str,
+    value: str,
+    prefix: str = "",
+    *,
+    colour: Callable[[Any], str],
+    hollow: Callable[[Any], bool] = lambda row: False,
+) -> list[Panel]:
+    """Makes a panel for each value of the column ``by``, with a row for each row of the table.
+
+    Args:
+        table: Columns ``name``, ``value`` and the ends of intervals, ``low`` and ``high``.
+        by: Column with the titles of panels.
+        name: Column with the names of rows.
+        value: Column with the points.
+        prefix: Of the columns ``low`` and ``high``.
+        colour: Colour of a row.
+        hollow: Whether a row is a bound or a baseline.
+    """
+
+    def row_of(row: Any) -> Row:
+        at, low, high = (getattr(row, key) for key in (value, f"{prefix}low", f"{prefix}high"))
+        return Row(str(getattr(row, name)), at, low, high, colour(row), hollow(row))
+
+    return [
+        Panel(str(title), [row_of(row) for row in part.itertuples()])
+        for title, part in table.groupby(by, sort=False)
+    ]
 
 
 def forest(

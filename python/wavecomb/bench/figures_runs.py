@@ -19,7 +19,7 @@ from wavecomb.bench.analysis_data import (
     varying,
 )
 from wavecomb.bench.analysis_interval import bootstrap
-from wavecomb.bench.figures_forest import Panel, Row, forest
+from wavecomb.bench.figures_forest import forest, panels_of
 from wavecomb.bench.figures_style import (
     BLUE,
     FAINT,
@@ -67,20 +67,11 @@ def ratio_figure(
     """A table of ``ratios`` as forest plots, a panel for each cell; None where it is too large."""
     if table.empty or table["cell"].nunique() > MOST_PANELS:
         return None
-    panels = []
-    for cell, part in table.groupby("cell", sort=False):
-        rows = [
-            Row(
-                str(row.level),
-                row.ratio,
-                row.low,
-                row.high,
-                policy_colour(row.level) if factor == "policy" else BLUE,
-                row.is_baseline or row.level in BOUNDS,
-            )
-            for row in part.itertuples()
-        ]
-        panels.append(Panel(str(cell), rows))
+    panels = panels_of(
+        table, "cell", "level", "ratio",
+        colour=lambda row: policy_colour(row.level) if factor == "policy" else BLUE,
+        hollow=lambda row: row.is_baseline or row.level in BOUNDS,
+    )  # fmt: skip
     base = table.loc[table["is_baseline"], "level"].iloc[0]
     caption = (
         f"{x_label[:1].upper()}{x_label[1:]}: ratio of means to {base}, 1 is no difference. "

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wavecomb.extras import needed
 from wavecomb.picture.files import replacing
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 INK = "#1a1b1e"
 """The colour of text, axes and what is compared with; in the report the page's own."""
 FAINT = "#8a8d93"
-GRID = "#8a8d9340"
 WHISKERS = 4.0
 """How far a logarithmic axis goes beyond the points, as a factor."""
 WIDTH = 7.4
@@ -39,39 +38,7 @@ _POLICY = {
     **{"texture-locality": SKY, "cost-benefit": RED, "adaptive": PURPLE},
     **{"random-runs": FAINT, "oracle": FAINT, "oracle-best": FAINT, "oracle-worst": FAINT},
 }
-_SETTINGS: dict[str, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 8.5,
-    "axes.titlesize": 9,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 8.5,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": FAINT,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "text.color": INK,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "grid.color": GRID,
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "lines.linewidth": 1.4,
-    "lines.markersize": 4.5,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "savefig.dpi": 160,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "wavecomb",
-}
+_STYLE = Path(__file__).parent / "report.mplstyle"
 
 
 @dataclass(frozen=True)
@@ -93,9 +60,8 @@ class Drawn:
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Settings of Matplotlib for as long as figures are made and saved."""
-    matplotlib = needed("matplotlib", "a figure")
-    with matplotlib.rc_context(_SETTINGS):
+    """Applies the style of figures while they are made and saved."""
+    with needed("matplotlib.style", "a figure").context(_STYLE):
         yield
 
 

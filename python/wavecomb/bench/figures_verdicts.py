@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.bench.analysis_data import BOUNDS
-from wavecomb.bench.figures_forest import Panel, Row, forest
+from wavecomb.bench.figures_forest import Panel, Row, forest, panels_of
 from wavecomb.bench.figures_runs import INTERVALS, MOST_PANELS, count_words
 from wavecomb.bench.figures_style import (
     BLUE,
@@ -40,20 +40,10 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | N
     """Ratio of each policy to the placebo, with the oracle, a panel for each stratum."""
     if table.empty or table["placebo_ratio"].isna().all():
         return None
-    panels = []
-    for stratum, part in table.groupby("stratum", sort=False):
-        rows = [
-            Row(
-                row.policy,
-                row.placebo_ratio,
-                row.placebo_low,
-                row.placebo_high,
-                policy_colour(row.policy),
-                row.policy in BOUNDS,
-            )
-            for row in part.itertuples()
-        ]
-        panels.append(Panel(str(stratum), rows))
+    panels = panels_of(
+        table, "stratum", "policy", "placebo_ratio", "placebo_",
+        colour=lambda row: policy_colour(row.policy), hollow=lambda row: row.policy in BOUNDS,
+    )  # fmt: skip
     if len(panels) > MOST_PANELS:
         return None
     caption = (
@@ -68,13 +58,9 @@ def regret_figure(table: pd.DataFrame, name: str) -> Drawn | None:
     """Regret of each policy, a panel for each cell."""
     if table.empty or table["cell"].nunique() > MOST_PANELS:
         return None
-    panels = []
-    for cell, part in table.groupby("cell", sort=False):
-        rows = [
-            Row(row.policy, row.regret, row.low, row.high, policy_colour(row.policy))
-            for row in part.itertuples()
-        ]
-        panels.append(Panel(str(cell), rows))
+    panels = panels_of(
+        table, "cell", "policy", "regret", colour=lambda row: policy_colour(row.policy)
+    )
     caption = (
         "Render time above that of the best fixed policy of the cell. "
         f"{INTERVALS}, n = {count_words(table['n'])} rounds."

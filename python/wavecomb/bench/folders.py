@@ -105,24 +105,22 @@ def compare_folders(before: Path, after: Path, metric: str = "render_s") -> Fold
             "compare folders of one suite, or choose another --metric"
         )
     tested = [_welch(groups_a[config], groups_b[config]) for config in common]
-    words = _words(metric)
-    changes = []
-    corrected = holm([p for _, p in tested])
-    for config, (estimate, _), p in zip(common, tested, corrected, strict=True):
-        values_a, values_b = groups_a[config], groups_b[config]
-        changes.append(
-            Change(
-                config=config,
-                before=float(values_a.mean()),
-                after=float(values_b.mean()),
-                ratio=estimate.value,
-                low=estimate.low if estimate.known else None,
-                high=estimate.high if estimate.known else None,
-                runs=(len(values_a), len(values_b)),
-                p=p,
-                verdict=verdict(estimate, p, words),
-            )
+    changes = [
+        Change(
+            config=config,
+            before=float(groups_a[config].mean()),
+            after=float(groups_b[config].mean()),
+            ratio=estimate.value,
+            low=estimate.low if estimate.known else None,
+            high=estimate.high if estimate.known else None,
+            runs=(len(groups_a[config]), len(groups_b[config])),
+            p=p,
+            verdict=verdict(estimate, p, _words(metric)),
         )
+        for config, (estimate, _), p in zip(
+            common, tested, holm([p for _, p in tested]), strict=True
+        )
+    ]
     pictures, different = _pictures(a, b)
     return FolderComparison(
         metric=metric,
