@@ -12,9 +12,9 @@ from graph_reference import FORMULAS, evaluate
 from wavecomb import _core
 from wavecomb.usd.graphs import program
 from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.linear import linear
 from wavecomb.usd.graphs.node import INPUTS, POINT_SIZE, GraphTooLarge, is_constant, numbers
 from wavecomb.usd.graphs.program import assemble
+from wavecomb.usd.graphs.surface import linear
 
 CONTINUOUS = [c for c in FORMULAS if c not in ("modulo", "less", "equal", "floor", "sign")]
 JUMPS = ["modulo", "less", "floor", "sign"]

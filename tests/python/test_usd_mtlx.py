@@ -16,7 +16,7 @@ from usd_recorder import Recorder
 from wavecomb.picture.image import write_png
 from wavecomb.usd import LoadReport, load_stage, mtlx, open_stage
 from wavecomb.usd.materialx.files import MAX_DEPTH, MtlxError
-from wavecomb.usd.materialx.layer import translate
+from wavecomb.usd.materialx.references import translate
 from wavecomb.usd.stage.diagnostics import captured
 
 GOLD = """<?xml version="1.0"?>

@@ -22,8 +22,7 @@ from wavecomb.usd.stage.unread import unread_mtlx
 
 if TYPE_CHECKING:
     from wavecomb.usd.graphs.surface import Networks
-    from wavecomb.usd.looks.surface import Surface
-    from wavecomb.usd.looks.surface_inputs import InputDefinition
+    from wavecomb.usd.looks.surface import InputDefinition, Surface
     from wavecomb.usd.looks.texture import TextureTable
     from wavecomb.usd.stage.report import LoadReport
 

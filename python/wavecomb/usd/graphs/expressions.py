@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from wavecomb.picture.working_space import from_rec709
 from wavecomb.usd.graphs.node import (
     INPUTS,
     POINT_SIZE,
@@ -170,3 +171,14 @@ def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
             new = operands[0] if node.code == PRIMVAR else make.again(node, operands)
         done[node] = fit(new, node.results)
     return tuple(part_of(part) for part in value)
+
+
+def in_working_space(make: Expressions, value: Value, working: str) -> Value:
+    """A colour of linear Rec.709 in the working space; what follows r, g and b stays."""
+    if working == "rec709":
+        return value
+    matrix = from_rec709(np.eye(3), working)
+    rgb = tuple(
+        make.op("dot", value[:3], numbers(*(float(x) for x in matrix[:, i])))[0] for i in range(3)
+    )
+    return rgb + value[3:]

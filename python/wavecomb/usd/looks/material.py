@@ -14,13 +14,15 @@ from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd import mtlx
-from wavecomb.usd.graphs.attributes import with_attributes
-from wavecomb.usd.graphs.node import GraphTooLarge
+from wavecomb.usd.graphs.expressions import Expressions, in_working_space
+from wavecomb.usd.graphs.node import PARAMETERS, GraphTooLarge, fit, numbers
+from wavecomb.usd.graphs.surface import graphs_of
 from wavecomb.usd.looks.emission import mean_emission
 from wavecomb.usd.looks.network import shader_id
 from wavecomb.usd.looks.preview import PreviewReader
 from wavecomb.usd.looks.surface import (
     COLOUR_PARAMETERS,
+    DEFAULTS,
     OPENPBR_COLOURS,
     Surface,
     fallback_surface,
@@ -362,3 +364,26 @@ class MaterialTable:
 def _stand_in(material: Usd.Prim) -> Surface:
     """What stands for a material that cannot be drawn."""
     return replace(fallback_surface(DEFAULT_COLOUR, name=str(material.GetPath())), stand_in=True)
+
+
+def with_attributes(surface: Surface, varying: Sequence[str], working: str) -> Surface:
+    """A surface some of whose parameters read their primvars at hits.
+
+    Raises:
+        GraphTooLarge: Together with what drives the surface already it is too much.
+    """
+    make = Expressions()
+    graph = surface.graph
+    outputs = {} if graph is None else dict(graph.outputs)
+    names = () if graph is None else graph.primvars
+    for parameter in varying:
+        width = PARAMETERS[parameter][1]
+        given = surface.parameters.get(parameter, DEFAULTS[parameter])
+        constant = given if isinstance(given, (tuple, list)) else (given,)
+        fallback = fit(numbers(*(float(x) for x in constant)), width)
+        value = make.attribute(surface.primvars[parameter], width, fallback)
+        if parameter in COLOUR_PARAMETERS:
+            value = in_working_space(make, value, working)
+        outputs[parameter] = value
+    rest = {key: name for key, name in surface.primvars.items() if key not in varying}
+    return replace(surface, primvars=rest, graph=graphs_of(outputs, names))

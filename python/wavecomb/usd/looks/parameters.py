@@ -25,8 +25,7 @@ from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical, linear_colou
 from wavecomb.usd.looks.material import PREVIEW, surface_source
 from wavecomb.usd.looks.network import Source, colour, number, shader_id, source_of, value_of
 from wavecomb.usd.looks.preview import INPUTS, constant, program_of
-from wavecomb.usd.looks.surface import COLOUR_PARAMETERS
-from wavecomb.usd.looks.surface_inputs import COLOUR, SWITCH, InputDefinition
+from wavecomb.usd.looks.surface import COLOUR, COLOUR_PARAMETERS, SWITCH, InputDefinition
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 

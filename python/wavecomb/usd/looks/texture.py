@@ -18,8 +18,7 @@ from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import memory
 from wavecomb.usd.looks.asset_files import UDIM, image_files, tile_files
 from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
-from wavecomb.usd.looks.halve import halve
-from wavecomb.usd.looks.pixels import ReadAhead, TextureError, read_image, stamp_of
+from wavecomb.usd.looks.pixels import ReadAhead, TextureError, halve, read_image, stamp_of
 from wavecomb.usd.looks.texture_cache import Image, TextureCache
 from wavecomb.usd.stage.report import LoadReport
 

@@ -31,8 +31,7 @@ from wavecomb.usd.stage.emitters import emitter_of
 from wavecomb.usd.stage.frame_cache import MeshCache
 from wavecomb.usd.stage.group import Group, Matrices, Scope
 from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.instance_looks import InstanceLooks, Look
-from wavecomb.usd.stage.instance_materials import InstanceMaterials
+from wavecomb.usd.stage.instance_looks import InstanceLooks, InstanceMaterials, Look
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
 from wavecomb.usd.stage.origin import around
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of

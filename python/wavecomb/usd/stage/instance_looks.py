@@ -18,10 +18,106 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from wavecomb.usd.geometry.primvar import PrimvarError, from_attribute, in_linear
 from wavecomb.usd.looks.assign import is_alike
-from wavecomb.usd.looks.material import MaterialTable, bound_materials
+from wavecomb.usd.looks.material import (
+    DEFAULT_COLOUR,
+    INHERIT_MATERIAL,
+    MaterialTable,
+    bound_materials,
+)
+from wavecomb.usd.looks.network import colour
 from wavecomb.usd.stage.group import Scope
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.traverse import Placed, Traversal
+
+MAX_COLOURS = 256
+"""Materials that one varying colour may turn into."""
+
+
+def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Colours (m, 3) as a palette (k, 3), k <= ``MAX_COLOURS``, and an index (m,) into it.
+
+    Steps are even in the square root, near to what the eye sees as even.
+    """
+    colours = np.nan_to_num(np.asarray(colours, np.float64), nan=0.0, posinf=1.0, neginf=0.0)
+    colours = np.maximum(colours, 0.0)
+    top = max(1.0, float(colours.max(initial=0.0)))
+    level = np.sqrt(colours / top)
+    for steps in (4095, 31, 15, 7, 5):
+        q = np.rint(level * steps).astype(np.int64)
+        keys = (q[:, 0] * 4096 + q[:, 1]) * 4096 + q[:, 2]
+        unique, index = np.unique(keys, return_inverse=True)
+        if len(unique) <= MAX_COLOURS:
+            break
+    index = index.ravel()
+    sizes = np.bincount(index)
+    sums = [np.bincount(index, weights=colours[:, axis]) for axis in range(3)]
+    return np.stack(sums, axis=1) / sizes[:, None], index
+
+
+class InstanceMaterials:
+    """Finds the materials of native instances and of point instancers."""
+
+    def __init__(self, traversal: Traversal, materials: MaterialTable, report: LoadReport) -> None:
+        self.traversal = traversal
+        self.time = traversal.time
+        self.materials = materials
+        self.report = report
+
+    def of_proxies(self, instance: Usd.Prim) -> tuple[str, ...]:
+        """Material paths of all below an instance: tells which instances may share a group."""
+        prims = [
+            prim
+            for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
+            if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.Subset)
+        ]
+        bound = bound_materials(prims, self.traversal.binding_purposes)
+        return tuple(str(m.GetPath()) if m else "" for m in bound)
+
+    def of_instance(self, placed: Placed, scope: Scope) -> int:
+        """The id for the meshes of an instance that have none of their own."""
+        surface = None if placed.material is None else self.materials.surface(placed.material)
+        if surface is not None and not surface.stand_in:
+            return self.materials.add(surface)
+        if scope.override or scope.bound:
+            return INHERIT_MATERIAL
+        for primvar in placed.inherited:
+            if primvar.GetPrimvarName() == "displayColor":
+                value = from_attribute(primvar.GetAttr(), "displayColor", self.time)
+                if value is not None and len(value.values):
+                    value = in_linear(value, self.report, placed.prim.GetPath())
+                    return self.materials.plain(colour(value.values[0], DEFAULT_COLOUR))
+        return INHERIT_MATERIAL if scope.inside else self.materials.plain()
+
+    def of_instancer(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
+        """(count,) ids for the instances of a point instancer: by its displayColor."""
+        if scope.bound or scope.override:
+            return np.full(count, INHERIT_MATERIAL, np.uint32)
+        inherited = self.traversal.inherit(placed.prim, placed.inherited)
+        attribute = placed.prim.GetAttribute("primvars:displayColor")
+        if attribute.HasAuthoredValue():
+            attributes = [attribute]
+        else:
+            attributes = [p.GetAttr() for p in inherited if p.GetPrimvarName() == "displayColor"]
+        for candidate in attributes:
+            try:
+                primvar = from_attribute(candidate, "displayColor", self.time)
+            except PrimvarError as error:
+                self.report.warn(f"{error}: ignored", placed.prim.GetPath())
+                continue
+            if primvar is None or primvar.values.shape[1] < 3:
+                continue
+            primvar = in_linear(primvar, self.report, placed.prim.GetPath())
+            if len(primvar.values) == 1:
+                return np.full(count, self.materials.plain(primvar.values[0]), np.uint32)
+            if len(primvar.values) == count:
+                palette, index = quantise(primvar.values[:, :3])
+                ids = np.array([self.materials.plain(c) for c in palette], np.uint32)
+                return ids[index]
+            what = "point instancer displayColor does not match protoIndices: ignored"
+            self.report.warn(what, placed.prim.GetPath())
+        default = INHERIT_MATERIAL if scope.inside else self.materials.plain()
+        return np.full(count, default, np.uint32)
+
 
 MOST_LOOKS = 256
 """Of a prototype; of more instances primvars are not read."""

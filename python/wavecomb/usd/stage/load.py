@@ -40,8 +40,7 @@ from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.material import MaterialTable
 from wavecomb.usd.looks.texture import TextureTable
-from wavecomb.usd.looks.texture_cache import TextureCache
-from wavecomb.usd.looks.texture_store import MEGABYTE, texture_store
+from wavecomb.usd.looks.texture_cache import MEGABYTE, TextureCache, texture_store
 from wavecomb.usd.stage.catchers import IGNORED, check_there, set_catchers
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary

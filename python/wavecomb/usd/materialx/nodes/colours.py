@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.colour import in_working_space
-from wavecomb.usd.graphs.expressions import Expressions
+from wavecomb.usd.graphs.expressions import Expressions, in_working_space
 from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import COLOURS
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder

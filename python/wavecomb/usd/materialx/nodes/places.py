@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.colour import in_working_space
+from wavecomb.usd.graphs.expressions import in_working_space
 from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import COLOURS, NORMAL
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder

@@ -10,9 +10,8 @@ import functools
 import math
 from typing import Any
 
-from wavecomb.usd.looks.surface_inputs import COLOUR, NUMBER, SWITCH, InputDefinition
-from wavecomb.usd.materialx.surfaces.models import MODELS
-from wavecomb.usd.materialx.surfaces.openpbr import layers_of
+from wavecomb.usd.looks.surface import COLOUR, NUMBER, SWITCH, InputDefinition
+from wavecomb.usd.materialx.surfaces.models import MODELS, layers_of
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
 _MOST = 1e6

@@ -18,8 +18,7 @@ from wavecomb.usd.looks.colour_space import holds_colour
 from wavecomb.usd.looks.network import colour, number, source_of
 from wavecomb.usd.looks.surface import Surface
 from wavecomb.usd.materialx.nodes.network import Networks
-from wavecomb.usd.materialx.surfaces.models import MODELS, Colour, Row
-from wavecomb.usd.materialx.surfaces.openpbr import drive_layers, layers_of
+from wavecomb.usd.materialx.surfaces.models import MODELS, Colour, Row, drive_layers, layers_of
 
 if TYPE_CHECKING:
     from wavecomb.usd.looks.texture import TextureTable
