@@ -33,6 +33,7 @@ class Setting:
         group: "picture": what the picture is; "work": how much is done for it; "order": what
             computes it, and in which order.
         changes_picture: Whether the picture depends on it.
+        changes_expectation: Whether the picture that more and more samples tend to depends on it.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Setting:
     choices: Mapping[str, str]
     group: str
     changes_picture: bool
+    changes_expectation: bool
 
     @property
     def option(self) -> str:
@@ -92,6 +94,16 @@ def names(group: str, *, without: Iterable[str] = ()) -> tuple[str, ...]:
     return tuple(
         name for name, row in settings().items() if row.group == group and name not in left_out
     )
+
+
+@cache
+def expectation() -> tuple[str, ...]:
+    """The settings that the picture depends on which more and more samples tend to.
+
+    >>> "max_depth" in expectation(), "seed" in expectation()
+    (True, False)
+    """
+    return tuple(name for name, row in settings().items() if row.changes_expectation)
 
 
 def default_text(setting: Setting) -> str:

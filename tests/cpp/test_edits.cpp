@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Edited scenes, twins, stop(), pick(): a scene that was edited is the scene built anew.
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <thread>
+#include <type_traits>
 
 #include "scene_testing.h"
 
@@ -304,6 +306,30 @@ TEST(Stop, EndsARenderFromAnotherThread) {
   Settings quick = small();
   renderer.render(quick);
   EXPECT_FALSE(renderer.statistics().cancelled) << "a stop is of one render";
+}
+
+static_assert(
+    std::is_same_v<RenderStatistics, decltype(std::declval<WavefrontRenderer&>().statistics())> &&
+        std::is_same_v<CostProfile, decltype(std::declval<WavefrontRenderer&>().cost_profile())>,
+    "another thread may replace them: callers get copies");
+
+/// For the thread sanitizer, and for copies of vectors that are being replaced.
+TEST(Renderer, StatisticsAreReadWhileAnotherThreadRenders) {
+  WavefrontRenderer renderer(cornell());
+  Settings s = small();
+  renderer.render(s);
+  const RenderStatistics first = renderer.statistics();
+  std::atomic<bool> done = false;
+  std::thread other([&] {
+    while (!done) {
+      const RenderStatistics now = renderer.statistics();
+      EXPECT_EQ(now.samples, first.samples);
+      EXPECT_GE(renderer.cost_profile().materials.size(), 0u);
+    }
+  });
+  for (int i = 0; i < 20; ++i) renderer.render(s);
+  done = true;
+  other.join();
 }
 
 TEST(Progressive, IsTheSamePictureInShortPasses) {

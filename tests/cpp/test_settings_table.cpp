@@ -36,6 +36,22 @@ TEST(SettingsTable, ValuesComeBackAsTheyWereSet) {
   EXPECT_EQ(find_setting("tea"), nullptr);
 }
 
+TEST(SettingsTable, SettingsThatChangeTheExpectationAreMarked) {
+  std::set<std::string> marked;
+  for (const SettingInfo& setting : setting_table())
+    if (setting.changes_expectation) {
+      marked.insert(setting.name);
+      EXPECT_TRUE(setting.changes_picture) << setting.name;
+    }
+  // A setting that is added has to be thought about, and named here if it is marked.
+  const std::set<std::string> known = {
+      "alpha",        "clamp_indirect", "crop",   "filter",    "filter_width",
+      "firefly",      "fresnel",        "height", "max_depth", "overscan",
+      "merge_radius", "texture_filter", "width"};
+  EXPECT_EQ(marked, known);
+  EXPECT_EQ(setting_table().size(), 50u) << "is the expectation another with the new setting?";
+}
+
 TEST(SettingsTable, WhatIsBeyondIsRefused) {
   for (const SettingInfo& setting : setting_table()) {
     if (!setting.choices.empty() || setting.least > setting.most || setting.most > 4e9) continue;

@@ -104,6 +104,7 @@ class Fake:
             camera_path="/Camera",
             volumes=[],
             catchers=(),
+            origin=(0.0, 0.0, 0.0),
             working_space="rec709",
             seconds=0.25,
             stage_path=path,

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,19 @@ def test_suites_are_as_large_as_they_should_be() -> None:
     assert len(of) == len(set(of.values())) == 1 + 4 + 6 + 1 + 2, "alone, in pairs, all, and auto"
     assert {c.case for c in learning if c.settings["time_limit"] == 5} == set(of)
     assert len(load_suite(find_suite("scenes")).stages) >= 12
+
+
+def test_settings_that_only_change_noise_share_a_golden_picture() -> None:
+    config = configurations(load_suite(find_suite("peers")), LIMITS)[0]
+
+    def key(**settings: object) -> str:
+        return replace(config, settings={**config.settings, **settings}).golden_key()
+
+    for alike in ({"roulette": "off"}, {"sampler": "independent"}, {"cosine_sampling": True}):
+        assert key(**alike) == key()
+    for other in ({"firefly": "reweight"}, {"merge_radius": 1.0}, {"texture_filter": "whole"},
+                  {"alpha": True}, {"max_depth": 3}, {"size": [9, 9]}):  # fmt: skip
+        assert key(**other) != key()
 
 
 def test_variants_of_a_renderer_share_a_golden_picture() -> None:

@@ -208,6 +208,10 @@ def drop_samples(metadata: dict[str, Any], layers: dict[str, Any]) -> None:
         (change({"seed": 1}), "b.exr: has seed 1, as "),
         (change({"max_depth": 3}), "b.exr: max_depth is 3, that of "),
         (change({"width": 31}), "b.exr: width is 31, that of "),
+        (change({"merge_radius": 1.0}), "b.exr: merge_radius is 1.0, that of "),
+        (change({"firefly": "reweight"}), "b.exr: firefly is reweight, that of "),
+        (change({"texture_filter": "whole"}), "b.exr: texture_filter is whole, that of "),
+        (change({"alpha": True}), "b.exr: alpha is True, that of "),
         (set_("wavecomb:stage", "other.usd"), "b.exr: the stage is other.usd, that of "),
         (set_("wavecomb:scene", "0123"), "b.exr: its stage is not that of "),
         (drop_settings, "b.exr: does not say what settings made it"),
@@ -226,6 +230,30 @@ def test_what_does_not_fit_is_refused(
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1 and message in result.stderr
     assert not output.exists()
+
+
+def test_settings_that_only_change_noise_may_differ(
+    pictures: list[wavecomb.Picture], files: list[Path]
+) -> None:
+    others = {
+        "sampler": "independent", "roulette": "off", "transport": "light", "guiding": "on",
+        "cosine_sampling": True, "light_selection": "power",
+    }  # fmt: skip
+    metadata, layers = pictures[1].file_metadata(), pictures[1].layers()
+    change(others)(metadata, layers)
+    write_exr(files[1], layers, metadata=metadata)
+    assert len(merge(files[:2]).seeds) == 2
+
+
+def test_files_of_builds_without_a_setting_have_its_default(
+    pictures: list[wavecomb.Picture], files: list[Path]
+) -> None:
+    metadata, layers = pictures[1].file_metadata(), pictures[1].layers()
+    old = json.loads(metadata["wavecomb:settings"])
+    del old["merge_radius"]
+    metadata["wavecomb:settings"] = json.dumps(old)
+    write_exr(files[1], layers, metadata=metadata)
+    assert len(merge(files[:2]).seeds) == 2
 
 
 def test_files_are_kept_from_harm(files: list[Path]) -> None:

@@ -104,7 +104,9 @@ def settings_page() -> str:
     """The settings of a render."""
     parts = ["# Settings of a render\n", NOTE,
              "Keywords of `wavecomb.render`, fields of `wavecomb.Settings`, keys of a suite. As "
-             "options of commands they have `-` for `_`.\n"]  # fmt: skip
+             "options of commands they have `-` for `_`. *Expectation*: whether the image that "
+             "more and more samples tend to depends on the setting; `wavecomb merge` refuses "
+             "images in which such settings differ.\n"]  # fmt: skip
     for group, title in ABOUT.items():
         parts.append(f"## {title}\n")
         body = []
@@ -114,8 +116,10 @@ def settings_page() -> str:
             choices = "<br>".join(f"`{key}`: {cell(text)}" for key, text in row.choices.items())
             values = choices or bounds(row.least, row.most) or row.kind
             zero = f" 0: {row.zero}." if row.zero else ""
-            body.append((code(name), cell(row.help + zero), code(default_text(row)), values))
-        parts.append(table(("setting", "", "default", "values"), body))
+            changes = "yes" if row.changes_expectation else ""
+            help_text = cell(row.help + zero)
+            body.append((code(name), help_text, code(default_text(row)), values, changes))
+        parts.append(table(("setting", "", "default", "values", "expectation"), body))
     return "\n".join(parts)
 
 

@@ -16,15 +16,10 @@ from typing import Any
 
 from wavecomb.bench.suite_model import WAVECOMB, Experiment, StageSource, Suite
 from wavecomb.errors import WavecombError
+from wavecomb.options import expectation
 
 FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
 """What settings that a row names are where a suite says nothing."""
-
-_FOR_PICTURE = (
-    *("size", "max_depth", "sampler", "filter", "filter_width"),
-    *("clamp_indirect", "fresnel", "cosine_sampling"),
-)
-"""Settings that a converged picture depends on."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +70,8 @@ class Config:
     def golden_key(self) -> str:
         """Equal for configurations that converge to the same picture; fit for file names."""
         width, height = self.settings["size"]
-        of = {key: self.settings[key] for key in _FOR_PICTURE if key in self.settings}
+        names = ("size", *expectation())
+        of = {key: self.settings[key] for key in names if key in self.settings}
         family = self.renderer.split("-")[0]  # variants of a renderer converge alike
         stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{family}"
         return f"{stage}-{width}x{height}-{digest(of)}"

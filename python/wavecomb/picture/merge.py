@@ -13,24 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
+from wavecomb.options import expectation
+from wavecomb.options import settings as known_settings
 from wavecomb.picture import cryptomatte
 from wavecomb.picture.image import read_layers, read_metadata
 from wavecomb.run.aovs import of_kind
 
-SAME_SETTINGS = (
-    "width",
-    "height",
-    "max_depth",
-    "sampler",
-    "filter",
-    "filter_width",
-    "roulette",
-    "roulette_depth",
-    "clamp_indirect",
-    "fresnel",
-    "cosine_sampling",
-)
-"""Settings that decide what a picture tends to; the rest may differ."""
 SQUARED = ("variance",)
 """Variances of means: they add up with the squares of the weights."""
 SPREAD = ("error",)
@@ -163,8 +151,12 @@ def _check_fit(first: _Source, other: _Source) -> None:
     def refuse(what: str, a: Any, b: Any) -> None:
         raise WavecombError(f"{other.name}: {what} is {b}, that of {first.name} is {a}")
 
-    for key in SAME_SETTINGS:
-        a, b = first.settings.get(key), other.settings.get(key)
+    rows = known_settings()
+    for key in expectation():
+        if key == "overscan":
+            continue  # checked below, with the size that it adds to
+        # Files of an earlier build lack settings that it did not have.
+        a, b = (one.settings.get(key, rows[key].default) for one in (first, other))
         if a != b:
             refuse(key, a, b)
     for key, what in (("wavecomb:stage", "the stage"), ("wavecomb:camera", "the camera")):

@@ -106,54 +106,65 @@ SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* 
   return info;
 }
 
+/// The same setting, as one that changes the expectation.
+SettingInfo in_expectation(SettingInfo info) {
+  info.changes_expectation = true;
+  return info;
+}
+
 /// What the picture is.
 std::vector<SettingInfo> picture_settings() {
   using S = Settings;
   return {
-      number<&S::width>("width", "Width", 1, kMaxSize, "Pixels of a row of the picture."),
-      number<&S::height>("height", "Height", 1, kMaxSize, "Rows of pixels."),
-      number<&S::max_depth>("max_depth", "Max depth", 0, kMostDepth,
-                            "Longest path, in scatterings."),
+      in_expectation(
+          number<&S::width>("width", "Width", 1, kMaxSize, "Pixels of a row of the picture.")),
+      in_expectation(number<&S::height>("height", "Height", 1, kMaxSize, "Rows of pixels.")),
+      in_expectation(number<&S::max_depth>("max_depth", "Max depth", 0, kMostDepth,
+                                           "Longest path, in scatterings.")),
       number<&S::seed>("seed", "Seed", 0, 0xffffffffu, "Of all random numbers."),
       choice<&S::sampler>("sampler", "Sampler",
                           {{"sobol", "Owen-scrambled Sobol points."},
                            {"independent", "Independent random numbers."}},
                           "Where samples lie."),
-      choice<&S::filter>("filter", "Filter",
-                         {{"box", "Even over its width."},
-                          {"gaussian", "A bell."},
-                          {"blackman-harris", "A bell that ends smoothly."}},
-                         "How samples count for the pixels around them."),
-      number_or_own<&S::filter_width>(
+      in_expectation(choice<&S::filter>("filter", "Filter",
+                                        {{"box", "Even over its width."},
+                                         {"gaussian", "A bell."},
+                                         {"blackman-harris", "A bell that ends smoothly."}},
+                                        "How samples count for the pixels around them.")),
+      in_expectation(number_or_own<&S::filter_width>(
           "filter_width", "Filter width", 0.01f, 32,
           "Full width of the filter in pixels; its own: box 1, the others 3.",
-          [](const S& s) -> SettingValue { return double{s.used_filter_width()}; }),
-      number<&S::clamp_indirect>("clamp_indirect", "Clamp indirect", 0, 1e30f,
-                                 "Limit of a sample's indirect light; biased.", "off"),
-      choice<&S::schlick_fresnel>(
+          [](const S& s) -> SettingValue { return double{s.used_filter_width()}; })),
+      in_expectation(number<&S::clamp_indirect>("clamp_indirect", "Clamp indirect", 0, 1e30f,
+                                                "Limit of a sample's indirect light; biased.",
+                                                "off")),
+      in_expectation(choice<&S::schlick_fresnel>(
           "fresnel", "Fresnel",
           {{"exact", "Fresnel's equations."}, {"schlick", "Schlick's approximation."}},
-          "Reflectance of dielectrics."),
-      choice<&S::texture_filter>(
+          "Reflectance of dielectrics.")),
+      in_expectation(choice<&S::texture_filter>(
           "texture_filter", "Texture filter",
           {{"auto",
             "Whole where the camera looks, by one texel, chosen by its weight, after a bounce."},
            {"whole", "Whole everywhere."}},
-          "How textures are filtered."),
+          "How textures are filtered.")),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
                                "Samples every bounce that is not a mirror's by cosine."),
-      row<&S::alpha>("alpha", "Alpha",
-                     "Where the camera sees a dome or a distant light the picture is clear, with "
-                     "an alpha channel."),
+      in_expectation(row<&S::alpha>(
+          "alpha", "Alpha",
+          "Where the camera sees a dome or a distant light the picture is clear, with "
+          "an alpha channel.")),
       row<&S::error>("error", "Errors", "Keeps errors and variances where nothing else asks."),
-      number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
-                           "Pixels that are rendered beyond each edge of the picture."),
+      in_expectation(
+          number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
+                               "Pixels that are rendered beyond each edge of the picture.")),
       number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMostDeepSamples,
                                "The most samples that a deep picture has in a pixel."),
       number<&S::deep_tolerance>("deep_tolerance", "Deep tolerance", 0, 1,
                                  "Samples of a deep picture whose depths differ by no more than "
                                  "this share of the depth are one."),
-      row<&S::crop>("crop", "Crop", "The picture is its region alone, in memory and in files."),
+      in_expectation(row<&S::crop>("crop", "Crop",
+                                   "The picture is its region alone, in memory and in files.")),
   };
 }
 
@@ -187,17 +198,18 @@ std::vector<SettingInfo> work_settings() {
           {{"off", "As lights shine, wherever that is."},
            {"on", "Mostly where some before the first pass brought light to the picture."}},
           "Where paths from lights are aimed."),
-      number<&S::merge_radius>("merge_radius", "Merge within", 0, 64,
-                               "Pixels, by which caustics that are seen in mirrors or through "
-                               "glass may be blurred so that light paths find them.",
-                               "never"),
-      choice<&S::firefly>(
+      in_expectation(
+          number<&S::merge_radius>("merge_radius", "Merge within", 0, 64,
+                                   "Pixels, by which caustics that are seen in mirrors or through "
+                                   "glass may be blurred so that light paths find them.",
+                                   "never")),
+      in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
           {{"keep", "They stay: nothing is biased."},
            {"reweight",
             "Samples count as far as others are as bright: darker where they are few. The "
             "layer unbiased has them all."}},
-          "What becomes of samples much brighter than others."),
+          "What becomes of samples much brighter than others.")),
       number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
                                  "The first vertex at which a path may end early."),
       choice<&S::light_selection>(

@@ -34,6 +34,9 @@ struct SettingInfo {
   const char* help = "";   ///< a sentence
   /// Whether the picture depends on it; if not, it says how the picture is computed.
   bool changes_picture = true;
+  /// Whether the picture that more and more samples tend to depends on it. Others change noise,
+  /// work, or layers that say something about these.
+  bool changes_expectation = false;
   SettingGroup group = SettingGroup::kPicture;
   double least = 0, most = -1;         ///< of numbers; least > most: any
   const char* zero = "";               ///< what 0 stands for, where it stands for something

@@ -49,18 +49,18 @@ constexpr float kDarkestShare = 0x1p-12f;
 }  // namespace
 
 struct WavefrontRenderer::Impl {
-  // Replaced by edits, under the mutex.
+  // Replaced by edits and renders, under the mutex.
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeAccelerator> accel;
   uint64_t version = 0;
   std::shared_ptr<const Learned> learned;  ///< of the last render that was not stopped before
   Watch* watch = nullptr;                  ///< of the render that goes on
+  RenderStatistics statistics;             ///< of the last render
+  CostProfile profile;                     ///< after the last render
   mutable std::mutex mutex;
 
   uint32_t threads = 0;
   double build_s = 0;
-  RenderStatistics statistics;
-  CostProfile profile;  ///< after the last render
   LightCalibrationCache light_calibrations;
   GuideTrainingCache trainings;
 
@@ -181,11 +181,13 @@ std::optional<LearnedPlace> WavefrontRenderer::learned(float x, float y, uint32_
   return look_up(*learned, {seen->position, n, seen->material});
 }
 
-const RenderStatistics& WavefrontRenderer::statistics() const {
+RenderStatistics WavefrontRenderer::statistics() const {
+  const std::lock_guard lock(impl_->mutex);
   return impl_->statistics;
 }
 
-const CostProfile& WavefrontRenderer::cost_profile() const {
+CostProfile WavefrontRenderer::cost_profile() const {
+  const std::lock_guard lock(impl_->mutex);
   return impl_->profile;
 }
 
@@ -230,6 +232,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   if (chosen.time_limit > 0)
     chosen.time_limit = std::max(1e-6f, chosen.time_limit - static_cast<float>(choice.seconds));
   Picture picture = impl_->render(chosen, choice.share, options, watch);
+  const std::lock_guard lock(impl_->mutex);
   impl_->statistics.transport = choice;
   return picture;
 }
@@ -402,8 +405,13 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   if (options.progress && !watch.stopped()) options.progress(loop.status());
   snapshot(true);
 
-  RenderStatistics& s = statistics = taken();
-  profile = costs.profile();
+  RenderStatistics s = taken();
+  const auto keep = [&] {
+    const std::lock_guard lock(mutex);
+    statistics = s;
+    profile = costs.profile();
+  };
+  keep();
   if (!options.wants_picture) return {window.width(), window.height(), {}, {}, {}, {}, {}};
   ErrorMap error;
   error.mean_relative = std::numeric_limits<double>::infinity();
@@ -411,6 +419,7 @@ Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare
   s.error = error.mean_relative;
   Film::Layers layers = std::move(film).finish(aovs.kept_names);
   s.peak_rss_bytes = peak_rss_bytes();
+  keep();
   Picture picture{window.width(),
                   window.height(),
                   std::move(layers.beauty),

@@ -119,10 +119,10 @@ class WavefrontRenderer {
   /// packed_training() of the last render() that was not stopped before it began.
   std::vector<std::byte> packed_learned() const;
 
-  /// Costs after the last render().
-  const CostProfile& cost_profile() const;
-  /// Of the last render().
-  const RenderStatistics& statistics() const;
+  /// Costs after the last render(); a copy, since the next render replaces them.
+  CostProfile cost_profile() const;
+  /// Statistics of the last render(); a copy likewise.
+  RenderStatistics statistics() const;
 
  private:
   struct Impl;
