@@ -369,7 +369,7 @@ def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
         assert client.poll() is None, client.communicate()[1]
         secrets = next(folder.path.glob(".cluster-*"))
         assert stat.S_IMODE(secrets.stat().st_mode) == 0o700
-        assert stat.S_IMODE((secrets / "tls_worker_key").stat().st_mode) == 0o600
+        assert stat.S_IMODE((secrets / "tls.json").stat().st_mode) == 0o600
         for number in (tmp_path / "pids").read_text().split():
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(int(number), signal.SIGTERM)  # as at the end of their time

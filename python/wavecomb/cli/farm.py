@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -83,8 +84,9 @@ def resume_command(
 
     where = parse_where(on)
     folder = opened(job, maps)
-    found = Job.of(ask_plan({"again": folder.job.as_json()})["job"], job)
-    changed = refresh(folder, found)
+    short = replace(folder.job, files=(), images=folder.job.images[:1])
+    found = Job.of(ask_plan({"again": short.as_json()})["job"], job)
+    changed = refresh(folder, replace(folder.job, files=found.files))
     if changed and not (quiet or as_json):
         click.echo(f"{changed} files of the stage have changed: all images are rendered again")
     if where.kind == "none":

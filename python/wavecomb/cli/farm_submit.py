@@ -7,7 +7,6 @@ import base64
 import json
 import os
 import subprocess
-import sys
 from typing import Any
 
 import click
@@ -119,7 +118,8 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     """Has a child process read the stage, so that a crash in a library is one line.
 
     Args:
-        request: Options of ``farm submit``, or {"again": a job as JSON}.
+        request: Options of ``farm submit``, or {"again": a job as JSON}. It is an argument of the
+            child, which a sandbox starts twice, so it has to be short.
 
     Returns:
         ``job`` as JSON, and ``learned``: base64 or None.
@@ -127,10 +127,10 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     Raises:
         WavecombError: What the child says.
     """
-    words = processes.command("wavecomb", "farm", "plan", parent=0)
+    words = processes.command("wavecomb", "farm", "plan", json.dumps(request), parent=0)
     try:
         done = subprocess.run(
-            words, input=json.dumps(request), capture_output=True, text=True, timeout=_PLAN_S
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_PLAN_S
         )
     except subprocess.TimeoutExpired:
         raise WavecombError(
@@ -146,15 +146,16 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
 
 
 @click.command("plan", hidden=True)
+@click.argument("text", metavar="REQUEST")
 @isolation_options
-def plan_command() -> None:
-    """Read a request of ``ask_plan`` on standard input and answer on standard output."""
+def plan_command(text: str) -> None:
+    """Answer a request of ``ask_plan`` on standard output."""
     from wavecomb.farm.job import Job
     from wavecomb.farm.maps import parse_maps
     from wavecomb.farm.planning import complete, with_files
     from wavecomb.farm.tiling import parse_tiles
 
-    request = _tuples(json.load(sys.stdin))
+    request = _tuples(json.loads(text))
     if "again" in request:
         enter_to_read(())
         job = with_files(Job.of(request["again"], "the job"))
@@ -177,8 +178,8 @@ def plan_command() -> None:
         maps=parse_maps(own["maps"]), isa=own["isa"],
     )  # fmt: skip
     job = complete(job, tiles=parse_tiles(own["tiles"]), workers=own["workers"], learned=learned)
-    text = None if learned is None else base64.b64encode(learned).decode()
-    click.echo(json.dumps({"job": job.as_json(), "learned": text}))
+    field = None if learned is None else base64.b64encode(learned).decode()
+    click.echo(json.dumps({"job": job.as_json(), "learned": field}))
 
 
 def _tuples(value: Any) -> Any:
