@@ -57,7 +57,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
     have their stage open before the clock starts. Both write the same part files.
     """
     from wavecomb import farm
-    from wavecomb.farm import client
+    from wavecomb.farm import client, outcome
     from wavecomb.farm.machine_class import machine_class
     from wavecomb.farm.rendering import Renderer
 
@@ -77,8 +77,8 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
         found["rendering_ms"] = 1e3 * (time.perf_counter() - start) / (len(tasks) - workers)
         started: list[tuple[float, int]] = []
 
-        def show(outcome: client.Outcome) -> None:
-            done = outcome.tasks_done
+        def show(at: outcome.Outcome) -> None:
+            done = at.tasks_done
             if (done >= workers and not started) or (done == len(tasks) and len(started) == 1):
                 started.append((time.perf_counter(), done))
 

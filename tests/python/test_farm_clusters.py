@@ -21,7 +21,7 @@ from parts import needs
 from wavecomb import farm
 from wavecomb.errors import WavecombError
 from wavecomb.farm.clusters import parse_address, parse_where
-from wavecomb.farm.job import Folder
+from wavecomb.farm.folder import Folder
 
 pytestmark = needs("wavecomb._core", "distributed", "cryptography")
 

@@ -17,7 +17,7 @@ from wavecomb.cli.options import examples
 from wavecomb.errors import WavecombError
 
 if TYPE_CHECKING:
-    from wavecomb.farm.job import Folder
+    from wavecomb.farm.folder import Folder
 
 JOB = click.argument("job", type=click.Path(), metavar="JOB")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="For programs.")
@@ -49,7 +49,7 @@ farm_command.add_command(plan_command)
 
 def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
     """The folder of a job, with path maps of this machine."""
-    from wavecomb.farm.job import Folder
+    from wavecomb.farm.folder import Folder
     from wavecomb.farm.maps import parse_maps, use_maps
 
     use_maps(parse_maps(maps))
@@ -100,7 +100,7 @@ def resume_command(
 @AS_JSON
 def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
     """Show how many tiles and images of JOB are there; each file is read and compared."""
-    from wavecomb.farm.client import status
+    from wavecomb.farm.outcome import status
 
     folder = opened(job, maps)
     out = status(folder)

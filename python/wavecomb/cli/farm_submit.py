@@ -83,7 +83,8 @@ def submit_command(
     keeps what is done, and `wavecomb farm resume` continues. docs/farm.md says more.
     """
     from wavecomb.farm.clusters import parse_where
-    from wavecomb.farm.job import Folder, Job
+    from wavecomb.farm.folder import Folder
+    from wavecomb.farm.job import Job
     from wavecomb.farm.maps import parse_maps
     from wavecomb.farm.planning import default_folder
     from wavecomb.farm.tiling import parse_tiles

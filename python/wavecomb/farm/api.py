@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.job import Folder, Job, Task
+from wavecomb.farm.folder import Folder
+from wavecomb.farm.job import Job, Task
 from wavecomb.farm.maps import parse_maps
 from wavecomb.farm.planning import complete, default_folder, shot_of
 from wavecomb.farm.tiling import parse_tile, parse_tiles
@@ -58,9 +59,6 @@ def submit(
         tries: How often a task is tried.
         hang_s: A worker without progress for so many seconds is restarted.
         **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
-
-    >>> job = submit("shot.usd", "shot.exr", tiles="8x4", spp=256)  # doctest: +SKIP
-    >>> run(job, workers=4)  # doctest: +SKIP
 
     Raises:
         WavecombError: An option is invalid, or a farm cannot render it.

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.job import Folder, Job, Shot, Task, write_json
+from wavecomb.farm.folder import Folder, write_json
+from wavecomb.farm.job import Job, Shot, Task
 from wavecomb.farm.part import AOV, DamagedPart, Part, has_part, load_part, read_part
 from wavecomb.farm.tiling import Rectangle
 from wavecomb.picture.rendered import Picture

@@ -7,14 +7,16 @@ import queue
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assemble import is_finished, machine_of
 from wavecomb.farm.clusters import Cluster, Where, connected
-from wavecomb.farm.job import Folder, Task, hashed
+from wavecomb.farm.folder import Folder
+from wavecomb.farm.job import Task, hashed
 from wavecomb.farm.machine_class import PREFIX
+from wavecomb.farm.outcome import Outcome
 from wavecomb.farm.part import has_part
 
 _TURN_S = 0.2
@@ -27,62 +29,6 @@ _LEAST_BATCHES = 4
 _NOBODY_S = 60.0
 """For workers to come back when all are gone."""
 _ASSEMBLY_PRIORITY = 1
-
-
-@dataclass
-class Outcome:
-    """How far a job is.
-
-    Attributes:
-        tasks: How many tiles there are.
-        tasks_done: How many are rendered.
-        images: How many images there are.
-        images_done: How many are written.
-        failed: A title and a line for each tile or image that failed.
-        stopped: Whether ``is_stopped`` ended it.
-        others: Workers that were not used, since they are of another class.
-    """
-
-    tasks: int
-    images: int
-    tasks_done: int = 0
-    images_done: int = 0
-    failed: list[tuple[str, str]] = field(default_factory=list)
-    stopped: bool = False
-    others: int = 0
-
-    @property
-    def state(self) -> str:
-        """One of "done", "failed" and "unfinished"."""
-        if self.images_done == self.images:
-            return "done"
-        return "failed" if self.failed else "unfinished"
-
-    def as_dict(self) -> dict[str, Any]:
-        """For programs."""
-        return {
-            "state": self.state, "tasks": {"all": self.tasks, "done": self.tasks_done},
-            "images": {"all": self.images, "done": self.images_done},
-            "failed": [{"title": title, "error": line} for title, line in self.failed],
-        }  # fmt: skip
-
-
-def status(folder: Folder) -> Outcome:
-    """How far a job is, by the files that are there; each is read and compared."""
-    job = folder.job
-    out = Outcome(job.task_count(), len(job.images))
-    for image in range(len(job.images)):
-        if is_finished(folder, image):
-            out.images_done += 1
-            out.tasks_done += job.tile_count(image)
-            continue
-        keys: dict[str, int] = {}
-        for task in job.tasks_of(image):
-            machine = machine_of(folder, task)
-            keys[machine] = keys.get(machine, 0) + 1
-        keys.pop("", None)
-        out.tasks_done += max(keys.values(), default=0)
-    return out
 
 
 @dataclass
@@ -132,6 +78,7 @@ class Run:
 
     def work(self, images: list[int]) -> None:
         """Renders what is missing of these images, and writes them."""
+        from wavecomb.farm.rendering import looks_for
         from wavecomb.farm.tasks import FarmPlugin
 
         self._cluster.client.register_plugin(FarmPlugin(self._job.isa, self._job.hang_s))
@@ -141,8 +88,6 @@ class Run:
         self._restart_stale()
         for image in images:
             shot, tiles = self._job.shot(image), self._job.rectangles(image)
-            from wavecomb.farm.rendering import looks_for
-
             self._looks[image] = looks_for(shot) if len(tiles) > 1 else 0
             missing = {
                 task.tile
@@ -330,7 +275,7 @@ class Run:
             self._note_done(task)
         bad = {(image, tile): line for image, tile, line in result["failed"]}
         for (image, tile), line in bad.items():
-            self._fail(self._job.title(image, tile), line)
+            self._out.failed.append((self._job.title(image, tile), line))
         self._again([t for t in batch.tiles if t not in done and (t.image, t.tile) not in bad])
         if done:
             # Of the last batch: the first ones open the stage, too.
@@ -344,11 +289,11 @@ class Run:
         self._progressed = True
         self._out.tasks_done += 1
         if not missing:
-            self._ready.append(_Batch([], task.image))
+            self._ready.append(_Batch([], task.image, self._attempts))
 
     def _take_image(self, image: int, result: dict[str, Any]) -> None:
         if result["full"]:
-            self._ready.appendleft(_Batch([], image, self._next_attempt()))
+            self._put_back(_Batch([], image))
             return
         if not result["again"]:
             self._out.images_done += 1
@@ -369,23 +314,17 @@ class Run:
         if len(batch.tiles) > 1:  # others of the batch may be good
             self._again(batch.tiles)
         elif batch.tiles:
-            self._fail(self._job.title(batch.tiles[0].image, batch.tiles[0].tile), line)
+            one = batch.tiles[0]
+            self._out.failed.append((self._job.title(one.image, one.tile), line))
         else:
-            self._fail(self._job.title(batch.image), line)
+            self._out.failed.append((self._job.title(batch.image), line))
 
     def _put_back(self, batch: _Batch) -> None:
         if batch.tiles:
             self._again(batch.tiles)
         else:
-            self._ready.appendleft(_Batch([], batch.image, self._next_attempt()))
-
-    def _next_attempt(self) -> int:
-        self._attempts += 1
-        return self._attempts
-
-    def _fail(self, title: str, line: str) -> None:
-        self._progressed = True
-        self._out.failed.append((title, line))
+            self._attempts += 1
+            self._ready.appendleft(_Batch([], batch.image, self._attempts))
 
     def _leave_out(self, worker: str, why: str) -> None:
         """Takes back from a worker whose disk is full what it has not begun."""

@@ -14,7 +14,7 @@ from typing import Any
 
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
-from wavecomb.farm.job import Folder
+from wavecomb.farm.folder import Folder
 from wavecomb.picture.files import replacing
 
 _NOTICE_S = 30

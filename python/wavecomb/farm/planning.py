@@ -11,7 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.job import MAX_TASKS, Folder, Job, Shot
+from wavecomb.farm.folder import Folder
+from wavecomb.farm.job import MAX_TASKS, Job, Shot
 from wavecomb.farm.refusals import check_reproducible, check_tiles, is_better_whole, needs_whole
 from wavecomb.farm.tiling import choose_tiles
 

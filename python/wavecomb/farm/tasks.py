@@ -213,7 +213,7 @@ def _begin() -> str:
 
 
 def _folder(folder: str, maps: list[Pair], job: str) -> Any:
-    from wavecomb.farm.job import Folder
+    from wavecomb.farm.folder import Folder
 
     os.environ.pop(VARIABLE, None)
     if _own_maps is not None:

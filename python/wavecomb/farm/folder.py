@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The folder of a job.
+
+It holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished image, and
+``images/IMAGE.json`` for each finished one. Nothing else records progress.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from wavecomb.errors import WavecombError
+from wavecomb.farm.job import Job, Task
+from wavecomb.picture.files import replacing
+
+JOB_FILE = "job.json"
+LEARNED_FILE = "guide.learned"
+
+
+class Folder:
+    """A job's folder.
+
+    Attributes:
+        path: Absolute.
+        job: What it holds.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Reads the job. Raises WavecombError where there is none."""
+        self.path = Path(os.path.abspath(path))
+        file = self.path / JOB_FILE
+        try:
+            text = file.read_text(encoding="utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            raise WavecombError(
+                f"{os.fspath(path)}: is no folder of a job; `wavecomb farm submit` makes one"
+            ) from None
+        try:
+            value = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise WavecombError(f"{file}: is damaged: {error}; submit the job again") from None
+        self.job = Job.of(value, str(file))
+
+    @classmethod
+    def create(cls, path: str | os.PathLike[str], job: Job, learned: bytes | None = None) -> Folder:
+        """Makes the folder of a job. Raises WavecombError where something has that name."""
+        folder = Path(path)
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            raise WavecombError(
+                f"{os.fspath(path)}: is there already: `wavecomb farm resume` continues a job, "
+                "and --job names another folder"
+            ) from None
+        if learned is not None:
+            from wavecomb.run.learned import save_learned
+
+            save_learned(folder / LEARNED_FILE, learned)
+        write_json(folder / JOB_FILE, job.as_json())
+        return cls(folder)
+
+    def replace(self, job: Job) -> None:
+        """Writes another description of the job in place of the present one."""
+        write_json(self.path / JOB_FILE, job.as_json())
+        self.job = job
+
+    def part(self, task: Task) -> Path:
+        """The file of a rendered tile."""
+        return self.parts(task.image) / f"{task.tile:06d}.exr"
+
+    def parts(self, image: int) -> Path:
+        """The folder of an image's rendered tiles."""
+        return self.path / "parts" / f"{image:06d}"
+
+    def record(self, image: int) -> Path:
+        """The file that says with which bytes a finished image was written."""
+        return self.path / "images" / f"{image:06d}.json"
+
+    def learned(self) -> bytes | None:
+        """The guiding field that all images are given. Raises WavecombError: it is damaged."""
+        if self.job.learned is None:
+            return None
+        from wavecomb.run.learned import load_learned
+
+        return load_learned(self.path / LEARNED_FILE)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Writes a small file, whole or not at all."""
+    with replacing(path) as part:
+        part.write_text(json.dumps(value, allow_nan=False) + "\n", encoding="utf-8")
