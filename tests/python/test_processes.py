@@ -366,7 +366,7 @@ def test_what_does_not_start_is_an_error_from_any_thread(monkeypatch: pytest.Mon
 PROGRAMS = {
     "bench/counters.py": "perf",
     "bench/machine.py": "git",
-    "farm/slurm_engine.py": "Slurm's commands",
+    "farm/clusters.py": "Slurm's commands",
     "run/isolate/sandbox.py": "bwrap",
 }
 """Files that start other programs than Python."""

@@ -129,20 +129,22 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
         WavecombError: What the child says.
     """
     words = processes.command("wavecomb", "farm", "plan", json.dumps(request), parent=0)
+    process = processes.popen(
+        words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     try:
-        done = subprocess.run(
-            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_PLAN_S
-        )
+        out, said = process.communicate(timeout=_PLAN_S)
     except subprocess.TimeoutExpired:
+        process.kill()
         raise WavecombError(
             f"the files of the stage were not read within {_PLAN_S / 3600:.0f} hours"
         ) from None
-    lines = done.stderr.strip().splitlines()
-    if done.returncode:
+    lines = said.strip().splitlines()
+    if process.returncode:
         raise WavecombError((lines[-1] if lines else "the stage was not read")[len("error: ") :])
     for line in lines:
         click.echo(line, err=True)
-    found: dict[str, Any] = json.loads(done.stdout)
+    found: dict[str, Any] = json.loads(out)
     return found
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from typing import Any
 
+from wavecomb import processes
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
 from wavecomb.farm.folder import Folder
@@ -45,7 +45,7 @@ def template(folder: Folder) -> dict[str, Any]:
         "parameterDefinitions": [
             # A PATH would have to lie in the folder of the template.
             {"name": "Job", "type": "STRING", "default": str(folder.path)},
-            {"name": "Python", "type": "STRING", "default": sys.executable},
+            {"name": "Python", "type": "STRING", "default": processes.interpreter()},
         ],
         "steps": [
             {
