@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/lane_kernels.h"
 #include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/snapshot.h"

@@ -140,7 +140,7 @@ def test_schema(fake: Fake, stage: Path) -> None:
     stats = wavecomb.render(stage, size=(4, 4), spp=1).stats
     assert list(stats) == [
         *("schema", "version", "stage", "camera"),
-        *("working_space", "cancelled", "settings", "seconds"),
+        *("working_space", "origin", "cancelled", "settings", "seconds"),
         *("phases_s", "sort_overhead", "counts", "passes", "resumed_samples", "error"),
         *("mean_path_length", "depths", "lane_utilisation"),
         *("coherence", "programs", "materials", "cost_prediction", "light_calibration"),

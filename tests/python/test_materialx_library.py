@@ -73,7 +73,9 @@ def test_all_nodes_are_read_or_named_with_a_reason():
         line = f"- {', '.join(f'`{name}`' for name in sorted(categories))}: {why}"
         assert re.sub(r"\s+", " ", line) in re.sub(r"\s+", " ", text), line
     table = text[text.index("| | primitives |") : text.index("All others are graphs")]
-    assert set(re.findall(r"`(\w+)`", table)) == CATEGORIES
+    # Nodes of Arnold are none of the library's: docs/materialx.md has them.
+    library_s = {name for name in CATEGORIES if not name.startswith("arnold_")}
+    assert set(re.findall(r"`(\w+)`", table)) == library_s
     assert not REASONS.keys() - {name for names in named.values() for name in names}
 
 

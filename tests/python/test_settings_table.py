@@ -23,12 +23,12 @@ ROOT = Path(__file__).parents[2]
 
 ADDED = (
     Setting("tea_time", "Tea", "When tea is served.", "number", 4.5, 0.0, 24.0, "never", (), {},
-            "work", True),
+            "work", True, False),
     Setting("biscuit", "Biscuit", "What goes with it.", "choice", "plain", None, None, "", (),
-            {"plain": "Nothing on it.", "iced": "With sugar."}, "order", False),
-    Setting("cups", "Cups", "How many.", "integer", 2, 1.0, 9.0, "", (), {}, "order", False),
+            {"plain": "Nothing on it.", "iced": "With sugar."}, "order", False, False),
+    Setting("cups", "Cups", "How many.", "integer", 2, 1.0, 9.0, "", (), {}, "order", False, False),
     Setting("milk", "Milk", "Before the tea.", "flag", False, None, None, "", (), {}, "picture",
-            True),
+            True, True),
 )  # fmt: skip
 
 FOLLOW = (

@@ -107,7 +107,7 @@ def test_light_that_is_lost_is_a_fault(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_what_is_refused_is_no_fault(tmp_path: Path) -> None:
-    scene = make_scene(2, tmp_path, enclosure=True)
+    scene = make_scene(38, tmp_path, enclosure=True)
     assert "lit subsurface" in scene.features
     renders = Renders(scene)
     with pytest.raises(_core.Error, match=REFUSED):

@@ -118,9 +118,9 @@ def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> C
     if "name" in more:
         names.append(more.pop("name"))
     given = _TYPES[kind] if isinstance(kind, str) else kind
-    return click.option(
-        *names, type=given, is_flag=kind == "flag", metavar=metavar, help=text, **more
-    )
+    if kind == "flag":  # with is_flag=False an option would not take "-1" as its value
+        more["is_flag"] = True
+    return click.option(*names, type=given, metavar=metavar, help=text, **more)
 
 
 def add_options(*options: Callable[[F], F]) -> Callable[[F], F]:

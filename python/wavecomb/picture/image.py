@@ -165,6 +165,34 @@ def read_image(path: str | os.PathLike[str]) -> Array:
     return _read(path)[0]
 
 
+def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """Reads an 8-bit image as a screen shows it on white: (height, width, 3).
+
+    Raises:
+        OSError: The file cannot be read; one line that names it.
+    """
+    import OpenImageIO as oiio
+
+    name = os.fspath(path)
+    source = _open(name)
+    try:
+        spec = source.spec()
+        _check_size(name, spec)
+        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.UINT8)
+        if pixels is None:
+            raise OSError(f"{name}: is damaged: {one_line(problem_of(source), name)}")
+        alpha = spec.alpha_channel
+    finally:
+        source.close()
+    codes = np.asarray(pixels, np.uint8).reshape(spec.height, spec.width, spec.nchannels)
+    colours = codes[:, :, :3] if codes.shape[2] >= 3 else np.repeat(codes[:, :, :1], 3, axis=2)
+    if alpha < 0:
+        return np.ascontiguousarray(colours)
+    share = codes[:, :, alpha : alpha + 1].astype(np.float32) / np.float32(255.0)
+    mixed: NDArray[np.uint8] = (share * colours + (1.0 - share) * 255.0 + 0.5).astype(np.uint8)
+    return mixed
+
+
 def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
     """Reads a picture by layers, as ``write_exr`` names them: {"beauty": (h, w, 3), ...}.
 

@@ -29,7 +29,10 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     if UDIM in value.resolvedPath:
         return value.resolvedPath
     layer = layer_of_value(attribute)
-    return UsdShade.UdimUtils.ResolveUdimPath(value.path, layer) or value.path
+    found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
+    if not found and layer is not None and value.path.startswith("."):
+        return str(layer.ComputeAbsolutePath(value.path))  # for messages: there are no tiles
+    return found or value.path
 
 
 def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:

@@ -73,10 +73,14 @@ def _watch(done: threading.Event, found: _Found) -> None:
 def _fifos() -> Iterator[tuple[str, str]]:
     """FIFOs that loaded layers name as layers, and the layer that does."""
     for layer in Sdf.Layer.GetLoadedLayers():
-        for name in layer.GetCompositionAssetDependencies():
-            path = layer.ComputeAbsolutePath(name)
+        try:
+            named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
+            name = layer.realPath or layer.identifier
+        except Exception:  # the thread that composes has let go of the layer
+            continue
+        for path in named:
             if path and kind_of(path) == "a FIFO":
-                yield path, layer.realPath or layer.identifier
+                yield path, name
 
 
 def _release(path: str, layer: str, found: _Found) -> None:

@@ -263,12 +263,9 @@ class GroupBuilder:
         if worn.by_face is not None and isinstance(shape, MeshArrays) and shape.topology:
             faces = worn.by_face[shape.topology.face_ids()]
         name = self.report.place(path)
-        may_shine = (
-            lamp is not None
-            or material == INHERIT_MATERIAL
-            or self.materials.any_emits(material, faces)
-        )
-        if self.notes_emitters and self.materials.any_emits(material, faces):
+        emits = self.materials.any_emits(material, faces)
+        may_shine = lamp is not None or material == INHERIT_MATERIAL or emits
+        if self.notes_emitters and emits:
             if isinstance(shape, MeshArrays):
                 group.emitters.append(emitter_of(shape, material, faces))
                 group.holds_placed = True

@@ -45,13 +45,13 @@ def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> 
     if not in_world and reach > NEAR and reach * _STEP > _COARSE * size:
         return INSTANCED
     move = matrix.GetRow3(3)
-    away = max(
-        abs(0.5 * (a + x) - move[0]), abs(0.5 * (b + y) - move[1]), abs(0.5 * (c + z) - move[2])
-    )
+    p, q, r = 0.5 * (a + x) - move[0], 0.5 * (b + y) - move[1], 0.5 * (c + z) - move[2]
     # Distances are in units of the group, and so is the size: their ratio is the prim's own.
-    if away * _STEP <= _COARSE * size or away <= NEAR * _scale(matrix):
+    # Chained comparisons, not calls: this is done for every prim.
+    far = size * (_COARSE / _STEP)
+    if -far <= p <= far and -far <= q <= far and -far <= r <= far:
         return None
-    return STORED
+    return None if max(abs(p), abs(q), abs(r)) <= NEAR * _scale(matrix) else STORED
 
 
 def _scale(matrix: Gf.Matrix4d) -> float:
