@@ -7,6 +7,10 @@
 #include <type_traits>
 
 #include "scene_testing.h"
+#include "wavecomb/accel/embree_accelerator.h"
+#include "wavecomb/render/cost_profile.h"
+#include "wavecomb/render/pick.h"
+#include "wavecomb/render/renderer.h"
 
 namespace wavecomb {
 namespace {

@@ -331,7 +331,9 @@ done
 echo "4711;cluster"
 """
 SQUEUE = """#!/bin/sh
-for i in $(cat "$HERE/pids"); do kill -0 $i 2> /dev/null && echo "4711 R"; done
+for i in $(cat "$HERE/pids"); do
+  case "$(sed 's/.*) //' "/proc/$i/stat" 2> /dev/null)" in "" | Z*) ;; *) echo "4711 R";; esac
+done
 exit 0
 """
 SCANCEL = """#!/bin/sh

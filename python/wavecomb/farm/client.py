@@ -26,6 +26,9 @@ _BATCH_S = 0.5
 """Small tiles are sent together, as many as take about this long."""
 _LEAST_BATCHES = 4
 """For each worker, so that workers end at about the same time."""
+_RETRY_S = 5.0
+"""Time between looks for tasks that wait for a worker."""
+
 _NOBODY_S = 60.0
 """For workers to come back when all are gone."""
 _ASSEMBLY_PRIORITY = 1
@@ -71,6 +74,7 @@ class Run:
         self._next_look = 0.0
         self._progressed = False
         self._alone_since: float | None = None
+        self._next_retry = 0.0
         self._full = ""
         self._common = (str(folder.path), [list(pair) for pair in self._job.maps], self._job.id)
 
@@ -202,6 +206,7 @@ class Run:
         self._progressed = False
         if self._capacity():
             self._alone_since = None
+            self._retry_waiting()
             return
         if self._full:
             raise WavecombError(self._full)
@@ -209,6 +214,18 @@ class Run:
         self._alone_since = self._alone_since or now
         if self._cluster.wait_s is not None and now - self._alone_since > _NOBODY_S:
             raise WavecombError(f"{self._cluster.what}: all workers are gone")
+
+    def _retry_waiting(self) -> None:
+        """Has the scheduler look for workers again, for tasks that it found none for.
+
+        Dask does so when a worker comes. At that moment the worker has no resource yet: it
+        announces its class of machines a little later.
+        """
+        from wavecomb.farm.tasks import retry_unrunnable
+
+        if self._flying and time.monotonic() > self._next_retry:
+            self._next_retry = time.monotonic() + _RETRY_S
+            self._cluster.client.run_on_scheduler(retry_unrunnable)
 
     def _submit(self) -> bool:
         """Sends the next batch; False: there is none."""

@@ -103,6 +103,17 @@ class FarmPlugin(WorkerPlugin):
                 os._exit(1)  # the nanny starts another worker, and Dask gives it the task
 
 
+def retry_unrunnable(dask_scheduler: Any) -> None:
+    """Has a scheduler look for workers again for tasks that it found none for.
+
+    Args:
+        dask_scheduler: The scheduler, in whose process this runs.
+    """
+    waiting = {task.key: "waiting" for task in dask_scheduler.unrunnable}
+    if waiting:
+        dask_scheduler.transitions(waiting, stimulus_id=f"wavecomb-retry-{time.time()}")
+
+
 def render_tiles(
     folder: str, maps: list[Pair], job: str, machine: str, tiles: list[tuple[int, int, int]]
 ) -> dict[str, Any]:
