@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from parts import needs, only_where
+from parts import needs, not_here, only_where
 
 from wavecomb.cli import main
 from wavecomb.run.isolate import memory, sandbox, supervisor
@@ -294,7 +294,7 @@ def test_shared_mappings_count_as_memory(place: Path) -> None:
     """RLIMIT_DATA does not see them; a control group does, where one may be made."""
     group = memory.Group.make(300_000_000)
     if group is None:
-        pytest.skip("no control group may be made here")
+        not_here("no control group may be made here")
     group.close()
     code = PARENT.replace(
         "supervisor.choices.words", "memory.ask(300)\nsupervisor.choices.words", 1
