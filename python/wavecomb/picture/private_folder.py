@@ -52,10 +52,6 @@ class PrivateFolder:
                 return
             os.close(self._lock)  # ``remove_abandoned`` was quicker than the lock
 
-    def fileno(self) -> int:
-        """Descriptor of the lock: a child that inherits it holds the lock, too."""
-        return self._lock
-
     def close(self) -> None:
         """Removes the folder with all that is in it."""
         shutil.rmtree(self.path, ignore_errors=True)

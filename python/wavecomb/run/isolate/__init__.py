@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps the caller alive where a library crashes, or never ends, on a file that is broken.
 
-``supervisor`` runs a command in a child; ``wavecomb.run.boxed`` reads stages for ``wavecomb.load``
-in a process of its own; ``box`` is the sandbox of both; ``trail`` says what such a process was at
-when it died; ``patience`` ends it where USD composes without end. docs/decisions/isolation.md says
-what each costs.
+``supervisor`` runs a command in a child process, ``sandbox`` builds the bubblewrap command for it,
+and ``outputs`` moves its finished files to their names. ``trail`` records what the child was doing,
+for the message after a crash. ``memory`` limits its memory, and ``patience`` ends it where USD
+composes without end. docs/decisions/isolation.md says what this costs.
 """

@@ -60,9 +60,9 @@ def command(
         gpu: Whether GPU devices can be used.
     """
     line = [_PROGRAM, "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"]
-    named = [path for path in _existing(inputs)]
+    named, places = _existing(inputs), library_places()
     if reads:
-        for path in _existing((*_SYSTEM, *library_places(), *reads)):
+        for path in _existing((*_SYSTEM, *places, *reads)):
             line += ["--ro-bind", path, path]
     else:
         line += ["--ro-bind", "/", "/"]
@@ -71,7 +71,7 @@ def command(
             line += ["--tmpfs", path] if os.path.isdir(path) and not os.path.islink(path) else []
     line += ["--dev", "/dev", "--proc", "/proc"]
     hidden = [path for path in _HIDDEN if os.path.isdir(path)]
-    for path in (*library_places(), *reads, *named):
+    for path in (*places, *reads, *named):
         if (path in named and reads) or any(_is_below(path, folder) for folder in hidden):
             line += ["--ro-bind-try", path, path]
     for device in _devices() if gpu else ():
