@@ -388,6 +388,35 @@ def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
     wait_for(lambda: not processes_of(folder.path), 30)
 
 
+ENDS_WITH_RESULT = """
+import os, pathlib, signal
+from distributed import Worker
+fetch = Worker.get_data
+async def get_data(self, comm, keys, who=None, serializers=None):
+    try:
+        pathlib.Path(os.environ["HERE"], "ended").touch(exist_ok=False)
+    except FileExistsError:
+        return await fetch(self, comm, keys, who, serializers)
+    os.killpg(0, signal.SIGKILL)
+def dask_setup(worker):
+    worker.handlers["get_data"] = get_data.__get__(worker)
+"""
+
+
+@pytest.mark.slow
+def test_a_worker_that_ends_with_a_result(
+    stage: Path, tmp_path: Path, slurm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The client does not wait for a result that only a new worker could compute again."""
+    (tmp_path / "ends.py").write_text(ENDS_WITH_RESULT)
+    monkeypatch.setenv("DASK_DISTRIBUTED__WORKER__PRELOAD", str(tmp_path / "ends.py"))
+    folder = made(stage, tmp_path)
+    done = forks.wavecomb("farm", "resume", folder.path, "--on", "slurm:1", timeout=150)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "ended").exists(), "or nothing is tested"
+    same(tmp_path / "a.exr", one_process(stage, tmp_path))
+
+
 def test_slurm_that_refuses(stage: Path, tmp_path: Path, slurm: Path) -> None:
     folder = made(stage, tmp_path)
     words = ("farm", "resume", folder.path, "--on", "slurm")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import time
 from collections import deque
@@ -28,7 +29,6 @@ _LEAST_BATCHES = 4
 """For each worker, so that workers end at about the same time."""
 _RETRY_S = 5.0
 """Time between looks for tasks that wait for a worker."""
-
 _NOBODY_S = 60.0
 """For workers to come back when all are gone."""
 _ASSEMBLY_PRIORITY = 1
@@ -66,7 +66,7 @@ class Run:
         self._missing: dict[int, set[int]] = {}
         self._looks: dict[int, int] = {}
         self._flying: dict[Any, _Batch] = {}
-        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._ended: queue.SimpleQueue[tuple[Any, dict[str, Any] | None]] = queue.SimpleQueue()
         self._attempts = 0
         self._seconds = 0.0
         self._warned: set[str] = set()
@@ -196,7 +196,7 @@ class Run:
             while len(self._flying) < self._capacity() and self._submit():
                 pass
             try:
-                self._take(self._ended.get(timeout=_TURN_S))
+                self._take(*self._ended.get(timeout=_TURN_S))
             except queue.Empty:
                 self._check()
             self._show(self._out)
@@ -250,7 +250,7 @@ class Run:
             priority=0 if tiles else _ASSEMBLY_PRIORITY,
         )  # fmt: skip
         self._flying[future] = batch
-        future.add_done_callback(self._ended.put)
+        future.add_done_callback(self._fetch)
         return True
 
     def _batch_size(self) -> int:
@@ -263,13 +263,12 @@ class Run:
         self._attempts += 1
         self._ready.extendleft(_Batch([task], attempt=self._attempts) for task in reversed(tiles))
 
-    def _take(self, future: Any) -> None:
+    def _take(self, future: Any, result: dict[str, Any] | None) -> None:
         """Notes how a batch ended."""
         batch = self._flying.pop(future, None)
         if batch is None:
             return
-        if future.status == "finished":
-            result = future.result()
+        if result is not None:
             if result["full"]:
                 self._leave_out(result["worker"], result["full"])
             if batch.tiles:
@@ -278,9 +277,23 @@ class Run:
                 self._take_image(batch.image, result)
         elif future.status == "error":
             self._take_error(batch, future.exception())
-        else:  # lost or cancelled, not by this client
+        else:  # lost or cancelled, not by this client, or its worker ended with the result
+            self._cluster.client.cancel([future])
             self._cluster.check(False)
             self._put_back(batch)
+
+    def _fetch(self, future: Any) -> None:
+        """Gets the result of a finished task; runs in a thread of Dask's.
+
+        Results stay with workers until the client asks for them. Where the worker ends in between,
+        Dask computes the task again, perhaps on a worker that only ``Cluster.check`` will start. So
+        nobody waits for results but this thread.
+        """
+        result = None
+        if future.status == "finished":
+            with contextlib.suppress(Exception):  # _take looks at the status
+                result = future.result()
+        self._ended.put((future, result))
 
     def _take_tiles(self, batch: _Batch, result: dict[str, Any]) -> None:
         for line in result["warnings"]:
