@@ -11,6 +11,7 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
+import cpu_times
 import parts
 import pytest
 import tiers
@@ -91,8 +92,9 @@ def refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Strict: no test is skipped for want of a part."""
+    """Notes CPU time. Strict: no test is skipped for want of a part."""
     report = yield
+    report.user_properties.append((cpu_times.PROPERTY, cpu_times.since_last()))
     if parts.is_strict():
         refuse_skip(report)
     return report
@@ -105,3 +107,17 @@ def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest
     if parts.is_strict():
         refuse_skip(report)
     return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Adds up what tests took; with xdist, in the process that collects the reports."""
+    cpu_times.add(report.nodeid, dict(report.user_properties).get(cpu_times.PROPERTY, 0.0))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Says which files and tests took most CPU time."""
+    lines = cpu_times.table()
+    if lines:
+        terminalreporter.section("CPU time")
+        for line in lines:
+            terminalreporter.line(line)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""CPU time of tests and of the processes that they started and waited for."""
+
+from __future__ import annotations
+
+import os
+
+PROPERTY = "cpu_s"
+"""Name of the property of a test report that holds the seconds."""
+_LEAST_S = 60.0
+"""Runs that took less print no table."""
+_FILES, _TESTS = 30, 40
+_last: float = 0.0
+_by_test: dict[str, float] = {}
+
+
+def since_last() -> float:
+    """Seconds of CPU time since the last call in this process; 0 at first."""
+    global _last
+    times = os.times()
+    now = times.user + times.system + times.children_user + times.children_system
+    out = now - _last if _last else 0.0
+    _last = now
+    return out
+
+
+def add(test: str, seconds: float) -> None:
+    """Adds what a phase of a test took."""
+    _by_test[test] = _by_test.get(test, 0.0) + seconds
+
+
+def table() -> list[str]:
+    """The files, then the tests, that took most; nothing after a short run."""
+    total = sum(_by_test.values())
+    if total < _LEAST_S:
+        return []
+    by_file: dict[str, float] = {}
+    for test, seconds in _by_test.items():
+        file = test.partition("::")[0]
+        by_file[file] = by_file.get(file, 0.0) + seconds
+    lines = [f"{total:8.1f} s in all"]
+    for times, most in ((by_file, _FILES), (_by_test, _TESTS)):
+        longest = sorted(times.items(), key=lambda row: -row[1])[:most]
+        lines += ["", *(f"{seconds:8.1f} s {name}" for name, seconds in longest)]
+    return lines
