@@ -248,10 +248,11 @@ bench: build ## Micro-benchmarks; JSON goes to out/micro
 
 # ---- style ---------------------------------------------------------------------------------------------
 
-lint: build/.setup-test ## Layout, layers, types; changes nothing
+lint: build/.setup-test ## Layout, layers, English, types; changes nothing
 	$(VENV)/ruff check --quiet .
 	$(VENV)/ruff format --check --quiet . || { echo "lint: run make format"; exit 1; }
 	$(VENV)/python tools/check_layers
+	$(VENV)/python tools/check_words
 	@printf '%s\n' $(CPP_FILES) | xargs -r -P $(JOBS) -n 24 $(VENV)/clang-format --dry-run --Werror \
 	  || { echo "lint: run make format"; exit 1; }
 	$(VENV)/mypy
