@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the cost of the child process (docs/decisions/isolation.md).
+"""Measures the cost of the child process (docs/decisions/sandbox.md).
 
     .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
 

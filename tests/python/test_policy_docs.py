@@ -37,7 +37,7 @@ def test_python_example_runs(
     names: dict[str, Any] = {}
     exec(compile(example, "writing-a-policy.md", "exec"), names)
     picture = names["picture"]
-    assert picture.stats["settings"]["policy"] == "dearest-first"
+    assert picture.stats["settings"]["policy"] == "expensive-first"
     run_length, overhead = (float(word) for word in capsys.readouterr().out.split())
     assert run_length > 2
     assert 0 < overhead < 1

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,9 @@ from parts import not_here
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
 OLD = {"claims", "noise_target", "peers", "peers-dragon"}
-"""Of fewer than five rounds, or from before their commands were kept; README says so."""
+"""Of fewer than five rounds, or from before their commands were kept."""
+RECENT = 40
+"""Commits of src/ after which a result has to be measured again."""
 
 
 def git(*words: str) -> subprocess.CompletedProcess[str]:
@@ -62,8 +66,26 @@ def test_pages_quote_the_command(path: Path) -> None:
     )
 
 
-def test_readme_says_which_figures_are_old() -> None:
-    page = (ROOT / "README.md").read_text(encoding="utf-8")
-    (said,) = (line for line in page.splitlines() if line.startswith("Rows of "))
-    for name in ("peers", "claims"):
-        assert name in said
+@cache
+def sections() -> list[str]:
+    """Sections of the pages, down to the second level of headings."""
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    texts = (page.read_text(encoding="utf-8") for page in pages)
+    return [part for text in texts for part in re.split(r"^## ", text, flags=re.MULTILINE)]
+
+
+@pytest.mark.parametrize("path", RESULTS, ids=of)
+def test_pages_mark_old_results(path: Path) -> None:
+    """A page that names a result of long ago says that it has to be measured again."""
+    shallow = git("rev-parse", "--is-shallow-repository")
+    if shallow.returncode != 0 or shallow.stdout.strip() != "false":
+        not_here("the history of this repository")
+    naming = [part for part in sections() if re.search(rf"\b{re.escape(path.name)}", part)]
+    assert naming, f"no page names {path.name}"
+    since = git("rev-list", "--count", f"{document(path)['commit']}..HEAD", "--", "src")
+    if of(path) not in OLD and int(since.stdout) <= RECENT:
+        return
+    for part in naming:
+        assert "measured again" in " ".join(part.lower().split()), (
+            f"{path.name} is {since.stdout.strip()} commits of src/ old: mark it in {part[:40]!r}"
+        )
