@@ -99,7 +99,11 @@ def _why(error: Exception) -> str:
 def _rebuild() -> str:
     """How the native part comes anew: where a source tree is imported, or what was installed."""
     is_source = (Path(__file__).resolve().parents[2] / "CMakeLists.txt").is_file()
-    return "make build" if is_source else "pip install --force-reinstall wavecomb"
+    return (
+        "make build"
+        if is_source
+        else "pip install --force-reinstall WHEEL, the wheel that was installed"
+    )
 
 
 def _package() -> Check:

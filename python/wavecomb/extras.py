@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import importlib.util
+import re
+import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,12 +43,36 @@ EXTRAS = {
 
 
 def install_command(extra: str) -> str:
-    """What brings it.
+    """Command that installs the packages of an extra.
 
-    >>> install_command("gui")
-    "pip install 'wavecomb[gui]'"
+    It names the packages, not ``wavecomb[extra]``: no package index has Wavecomb yet, so that name
+    could be anybody's.
+
+    >>> install_command("denoise")
+    "pip install 'pyoidn>=2.5'"
     """
-    return f"pip install 'wavecomb[{extra}]'"
+    return f"pip install {' '.join(repr(one) for one in requirements(extra))}"
+
+
+def requirements(extra: str) -> list[str]:
+    """Packages of an extra with their versions, from the metadata of the installed Wavecomb."""
+    try:
+        lines = importlib.metadata.requires("wavecomb") or []
+    except importlib.metadata.PackageNotFoundError:
+        lines = []
+    found = []
+    for line in lines:
+        package, _, marker = line.partition(";")
+        if re.search(rf"""extra == ['"]{extra}['"]""", marker) and _is_for_this_python(marker):
+            found.append(package.strip())
+    return found or [module.partition(".")[0] for module in EXTRAS[extra].modules]
+
+
+def _is_for_this_python(marker: str) -> bool:
+    """Whether the bounds of python_version in a marker hold."""
+    bounds = re.findall(r"""python_version (<|>=) ['"](\d+)\.(\d+)['"]""", marker)
+    now = sys.version_info[:2]
+    return all((now < (int(a), int(b))) == (sign == "<") for sign, a, b in bounds)
 
 
 def needed(module: str, what: str, extra: str = "bench") -> Any:

@@ -166,7 +166,7 @@ def test_a_missing_extra_is_said_before_anything(
         main, ["render", str(stage), "-o", str(tmp_path / "a.exr"), "--denoise"]
     )
     assert result.exit_code == 2
-    assert "pip install 'wavecomb[denoise]'" in result.stderr
+    assert "pip install 'pyoidn>=2.5'" in result.stderr
     assert not fake.loaded
     with pytest.raises(WavecombError, match=r"denoising needs pyoidn"):
         from wavecomb.picture.denoise import check_denoiser

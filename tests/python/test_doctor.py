@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,12 +16,15 @@ from parts import needs
 from wavecomb import doctor
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
-from wavecomb.extras import EXTRAS, check_installed, missing_modules
+from wavecomb.extras import EXTRAS, check_installed, install_command, missing_modules
 
 try:
     import tomllib
 except ModuleNotFoundError:
     import tomli as tomllib  # type: ignore[no-redef]
+
+
+PYPROJECT = Path(__file__).resolve().parents[2] / "pyproject.toml"
 
 
 def run(*arguments: str) -> Result:
@@ -58,7 +63,7 @@ def test_what_is_missing_comes_with_its_command(monkeypatch: pytest.MonkeyPatch)
 
     assert "missing" in after("OpenUSD")[0] and "pip install usd-core" in after("OpenUSD")[1]
     assert "missing" in after("[denoise]")[0]
-    assert "pip install 'wavecomb[denoise]'" in after("[denoise]")[1]
+    assert "pip install 'pyoidn>=2.5'" in after("[denoise]")[1]
     assert "BROKEN" in after("a picture")[0] and "make build" in after("a picture")[1]
     assert "set DISPLAY" in after("display")[1]
     plain = json.loads(run("--json").stdout)
@@ -96,3 +101,14 @@ def test_an_extra_is_asked_for_without_importing_it(monkeypatch: pytest.MonkeyPa
     with pytest.raises(WavecombError, match=r"the window needs PySide6 and pyqtgraph: pip install"):
         check_installed("gui", "the window")
     assert "PySide6" not in set(sys.modules) - before
+
+
+@pytest.mark.parametrize("extra", sorted(EXTRAS))
+def test_install_commands_name_the_packages_of_an_extra(extra: str) -> None:
+    with PYPROJECT.open("rb") as file:
+        listed = tomllib.load(file)["project"]["optional-dependencies"][extra]
+    names = {re.split(r"[<>=]", line)[0] for line in listed}
+    command = install_command(extra)
+    assert command.startswith("pip install '")
+    assert set(re.findall(r"'([A-Za-z][\w-]*)[<>=~!]", command)) == names
+    assert len(re.findall("'", command)) == 2 * len(names)

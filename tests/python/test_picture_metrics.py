@@ -281,4 +281,4 @@ def test_without_the_extra(files: dict[str, str], monkeypatch: pytest.MonkeyPatc
     assert "SSIM" in text
     code, _, error = run(files["a"], files["b"], "--metric", "flip-ldr")
     assert code == 2
-    assert "pip install 'wavecomb[bench]'" in error
+    assert "pip install 'flip-evaluator" in error

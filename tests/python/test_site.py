@@ -52,6 +52,13 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert not broken, "; ".join(broken)
 
 
+def test_nothing_installs_wavecomb_from_an_index() -> None:
+    """No package index has it, so the name there could be anybody's."""
+    files = [*PAGES, *(ROOT / "python").rglob("*.py"), ROOT / "Makefile"]
+    said = re.compile(r"pip install (?:-\S+ )*['\"]?wavecomb\b")
+    assert [file for file in files if said.search(file.read_text(encoding="utf-8"))] == []
+
+
 def test_every_page_has_a_place_in_the_site() -> None:
     listed = set(
         re.findall(r"^\s+- (?:[\w ]+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), flags=re.M)

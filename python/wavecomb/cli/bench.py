@@ -174,6 +174,7 @@ def _dry_run(sitting: object) -> None:
 def report_command(folder: str, markdown: str | None) -> None:
     """Write DIR/report.html and DIR/figures from the results in DIR."""
     from wavecomb.errors import WavecombError
+    from wavecomb.extras import install_command
 
     if markdown is not None and not markdown.endswith(".md"):
         raise WavecombError(f"--markdown {markdown}: give a file whose name ends in .md")
@@ -183,7 +184,7 @@ def report_command(folder: str, markdown: str | None) -> None:
         build = import_module("wavecomb.bench.report").build
     except ImportError as error:
         raise WavecombError(
-            f"bench report: {error.name} is missing; run `pip install 'wavecomb[bench]'`"
+            f"bench report: {error.name} is missing; run `{install_command('bench')}`"
         ) from error
     page = Path(markdown) if markdown is not None else None
     click.echo(f"wrote {build(Path(folder), page)}")

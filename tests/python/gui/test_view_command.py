@@ -42,7 +42,7 @@ def test_without_the_extra(tmp_path):
     (tmp_path / "PySide6").mkdir()
     (tmp_path / "PySide6" / "__init__.py").write_text("raise ImportError('not here')\n")
     line = told(run([], PYTHONPATH=str(tmp_path)))
-    assert "pip install 'wavecomb[gui]'" in line
+    assert "pip install 'PySide6-Essentials" in line
 
 
 @pytest.mark.slow

@@ -163,7 +163,7 @@ def test_a_missing_denoiser_is_told(cornell_window, monkeypatch):
 
     monkeypatch.setattr(importlib, "import_module", without)
     cornell_window.render_bar.denoise.click()
-    assert "pip install 'wavecomb[denoise]'" in cornell_window.message.text()
+    assert "pip install 'pyoidn>=2.5'" in cornell_window.message.text()
     assert not cornell_window.render_bar.denoise.isChecked()
     assert not cornell_window.session.setup.denoise
 
