@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import shutil
 import subprocess
 import sys
 from functools import cache
@@ -95,6 +96,11 @@ def test_reference_pages_have_every_row(monkeypatch: pytest.MonkeyPatch) -> None
         assert name == "__version__" or f"## wavecomb.{name}\n" in pages["python.md"]
     for command in ("render", "farm submit", "bench run", "doctor", "sheet"):
         assert f"## wavecomb {command}\n" in pages["options.md"]
+    rows = [line.split(" | ") for line in pages["options.md"].splitlines() if line[:3] == "| `"]
+    assert len(rows) > 200
+    for row in rows:
+        assert len(row) == 4 and len(row[0]) < 36, row  # a first column that leaves room
+    assert any(row[0] == "| `--seed`" and "`N`" in row[1] and "0" in row[3] for row in rows)
     for name, text in pages.items():
         widths = {line.replace("\\|", "").count("|") for line in text.splitlines()
                   if line.startswith("| ")}  # fmt: skip
@@ -109,3 +115,13 @@ def test_the_site_is_built_without_warnings(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "index.html").is_file() and (tmp_path / "reference/options.html").is_file()
+    assert (tmp_path / "search/search_index.js").is_file()
+    home = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert '<script src="iframe-worker.js"' in home and "unpkg.com" not in home
+    browser = shutil.which("chromium")
+    if browser:  # the search works where pages are opened as files
+        page = f"{(tmp_path / 'index.html').as_uri()}?q=guiding"
+        options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000"]
+        shown = subprocess.run([browser, *options, "--dump-dom", page], capture_output=True,
+                               text=True, timeout=120).stdout  # fmt: skip
+        assert "md-search-result__item" in shown

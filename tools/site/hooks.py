@@ -23,7 +23,8 @@ INLINE = re.compile(r"`[^`\n]+`")
 STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
-@media (min-width: 60em) { .md-typeset td:first-child code { white-space: nowrap; } }
+.md-typeset td:first-child code { white-space: nowrap; }
+.md-typeset td:not(:first-child) code { white-space: normal; overflow-wrap: anywhere; }
 .md-grid { max-width: 68rem; }
 """
 
@@ -44,6 +45,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Adds what is not in docs/."""
     made = {f"reference/{name}": text for name, text in reference.pages().items()}
     made["site.css"] = STYLE
+    made["iframe-worker.js"] = Path(__file__).with_name("iframe-worker.js").read_text("utf-8")
     for source, name in PAGES.items():
         made[name] = (ROOT / source).read_text(encoding="utf-8")
     for name, text in made.items():

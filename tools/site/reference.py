@@ -80,11 +80,36 @@ def options_page() -> str:
         body = []
         for one in command.get_params(context):
             record = one.get_help_record(context)
-            if record is not None and "--help" not in one.opts:
-                body.append((code(record[0]), cell(record[1])))
+            if record is not None and record[1] and "--help" not in one.opts:
+                body.append(option_row(*record))
         if body:
-            parts.append(table(("option", ""), body))
+            parts.append(table(("option", "value", "effect", "default"), body))
     return "\n".join(parts)
+
+
+def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
+    """Cells of an option: names, value, effect, default, from what its help says.
+
+    >>> option_row("-o, --output FILE", "Image.  [default: out.exr]")
+    ('`-o, --output`', '`FILE`', 'Image.', 'out.exr')
+    """
+    names, value = re.fullmatch(r"((?:-\S+(?:,| /)? ?)*)(.*)", usage, re.DOTALL).groups()  # type: ignore[union-attr]
+    if not names:  # an argument of the command
+        names, value = value, ""
+    choices = re.fullmatch(r"\[(.*\|.*)\]", value)
+    shown = ", ".join(map(code, choices[1].split("|"))) if choices else code(value)
+    in_brackets = re.compile(r"\s*\[((?:default: |required|\S*x[<>]=?|\S*<=?x)[^\[\]]*)\]")
+    default = ""
+    for note in in_brackets.findall(text):
+        ends = re.fullmatch(r"(?:(\S+?)<=?)?x(?:[<>]=?(\S+))?", note)
+        if ends and not ends[1]:
+            shown += f", from {ends[2]}" if ">" in note else f", to {ends[2]}"
+        elif ends:
+            shown += f", {ends[1]} to {ends[2]}"
+        else:
+            default = note.removeprefix("default: ")
+    effect = in_brackets.sub("", text)
+    return code(names), shown, cell(effect), cell(default)
 
 
 def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple[str, Any, Any]]:
