@@ -60,6 +60,50 @@ def test_nothing_installs_wavecomb_from_an_index() -> None:
     assert [file for file in files if said.search(file.read_text(encoding="utf-8"))] == []
 
 
+@needs("wavecomb._core")
+def test_commands_of_pages_have_their_options(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every option that a page gives to a command of wavecomb is one of that command."""
+    import click
+
+    from wavecomb.cli import main
+
+    monkeypatch.syspath_prepend(str(ROOT / "tools" / "site"))
+    import reference
+
+    root = click.Context(main, info_name="wavecomb")
+    known = {path: {one for param in command.get_params(context) for one in param.opts}
+             for path, command, context in reference.walk(main, root)}  # fmt: skip
+    wrong, seen = [], 0
+    for page in PAGES:
+        if page.name == "CHANGELOG.md":
+            continue
+        text = page.read_text(encoding="utf-8")
+        for line in re.findall(r"^(?:    )?wavecomb [^\n|#>]*", text, flags=re.MULTILINE):
+            words = line.split()[1:]
+            command = " ".join(words[:2]) if " ".join(words[:2]) in known else words[0]
+            options = re.findall(r"(?<=\s)(--[a-z][\w-]*)", line)
+            seen += len(options)
+            wrong += [f"{page.name}: {line.strip()}: {one}" for one in options
+                      if one not in known.get(command, ())]  # fmt: skip
+    assert not wrong, "\n".join(wrong[:20])
+    assert seen > 150
+
+
+def test_sources_name_pages_that_are_there() -> None:
+    """Of docs/NAME.md in comments, messages and tests."""
+    missing = []
+    for folder in ("src", "bindings", "python", "tests", "tools", "benchmarks", "cmake"):
+        for path in (ROOT / folder).rglob("*"):
+            kinds = (".h", ".cpp", ".inl", ".in", ".py", ".pyi", ".csv", ".cmake", "")
+            if path.suffix not in kinds or not path.is_file():
+                continue
+            text = path.read_text(encoding="utf-8", errors="replace")
+            missing += [f"{path.name}: {name}"
+                        for name in re.findall(r"\bdocs/[a-z-]{2,}(?:/[a-z-]{2,})?\.md", text)
+                        if not (ROOT / name).is_file() and "made-up" not in name]  # fmt: skip
+    assert not missing, missing
+
+
 def test_every_page_has_a_place_in_the_site() -> None:
     listed = set(
         re.findall(r"^\s+- (?:[\w ]+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), flags=re.M)
