@@ -39,7 +39,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
+.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist release render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
 
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -95,6 +95,11 @@ sdist: build/.setup ## The source distribution, in dist/
 	@rm -f dist/wavecomb-*.tar.gz
 	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
 	@ls dist/wavecomb-*.tar.gz
+
+# Uploads nothing: what to upload is printed.
+release: test-wheel test-sdist ## Build and test wheels and source distribution, and print what to upload
+	@$(VENV)/python -c 'import twine' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'twine>=6'
+	@$(VENV)/python tools/release
 
 # ---- use -----------------------------------------------------------------------------------------------
 
