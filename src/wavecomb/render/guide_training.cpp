@@ -99,11 +99,11 @@ PathLesson mean_path(const Lessons& lessons, std::span<const uint32_t> pixels,
 /// One training: its rounds, and for Guiding::kAuto whether they pay.
 class Trainer {
  public:
-  Trainer(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
-          uint64_t budget, const std::function<bool()>& stopped)
+  Trainer(const WaveContext& render, const Scene& scene, const WaveSetup& waves, uint64_t budget,
+          const std::function<bool()>& stopped)
       : trial_settings_(whole_picture(*render.settings)),
         settings_(trial_settings_),
-        means_(means),
+        waves_(waves),
         scene_(scene),
         budget_(budget),
         stopped_(stopped),
@@ -173,7 +173,7 @@ class Trainer {
   }
 
   Trial trial(const GuideView* guide) const {
-    return try_out(context_, trial_settings_, guide, means_, trial_pixels_, trial_samples_, grid_,
+    return try_out(context_, trial_settings_, guide, waves_, trial_pixels_, trial_samples_, grid_,
                    [this] { return ended(); });
   }
 
@@ -246,7 +246,7 @@ class Trainer {
                           tiles_ ? &*tiles_ : nullptr,
                           costs_,
                           settings_.roulette_depth};
-    const double cost = teach(context_, means_, pixels, plan, lessons_, [this] { return ended(); });
+    const double cost = teach(context_, waves_, pixels, plan, lessons_, [this] { return ended(); });
     if (ended()) return cost;
     first_sample_ += samples;
     statistics_.paths += lessons_.luminances.size();
@@ -273,7 +273,7 @@ class Trainer {
     GuideView taught = field.view();
     tiles_->apply(taught);
     const auto few = some_pixels(order_, budget_ / kSpreadShare / (2 * kSpreadSamples));
-    const Trial trial = try_out(context_, settings_, &taught, means_, few, kSpreadSamples, grid_,
+    const Trial trial = try_out(context_, settings_, &taught, waves_, few, kSpreadSamples, grid_,
                                 [this] { return ended(); });
     return 0.5 * kSpreadSamples * error_of(trial, few, *tiles_);
   }
@@ -281,7 +281,7 @@ class Trainer {
   const Clock::time_point start_ = Clock::now();
   const Settings trial_settings_;  ///< as the picture is
   Settings settings_;              ///< as paths that teach are
-  const TrainingMeans means_;
+  const WaveSetup waves_;
   const Scene& scene_;
   uint64_t budget_;
   const std::function<bool()>& stopped_;
@@ -322,12 +322,12 @@ bool is_taught(const Settings& settings) {
   return settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
 }
 
-GuideTraining train_guide(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
+GuideTraining train_guide(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
                           const std::function<bool()>& stopped) {
   const Settings& settings = *render.settings;
-  const uint64_t budget = training_paths(settings, means.threads);
+  const uint64_t budget = training_paths(settings, waves.threads);
   if (!is_taught(settings) || settings.max_depth == 0 || budget == 0) return {};
-  return Trainer(render, scene, means, budget, stopped).train();
+  return Trainer(render, scene, waves, budget, stopped).train();
 }
 
 }  // namespace wavecomb

@@ -15,6 +15,7 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/learn/guide_field.h"
 #include "wavecomb/render/picture_tiles.h"
+#include "wavecomb/render/wave_setup.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -53,14 +54,9 @@ GuideGrid grid_of(const Scene& scene);
 /// Whether a render with such settings is guided, or told where paths end, by what is learned.
 bool is_taught(const Settings& settings);
 
-/// How training paths are run.
-struct TrainingMeans {
-  uint32_t lanes, threads, wave_size;
-};
-
 /// Trains for a render with `context`, whose lights are weighed. `stopped`: give up; what comes
 /// back is then of no use.
-GuideTraining train_guide(const WaveContext& context, const Scene& scene,
-                          const TrainingMeans& means, const std::function<bool()>& stopped);
+GuideTraining train_guide(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
+                          const std::function<bool()>& stopped);
 
 }  // namespace wavecomb

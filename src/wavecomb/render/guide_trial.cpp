@@ -20,10 +20,9 @@ constexpr double kUncounted = 0.005;
 constexpr size_t kPathsAtOnce = 65'536;
 
 /// Cost of what an integrator has done, in rays of a hierarchy.
-double cost_of(const Integrator& integrator, const TrainingMeans& means, bool has_list,
-               bool looks_up) {
+double cost_of(const Integrator& integrator, const WaveSetup& waves, bool has_list, bool looks_up) {
   double rays = 0, records = 0;
-  for (uint32_t i = 0; i < means.threads; ++i)
+  for (uint32_t i = 0; i < waves.threads; ++i)
     if (const Counts* c = integrator.worker(i).counts) {
       rays += static_cast<double>(c->rays + c->shadow_rays);
       records += static_cast<double>(c->records);
@@ -48,14 +47,14 @@ double mean_without_largest(std::vector<double>& values, double share) {
          static_cast<double>(std::max<std::ptrdiff_t>(counted, 1));
 }
 
-double teach(WaveContext context, const TrainingMeans& means, std::span<const uint32_t> pixels,
+double teach(WaveContext context, const WaveSetup& waves, std::span<const uint32_t> pixels,
              const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped) {
   // Integrators keep vertices where somebody reads them when they are made.
   BounceReader nobody({}, plan);
   context.histories = &nobody;
   const std::unique_ptr<Integrator> integrator = make_integrator(
-      context.settings->integrator, context, means.lanes, means.threads, means.wave_size);
-  PassRunner runner(*integrator, means.threads, means.wave_size);
+      context.settings->integrator, context, waves.lanes, waves.threads, waves.wave_size);
+  PassRunner runner(*integrator, waves.threads, waves.wave_size);
   const size_t step = std::max<size_t>(1, kPathsAtOnce / plan.samples);
   lessons.bounces.clear();
   lessons.luminances.clear();
@@ -70,11 +69,11 @@ double teach(WaveContext context, const TrainingMeans& means, std::span<const ui
     runner.run(pass, stopped);
     reader.append_to(lessons);
   }
-  return cost_of(*integrator, means, context.accel->has_list(), context.guide != nullptr);
+  return cost_of(*integrator, waves, context.accel->has_list(), context.guide != nullptr);
 }
 
 Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const TrainingMeans& means, std::span<const uint32_t> pixels, uint32_t samples,
+              const WaveSetup& waves, std::span<const uint32_t> pixels, uint32_t samples,
               const GuideGrid& grid, const std::function<bool()>& stopped) {
   Trial trial;
   trial.samples = samples;
@@ -85,7 +84,7 @@ Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
     settings.seed = seed;
     Lessons lessons;
     const LessonPlan plan{0, samples, 0, grid, {}, nullptr, {}, 1};
-    trial.cost += teach(context, means, pixels, plan, lessons, stopped);
+    trial.cost += teach(context, waves, pixels, plan, lessons, stopped);
     if (stopped()) return trial;
     const double sign = (seed == kTrialSeeds[0] ? 1.0 : -1.0) / samples;
     for (size_t i = 0; i < pixels.size(); ++i)

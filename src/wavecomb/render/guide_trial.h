@@ -27,7 +27,7 @@ double mean_without_largest(std::vector<double>& values, double share);
 
 /// Runs the paths of `pixels` that `plan` says with the field of `context`, some at a time, and
 /// adds what they taught. Gives what they cost, in rays of a hierarchy.
-double teach(WaveContext context, const TrainingMeans& means, std::span<const uint32_t> pixels,
+double teach(WaveContext context, const WaveSetup& waves, std::span<const uint32_t> pixels,
              const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped);
 
 /// Two pictures of some pixels, with other seeds: Sobol's points are in them as they are in the
@@ -45,7 +45,7 @@ struct Trial {
 /// Renders `samples` of each pixel, as `settings` say but for the seed. `guide`: null: without a
 /// field.
 Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const TrainingMeans& means, std::span<const uint32_t> pixels, uint32_t samples,
+              const WaveSetup& waves, std::span<const uint32_t> pixels, uint32_t samples,
               const GuideGrid& grid, const std::function<bool()>& stopped);
 
 /// The mean squared difference, relative to the picture there. The pixels that differ most do not

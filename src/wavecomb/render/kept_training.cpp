@@ -163,8 +163,8 @@ GuideTraining unpacked_training(std::span<const std::byte> bytes, const Scene& s
 }
 
 std::shared_ptr<const GuideTraining> GuideTrainingCache::get(
-    const std::shared_ptr<const Scene>& scene, const WaveContext& context,
-    const TrainingMeans& means, const std::function<bool()>& stopped) {
+    const std::shared_ptr<const Scene>& scene, const WaveContext& context, const WaveSetup& waves,
+    const std::function<bool()>& stopped) {
   const Settings settings = that_teach(*context.settings);
   if (last_ && scene_.lock() == scene && settings_ == settings) {
     if (!last_->statistics.is_kept) {
@@ -176,7 +176,7 @@ std::shared_ptr<const GuideTraining> GuideTrainingCache::get(
     return last_;
   }
   auto trained =
-      std::make_shared<const GuideTraining>(train_guide(context, *scene, means, stopped));
+      std::make_shared<const GuideTraining>(train_guide(context, *scene, waves, stopped));
   if (trained->statistics.paths > 0 && !stopped()) {
     last_ = trained;
     settings_ = settings;

@@ -31,7 +31,7 @@ class GuideTrainingCache {
  public:
   /// train_guide(), or what it gave before.
   std::shared_ptr<const GuideTraining> get(const std::shared_ptr<const Scene>& scene,
-                                           const WaveContext& context, const TrainingMeans& means,
+                                           const WaveContext& context, const WaveSetup& waves,
                                            const std::function<bool()>& stopped);
 
  private:

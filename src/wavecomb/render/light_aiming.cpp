@@ -47,7 +47,7 @@ PassPlan first_paths(const Settings& settings, uint64_t count, uint32_t sample) 
 
 }  // namespace
 
-LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const TrainingMeans& means,
+LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped) {
   const Clock::time_point start = Clock::now();
   LightAiming out;
@@ -68,8 +68,8 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Tr
   const uint64_t numbers = uint64_t{settings.width} * settings.height;
   const uint64_t count = std::clamp(numbers / kAimShare, kLeastAimPaths, kMostAimPaths);
   const std::unique_ptr<Integrator> integrator =
-      make_integrator(settings.integrator, context, means.lanes, means.threads, means.wave_size);
-  PassRunner runner(*integrator, means.threads, means.wave_size);
+      make_integrator(settings.integrator, context, waves.lanes, waves.threads, waves.wave_size);
+  PassRunner runner(*integrator, waves.threads, waves.wave_size);
   out.aim = aim_at_seen(scene, *context.accel, settings, context.scene.lights.radius);
   for (uint32_t round = 0; round < kAimRounds; ++round) {
     AimLessons lessons(count);

@@ -25,7 +25,7 @@ struct LightAiming {
 
 /// Learns for a render with `context`, whose lights are weighed and send paths. `stopped`: give up;
 /// what comes back is then of no use.
-LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const TrainingMeans& means,
+LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped);
 
 }  // namespace wavecomb

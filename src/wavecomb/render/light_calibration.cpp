@@ -174,10 +174,9 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   return out;
 }
 
-const LightCalibration& LightCalibrationCache::get(const std::shared_ptr<const Scene>& scene,
-                                                   const EmbreeAccelerator& accel,
-                                                   const SceneView& view, const Settings& settings,
-                                                   const std::function<bool()>& stopped) {
+std::shared_ptr<const LightCalibration> LightCalibrationCache::get(
+    const std::shared_ptr<const Scene>& scene, const EmbreeAccelerator& accel,
+    const SceneView& view, const Settings& settings, const std::function<bool()>& stopped) {
   const bool is_off = settings.light_weights == LightWeights::kPower;
   if (!last_ || is_off || scene_.lock() != scene || !alike(settings_, settings)) {
     last_ = std::make_shared<const LightCalibration>(
@@ -190,7 +189,7 @@ const LightCalibration& LightCalibrationCache::get(const std::shared_ptr<const S
     kept->seconds = 0;
     last_ = kept;
   }
-  return *last_;
+  return last_;
 }
 
 }  // namespace wavecomb

@@ -39,11 +39,11 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
 /// Contract: one thread at a time.
 class LightCalibrationCache {
  public:
-  const LightCalibration& get(const std::shared_ptr<const Scene>& scene,
-                              const EmbreeAccelerator& accel, const SceneView& view,
-                              const Settings& settings, const std::function<bool()>& stopped);
-  /// What get() gave last; null before.
-  std::shared_ptr<const LightCalibration> last() const { return last_; }
+  /// calibrate_lights(), or what it gave before.
+  std::shared_ptr<const LightCalibration> get(const std::shared_ptr<const Scene>& scene,
+                                              const EmbreeAccelerator& accel, const SceneView& view,
+                                              const Settings& settings,
+                                              const std::function<bool()>& stopped);
 
  private:
   std::weak_ptr<const Scene> scene_;

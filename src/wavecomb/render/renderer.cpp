@@ -1,53 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/render/renderer.h"
 
-#include <tbb/global_control.h>
-#include <tbb/info.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
-#include <chrono>
-#include <limits>
 #include <mutex>
 #include <utility>
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/core/error.h"
-#include "wavecomb/core/task_order.h"
-#include "wavecomb/film/error_map.h"
-#include "wavecomb/film/film.h"
-#include "wavecomb/integrate/ray_recorder.h"
-#include "wavecomb/integrate/wave.h"
-#include "wavecomb/material/energy_tables.h"
 #include "wavecomb/render/cost_profile.h"
-#include "wavecomb/render/guide_training.h"
 #include "wavecomb/render/kept_training.h"
 #include "wavecomb/render/learned.h"
-#include "wavecomb/render/light_aiming.h"
-#include "wavecomb/render/light_calibration.h"
 #include "wavecomb/render/light_paths.h"
-#include "wavecomb/render/pass_loop.h"
-#include "wavecomb/render/pass_plan.h"
-#include "wavecomb/render/pass_runner.h"
 #include "wavecomb/render/pick.h"
-#include "wavecomb/render/process_memory.h"
-#include "wavecomb/render/render_costs.h"
-#include "wavecomb/render/render_setup.h"
+#include "wavecomb/render/render_plan.h"
+#include "wavecomb/render/render_run.h"
 #include "wavecomb/render/render_statistics.h"
 #include "wavecomb/render/snapshot.h"
 #include "wavecomb/render/transport_choice.h"
-#include "wavecomb/scene/light_tree.h"
 #include "wavecomb/scene/scene.h"
-#include "wavecomb/schedule/policy.h"
 
 namespace wavecomb {
-namespace {
-
-/// The darkest layer of cascades (film/cascades.h), over the brightness of the scene.
-constexpr float kDarkestShare = 0x1p-12f;
-
-}  // namespace
-
 struct WavefrontRenderer::Impl {
   // Replaced by edits and renders, under the mutex.
   std::shared_ptr<const Scene> scene;
@@ -61,20 +33,14 @@ struct WavefrontRenderer::Impl {
 
   uint32_t threads = 0;
   double build_s = 0;
-  LightCalibrationCache light_calibrations;
-  GuideTrainingCache trainings;
+  PilotCache pilot_cache;
 
-  /// What trials before a picture share.
-  struct TrialMeans {
-    const Settings& picture;            ///< for which lights are weighed
-    std::optional<LightAiming> aiming;  ///< of the first with light paths
-  };
-  /// Renders with settings whose transport is chosen; a trial with its means.
+  /// Renders with settings whose transport is chosen. `shared`: for trials.
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
-                 Watch& watch, TrialMeans* trial = nullptr);
-  /// A small picture, for choose_transport; ends where `outer` is stopped.
+                 Watch& watch, const TrialShared& shared = {});
+  /// Renders a small image, for choose_transport; ends where `outer` is stopped.
   TransportTrial try_out(const Settings& settings, LightPathShare share, bool wants_squares,
-                         TrialMeans& means, const Watch& outer);
+                         const TrialShared& shared, const Watch& outer);
 };
 
 namespace {
@@ -192,7 +158,7 @@ CostProfile WavefrontRenderer::cost_profile() const {
 }
 
 TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, LightPathShare share,
-                                                bool wants_squares, TrialMeans& means,
+                                                bool wants_squares, const TrialShared& shared,
                                                 const Watch& outer) {
   RenderOptions options;
   options.wants_camera_squares = wants_squares;
@@ -201,7 +167,7 @@ TransportTrial WavefrontRenderer::Impl::try_out(const Settings& settings, LightP
   };
   Watch watch(options.interval_s);
   TransportTrial trial;
-  Picture picture = render(settings, share, options, watch, &means);
+  Picture picture = render(settings, share, options, watch, shared);
   trial.beauty = std::move(picture.beauty);
   for (AovLayer& layer : picture.aovs)
     if (layer.name == aov_name(Aov::kByLightPaths)) trial.by_light_paths = std::move(layer.values);
@@ -220,11 +186,12 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
     if (used.max_depth == 0) used.transport = Transport::kPath;
     return impl_->render(used, {}, options, watch);
   }
-  Impl::TrialMeans means{settings, {}};
+  std::shared_ptr<const LightAiming> aiming;
+  const TrialShared shared{&settings, &aiming};
   const TransportChoice choice = choose_transport(
       *impl_->scene, settings,
       [&](const Settings& s, LightPathShare share, bool squares) {
-        return impl_->try_out(s, share, squares, means, watch);
+        return impl_->try_out(s, share, squares, shared, watch);
       },
       [&] { return watch.stopped(); });
   Settings chosen = settings;
@@ -239,200 +206,23 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
 
 Picture WavefrontRenderer::Impl::render(const Settings& settings, LightPathShare light_share,
                                         const RenderOptions& options, Watch& watch,
-                                        TrialMeans* trial) {
-  const Scene& scene = *this->scene;
-  const uint32_t lanes = choose_lanes(settings.lanes);
-  const LaneKernels kernels = lane_kernels(lanes);
-  const uint32_t threads = thread_count(settings);
-  std::vector<std::unique_ptr<SchedulingPolicy>> owned;
-  std::vector<const SchedulingPolicy*> policies;
-  if (options.policy) {
-    policies.push_back(options.policy);
-  } else {
-    owned = choose_policies(settings.policy);
-    for (const auto& policy : owned) policies.push_back(policy.get());
-  }
-  const bool wants_position = std::any_of(policies.begin(), policies.end(), [](const auto* policy) {
-    return (policy->columns() & kPositionColumn) != 0;
+                                        const TrialShared& shared) {
+  const RenderPlan plan(*scene, *accel, settings, light_share, options.policy);
+  RenderRun run(scene, plan, options, watch, build_s);
+  run.run(pilot_cache, shared, [&](const PilotResults& found) {
+    const std::lock_guard lock(mutex);
+    learned = std::make_shared<const Learned>(
+        Learned{scene, plan.view.lights.by_tree, found.lights, found.training});
   });
-  const std::vector<MaterialTraits> traits = material_traits(scene);
-  RenderCosts costs(scene, traits, settings);
-  const FilterTable filter(settings.filter, settings.used_filter_width());
-  const CameraSetup camera(scene.camera(), settings.width, settings.height, filter,
-                           settings.overscan);
-  const AovTables aovs(scene, settings);
-  const Region window = settings.film();
-  Film film(window, aovs.layout, settings.keeps_error());
-  const SplatFilter splat_filter = splat_filter_of(camera, filter, settings.rendered());
-  if (settings.joins_light()) {
-    check_light_paths(scene, settings);
-    film.keep_splats(splat_unit(scene), size_t{settings.width} * settings.height,
-                     double{light_share.paths()});
-  }
-  if (settings.merges()) film.keep_visible_points();
-  if (settings.firefly == Firefly::kReweight)
-    film.keep_cascades(scene_brightness(scene) * kDarkestShare);
-  PassState pass;
-  std::vector<std::byte> learned_before;
-  if (options.resume) learned_before = options.resume(film, pass);
-  if (learned_before.empty() && is_taught(settings)) learned_before = options.learned;
-  const uint64_t pixels = settings.rendered().pixels();
-  const uint32_t wave_size = wave_size_for(settings, pixels);
-  SceneView scene_view = scene.view();
-  scene_view.lights.by_tree = chooses_by_tree(settings.light_selection, scene_view.lights);
-  if (scene_view.lights.by_tree) scene_view.lights.tree = scene.light_tree(threads).view();
-  scene_view.materials.energy = energy_tables(scene.materials());
-  WaveContext context{
-      scene_view,
-      accel.get(),
-      &settings,
-      &camera,
-      policies,
-      traits,
-      &costs.order,
-      &costs.roulette,
-      order_grid(scene.bounds()),
-      &film,
-      settings.traversal == Traversal::kSingle ? 1u : std::min(lanes, accel->native_width()),
-      wants_position,
-      costs.measures(),
-      options.recorder,
-      &aovs};
-
-  if (settings.joins_light()) context.splat_filter = &splat_filter;
-  VisibleGrid visible;
-  if (settings.merges()) context.visible = &visible;
-  context.light_paths = light_share.paths();
-  const Clock::time_point start = Clock::now();
-  const std::unique_ptr<Integrator> integrator =
-      make_integrator(settings.integrator, context, lanes, threads, wave_size);
-  PassRunner runner(*integrator, threads, wave_size);
-  PassLoop loop(settings, pass_step(settings, pixels, wave_size), std::move(pass), light_share,
-                film, runner, costs, watch, [&] {
-                  if (settings.merges()) visible.build(film.visible_points());
-                });
-  const LightCalibration* lights = nullptr;
-  std::vector<std::string> without_paths;
-  if (settings.joins_light()) without_paths = lights_without_paths(scene);
-  auto training = std::make_shared<const GuideTraining>();
-  GuideView guide;
-  LightAiming aiming;
-  const TrainingMeans means{lanes, threads, wave_size};
-  const auto work = [&] {
-    lights =
-        &light_calibrations.get(this->scene, *accel, scene_view, trial ? trial->picture : settings,
-                                [&] { return watch.stopped(); });
-    lights->weighed.apply(context.scene.lights);
-    if (settings.joins_light()) send_paths(scene, context.scene.lights);
-    costs.start(context, kernels, options.profile, [&] { return watch.halted(); });
-    if (settings.joins_light() && settings.light_aim) {
-      aiming = trial && trial->aiming
-                   ? *trial->aiming
-                   : learn_to_aim(context, scene, means, [&] { return watch.stopped(); });
-      if (trial) trial->aiming = aiming;
-      if (aiming.aim.count > 0) context.scene.lights.aim = &aiming.aim;
-    }
-    training = learned_before.empty()
-                   ? trainings.get(this->scene, context, means, [&] { return watch.stopped(); })
-                   : std::make_shared<const GuideTraining>(
-                         unpacked_training(learned_before, scene, settings));
-    if (training->field) {
-      guide = view_of(*training);
-      context.guide = &guide;
-    }
-    // What is learned is learned of light.
-    if (options.wants_camera_squares) context.camera_squares = scene_brightness(scene);
-    if (!watch.stopped()) {
-      const std::lock_guard lock(mutex);
-      learned = std::make_shared<const Learned>(
-          Learned{this->scene, scene_view.lights.by_tree, light_calibrations.last(), training});
-    }
-    loop.run();
-  };
-  // The workers stand still meanwhile.
-  const auto taken = [&] {
-    RenderStatistics s;
-    s.build_s = build_s;
-    s.render_s = seconds_since(start);
-    s.first_samples_s = runner.first_samples_s();
-    s.threads = threads;
-    s.wave_size = wave_size;
-    s.cancelled = watch.stopped();
-    const RenderStatus status = loop.status();
-    s.passes = status.passes;
-    s.resumed_samples = status.resumed_samples;
-    s.error = status.error;
-    s.allotment = loop.allotment();
-    s.guiding = training->statistics;
-    if (aiming.paths > 0) s.light_aiming = {aiming.aim.count, aiming.paths, aiming.seconds};
-    s.lights_without_paths = without_paths;
-    add_up(runner, context, scene, costs, s);
-    s.scene_bytes = scene.bytes();
-    s.accelerator_bytes = accel->bytes();
-    s.film_bytes = film.bytes();
-    if (lights) s.light_calibration = light_shares(*lights);
-    s.peak_rss_bytes = peak_rss_bytes();
-    if (const TileStore* store = scene.texture_store()) s.texture_store = store->statistics();
-    return s;
-  };
-  // What is read since a store failed is black: nobody gets to see it.
-  const auto check_textures = [&] {
-    if (const TileStore* store = scene.texture_store()) store->check();
-  };
-  const auto snapshot = [&](bool finished) {
-    check_textures();
-    film.note_light_paths();
-    if (options.snapshot)
-      options.snapshot(
-          {film, loop.pass(), *training, loop.status(), finished, aovs.kept_names, taken});
-  };
-  const tbb::global_control parallelism(
-      tbb::global_control::max_allowed_parallelism,
-      std::max<size_t>(threads, static_cast<size_t>(tbb::info::default_concurrency())));
-  const auto in_arena = [&] {
-    const TaskOrder order;
-    tbb::task_arena(static_cast<int>(threads)).execute(order.around(work));
-    order.join();
-  };
-  watch.run(
-      in_arena,
-      [&] {
-        check_textures();
-        return options.progress ? options.progress(loop.status()) : Request::kGoOn;
-      },
-      [&] { snapshot(false); });
-  check_textures();
-  if (options.progress && !watch.stopped()) options.progress(loop.status());
-  snapshot(true);
-
-  RenderStatistics s = taken();
+  RenderStatistics s = run.statistics();
   const auto keep = [&] {
     const std::lock_guard lock(mutex);
     statistics = s;
-    profile = costs.profile();
+    profile = run.cost_profile();
   };
   keep();
-  if (!options.wants_picture) return {window.width(), window.height(), {}, {}, {}, {}, {}};
-  ErrorMap error;
-  error.mean_relative = std::numeric_limits<double>::infinity();
-  if (film.has_error()) error = measure_error(film);
-  s.error = error.mean_relative;
-  Film::Layers layers = std::move(film).finish(aovs.kept_names);
-  s.peak_rss_bytes = peak_rss_bytes();
+  Picture picture = run.finish(s);
   keep();
-  Picture picture{window.width(),
-                  window.height(),
-                  std::move(layers.beauty),
-                  std::move(layers.albedo),
-                  std::move(layers.normal),
-                  std::move(layers.depth),
-                  std::move(layers.samples),
-                  std::move(error.error),
-                  std::move(layers.variance),
-                  std::move(layers.aovs),
-                  {}};
-  picture.deep = std::move(layers.deep);
-  picture.manifests = crypto_manifests(scene, picture.aovs);
   return picture;
 }
 

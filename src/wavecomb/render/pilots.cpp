@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/pilots.h"
+
+#include <utility>
+
+namespace wavecomb {
+namespace {
+
+/// The training that a render uses: learned now or before.
+std::shared_ptr<const GuideTraining> training_for(const PilotInput& input,
+                                                  const WaveContext& context, PilotCache& cache) {
+  if (input.learned.empty())
+    return cache.trainings.get(input.scene, context, input.plan.waves, input.stopped);
+  return std::make_shared<const GuideTraining>(
+      unpacked_training(input.learned, *input.scene, input.plan.settings));
+}
+
+}  // namespace
+
+void PilotResults::apply(WaveContext& context, const Scene& scene) {
+  if (lights) {
+    lights->weighed.apply(context.scene.lights);
+    if (context.joins_light()) send_paths(scene, context.scene.lights);
+  }
+  if (aiming && aiming->aim.count > 0) context.scene.lights.aim = &aiming->aim;
+  if (training && training->field) {
+    guide_ = view_of(*training);
+    context.guide = &guide_;
+  }
+}
+
+PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
+  const RenderPlan& plan = input.plan;
+  WaveContext context = input.context;
+  PilotResults found;
+  found.lights = cache.lights.get(input.scene, plan.accelerator, plan.view, input.light_settings,
+                                  input.stopped);
+  found.apply(context, *input.scene);
+  input.costs.start(context, plan.kernels, input.profile, input.halted);
+  if (plan.settings.joins_light() && plan.settings.light_aim) {
+    found.aiming = input.aiming;
+    if (!found.aiming)
+      found.aiming = std::make_shared<const LightAiming>(
+          learn_to_aim(context, *input.scene, plan.waves, input.stopped));
+    found.apply(context, *input.scene);
+  }
+  found.training = training_for(input, context, cache);
+  return found;
+}
+
+}  // namespace wavecomb

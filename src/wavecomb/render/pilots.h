@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Pilots: small renders before the first pass that find out what the render needs.
+///
+/// They run one after another, and each may use what those before found:
+/// 1. light calibration: what each light brings to the image (light_calibration.h);
+/// 2. costs of materials (render_costs.h);
+/// 3. aiming: where paths from lights should go (light_aiming.h);
+/// 4. training: where light comes from (guide_training.h).
+/// Each returns its result with the seconds that it took and its statistics. Except for costs,
+/// which change no image, they depend on counted samples of the whole image only. Whether and how
+/// many paths start at lights was decided before, by a pilot that compares whole renders
+/// (transport_choice.h).
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "wavecomb/learn/guide_view.h"
+#include "wavecomb/render/kept_training.h"
+#include "wavecomb/render/light_aiming.h"
+#include "wavecomb/render/light_calibration.h"
+#include "wavecomb/render/render_plan.h"
+
+namespace wavecomb {
+
+/// Results of the pilots of earlier renders of the same scene.
+///
+/// Contract: one thread at a time.
+struct PilotCache {
+  LightCalibrationCache lights;
+  GuideTrainingCache trainings;
+};
+
+/// What the pilots of a render found.
+struct PilotResults {
+  std::shared_ptr<const LightCalibration> lights;  ///< null: not calibrated yet
+  std::shared_ptr<const LightAiming> aiming;       ///< null: paths from lights are not aimed
+  std::shared_ptr<const GuideTraining> training;   ///< null: not trained yet; may have no field
+
+  /// Makes the waves of `context` use it. Contract: the context is used while this object lives and
+  /// does not change.
+  void apply(WaveContext& context, const Scene& scene);
+
+ private:
+  GuideView guide_;
+};
+
+/// What pilots work with.
+struct PilotInput {
+  std::shared_ptr<const Scene> scene;
+  const RenderPlan& plan;
+  const WaveContext& context;  ///< of the render
+  RenderCosts& costs;          ///< gets what is measured
+  /// Costs of an earlier render, or null.
+  const CostProfile* profile = nullptr;
+  /// The image that lights are calibrated for: that of the plan, or the one that a trial is for.
+  const Settings& light_settings;
+  /// What an earlier render learned, in place of training (packed_training()); empty: nothing.
+  std::span<const std::byte> learned;
+  /// Of an earlier trial for the same image, in place of learning it; null: there was none.
+  std::shared_ptr<const LightAiming> aiming;
+  std::function<bool()> stopped;  ///< whether to give up
+  std::function<bool()> halted;   ///< whether to rest soon
+};
+
+/// Runs the pilots of a render. Where `stopped` said yes, what comes back is of no use.
+PilotResults run_pilots(const PilotInput& input, PilotCache& cache);
+
+}  // namespace wavecomb

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "wavecomb/render/render_run.h"
+
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "wavecomb/core/task_order.h"
+#include "wavecomb/film/error_map.h"
+#include "wavecomb/render/pick.h"
+#include "wavecomb/render/process_memory.h"
+#include "wavecomb/render/snapshot.h"
+
+namespace wavecomb {
+namespace {
+
+/// Names of the ids in the Cryptomatte layers among `layers`.
+std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
+                                             const std::vector<AovLayer>& layers) {
+  std::vector<CryptoManifest> manifests;
+  for (const AovLayer& layer : layers)
+    for (const Aov level : {Aov::kCryptoObject, Aov::kCryptoMaterial, Aov::kCryptoAsset})
+      if (layer.name == aov_name(level))
+        manifests.push_back({layer.name, crypto_manifest(scene, level, crypto_ids(layer))});
+  return manifests;
+}
+
+}  // namespace
+
+RenderRun::RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
+                     const RenderOptions& options, Watch& watch, double build_s)
+    : scene_(std::move(scene)),
+      plan_(plan),
+      options_(options),
+      watch_(watch),
+      build_s_(build_s),
+      costs_(*scene_, plan.traits, plan.settings),
+      film_(plan.make_film()),
+      context_(plan.make_context(film_, costs_, options.recorder,
+                                 plan.settings.merges() ? &visible_ : nullptr)),
+      integrator_(make_integrator(plan.settings.integrator, context_, plan.waves.lanes,
+                                  plan.waves.threads, plan.waves.wave_size)),
+      runner_(*integrator_, plan.waves.threads, plan.waves.wave_size),
+      loop_(plan.settings, plan.pass_samples, resume(), plan.light_share, film_, runner_, costs_,
+            watch, [this] {
+              if (plan_.settings.merges()) visible_.build(film_.visible_points());
+            }) {}
+
+PassState RenderRun::resume() {
+  PassState pass;
+  if (options_.resume) learned_before_ = options_.resume(film_, pass);
+  if (learned_before_.empty() && is_taught(plan_.settings)) learned_before_ = options_.learned;
+  return pass;
+}
+
+void RenderRun::work(PilotCache& cache, const TrialShared& shared,
+                     const std::function<void(const PilotResults&)>& learned) {
+  const auto stopped = [this] { return watch_.stopped(); };
+  pilots_ = run_pilots(
+      {
+          .scene = scene_,
+          .plan = plan_,
+          .context = context_,
+          .costs = costs_,
+          .profile = options_.profile,
+          .light_settings = shared.image ? *shared.image : plan_.settings,
+          .learned = learned_before_,
+          .aiming = shared.aiming ? *shared.aiming : nullptr,
+          .stopped = stopped,
+          .halted = [this] { return watch_.halted(); },
+      },
+      cache);
+  pilots_.apply(context_, *scene_);
+  if (shared.aiming) *shared.aiming = pilots_.aiming;
+  // Pilots measure light, whatever the render's splats hold.
+  if (options_.wants_camera_squares) context_.camera_squares = scene_brightness(*scene_);
+  if (!stopped()) learned(pilots_);
+  loop_.run();
+}
+
+void RenderRun::run(PilotCache& cache, const TrialShared& shared,
+                    const std::function<void(const PilotResults&)>& learned) {
+  const uint32_t threads = plan_.waves.threads;
+  const tbb::global_control parallelism(
+      tbb::global_control::max_allowed_parallelism,
+      std::max<size_t>(threads, static_cast<size_t>(tbb::info::default_concurrency())));
+  const auto in_arena = [&] {
+    const TaskOrder order;
+    tbb::task_arena(static_cast<int>(threads)).execute(order.around([&] {
+      work(cache, shared, learned);
+    }));
+    order.join();
+  };
+  watch_.run(
+      in_arena,
+      [&] {
+        check_textures();
+        return options_.progress ? options_.progress(loop_.status()) : Request::kGoOn;
+      },
+      [&] { take_snapshot(false); });
+  check_textures();
+  if (options_.progress && !watch_.stopped()) options_.progress(loop_.status());
+  take_snapshot(true);
+}
+
+void RenderRun::take_snapshot(bool is_finished) {
+  check_textures();
+  film_.note_light_paths();
+  if (!options_.snapshot) return;
+  static const GuideTraining kNothing;
+  const GuideTraining& training = pilots_.training ? *pilots_.training : kNothing;
+  options_.snapshot({film_, loop_.pass(), training, loop_.status(), is_finished,
+                     plan_.aovs.kept_names, [this] { return statistics(); }});
+}
+
+void RenderRun::check_textures() const {
+  if (const TileStore* store = scene_->texture_store()) store->check();
+}
+
+RenderStatistics RenderRun::statistics() const {
+  RenderStatistics s;
+  s.build_s = build_s_;
+  s.render_s = seconds_since(start_);
+  s.first_samples_s = runner_.first_samples_s();
+  s.threads = plan_.waves.threads;
+  s.wave_size = plan_.waves.wave_size;
+  s.cancelled = watch_.stopped();
+  const RenderStatus status = loop_.status();
+  s.passes = status.passes;
+  s.resumed_samples = status.resumed_samples;
+  s.error = status.error;
+  s.allotment = loop_.allotment();
+  if (pilots_.training) s.guiding = pilots_.training->statistics;
+  if (const LightAiming* aiming = pilots_.aiming.get(); aiming && aiming->paths > 0)
+    s.light_aiming = {aiming->aim.count, aiming->paths, aiming->seconds};
+  if (plan_.settings.joins_light()) s.lights_without_paths = lights_without_paths(*scene_);
+  add_up(runner_, context_, *scene_, costs_, s);
+  s.scene_bytes = scene_->bytes();
+  s.accelerator_bytes = plan_.accelerator.bytes();
+  s.film_bytes = film_.bytes();
+  if (pilots_.lights) s.light_calibration = light_shares(*pilots_.lights);
+  s.peak_rss_bytes = peak_rss_bytes();
+  if (const TileStore* store = scene_->texture_store()) s.texture_store = store->statistics();
+  return s;
+}
+
+Picture RenderRun::finish(RenderStatistics& statistics) {
+  Picture picture;
+  picture.width = plan_.window.width();
+  picture.height = plan_.window.height();
+  if (!options_.wants_picture) return picture;
+  ErrorMap error;
+  error.mean_relative = std::numeric_limits<double>::infinity();
+  if (film_.has_error()) error = measure_error(film_);
+  statistics.error = error.mean_relative;
+  Film::Layers layers = std::move(film_).finish(plan_.aovs.kept_names);
+  statistics.peak_rss_bytes = peak_rss_bytes();
+  picture.beauty = std::move(layers.beauty);
+  picture.albedo = std::move(layers.albedo);
+  picture.normal = std::move(layers.normal);
+  picture.depth = std::move(layers.depth);
+  picture.samples = std::move(layers.samples);
+  picture.error = std::move(error.error);
+  picture.variance = std::move(layers.variance);
+  picture.aovs = std::move(layers.aovs);
+  picture.deep = std::move(layers.deep);
+  picture.manifests = crypto_manifests(*scene_, picture.aovs);
+  return picture;
+}
+
+}  // namespace wavecomb
