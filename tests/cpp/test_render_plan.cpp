@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render does, decided before it runs, and the pilots that run before its first pass.
+/// Plans of renders, and the pilots that run before the first pass.
 #include <gtest/gtest.h>
 
 #include "scene_testing.h"

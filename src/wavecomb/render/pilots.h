@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Pilots: small renders before the first pass that find out what the render needs.
 ///
-/// They run one after another, and each may use what those before found:
-/// 1. light calibration: what each light brings to the image (light_calibration.h);
+/// They run in this order, and each uses the results of those before:
+/// 1. light calibration: the contribution of each light to the image (light_calibration.h);
 /// 2. costs of materials (render_costs.h);
 /// 3. aiming: where paths from lights should go (light_aiming.h);
 /// 4. training: where light comes from (guide_training.h).
@@ -33,7 +33,7 @@ struct PilotCache {
   GuideTrainingCache trainings;
 };
 
-/// What the pilots of a render found.
+/// Results of the pilots of one render.
 struct PilotResults {
   std::shared_ptr<const LightCalibration> lights;  ///< null: not calibrated yet
   std::shared_ptr<const LightAiming> aiming;       ///< null: paths from lights are not aimed
@@ -47,7 +47,7 @@ struct PilotResults {
   GuideView guide_;
 };
 
-/// What pilots work with.
+/// Input of the pilots.
 struct PilotInput {
   std::shared_ptr<const Scene> scene;
   const RenderPlan& plan;
@@ -57,7 +57,7 @@ struct PilotInput {
   const CostProfile* profile = nullptr;
   /// The image that lights are calibrated for: that of the plan, or the one that a trial is for.
   const Settings& light_settings;
-  /// What an earlier render learned, in place of training (packed_training()); empty: nothing.
+  /// Packed training of an earlier render (packed_training()), which replaces training; or empty.
   std::span<const std::byte> learned;
   /// Of an earlier trial for the same image, in place of learning it; null: there was none.
   std::shared_ptr<const LightAiming> aiming;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render computes with: lanes, waves, policies, camera and film.
+/// The plan of a render: lanes, waves, policies, camera and film.
 #pragma once
 
 #include <cstdint>
@@ -65,7 +65,7 @@ struct RenderPlan {
 
   /// An empty film with all that the settings ask for.
   Film make_film() const;
-  /// What the waves of the render read. `film`: of make_film(). `costs`: of this render.
+  /// The data that the waves of the render read. `film`: of make_film(). `costs`: of this render.
   /// `visible`: with whose points paths from lights are merged, or null.
   WaveContext make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
                            const VisibleGrid* visible) const;

@@ -23,14 +23,14 @@
 
 namespace wavecomb {
 
-/// What a trial takes from the image that it is for; both null in a render of its own.
+/// Data that the trials for one image share. Both pointers are null in other renders.
 struct TrialShared {
   const Settings* image = nullptr;                  ///< whose lights are calibrated
   std::shared_ptr<const LightAiming>* aiming = {};  ///< learned by the first trial, for the others
 };
 
-/// Contract: all functions on one thread; run() once, finish() once and last. What the constructor
-/// gets outlives the run.
+/// Contract: all functions on one thread; run() once, finish() once and last. The arguments of the
+/// constructor outlive the run.
 class RenderRun {
  public:
   /// `build_s`: seconds that the accelerator took to build, for statistics.
@@ -42,7 +42,7 @@ class RenderRun {
   void run(PilotCache& cache, const TrialShared& shared,
            const std::function<void(const PilotResults&)>& learned);
 
-  /// What the render took so far. Contract: while the workers stand still.
+  /// Statistics of the render so far. Contract: while no worker runs.
   RenderStatistics statistics() const;
   CostProfile cost_profile() const { return costs_.profile(); }
   /// The image. The film is freed meanwhile. `statistics`: get the error of the image and the peak
