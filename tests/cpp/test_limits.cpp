@@ -116,9 +116,10 @@ TEST(Limits, ids_of_layers_are_whole_numbers_of_a_float) {
   AovSet set{static_cast<uint32_t>(Aov::kInstanceId)};
   EXPECT_EQ(refusal([&] { check_id_layers(set, 1u << 24, 1u << 25); }), "");
   const std::string said = refusal([&] { check_id_layers(set, (1u << 24) + 1, 1); });
-  EXPECT_EQ(said,
-            "AOV instance_id: the scene has 16777217 instances; its floats tell 16777216 apart; "
-            "leave it out, or take crypto_object");
+  EXPECT_EQ(
+      said,
+      "AOV instance_id: the scene has 16777217 instances, but a float layer can distinguish only "
+      "16777216; remove it, or use crypto_object");
   set.bits = static_cast<uint32_t>(Aov::kMaterialId);
   EXPECT_EQ(refusal([&] { check_id_layers(set, 1u << 25, 1u << 24); }), "");
   EXPECT_NE(refusal([&] { check_id_layers(set, 1, (1u << 24) + 1); }).find("crypto_material"),

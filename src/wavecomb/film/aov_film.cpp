@@ -10,12 +10,12 @@
 namespace wavecomb {
 namespace {
 
-/// Before the names of light groups' layers.
+/// Prefix of the layer names of light groups.
 constexpr const char* kLightPrefix = "light_";
-/// And of light path expressions.
+/// Prefix of the layer names of light path expressions.
 constexpr const char* kExpressionPrefix = "lpe_";
 
-/// A layer whose pixel i is written by `write(i, pointer)`.
+/// Returns a layer whose pixel i is filled by `write(i, pointer)`.
 template <typename Write>
 AovLayer make_layer(std::string name, uint32_t channels, size_t pixels, const Write& write) {
   AovLayer layer{std::move(name), channels, std::vector<float>(pixels * channels)};
@@ -23,6 +23,7 @@ AovLayer make_layer(std::string name, uint32_t channels, size_t pixels, const Wr
   return layer;
 }
 
+/// Sorts `ids` and removes duplicates.
 void keep_once(std::vector<uint32_t>& ids) {
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
@@ -200,7 +201,7 @@ std::vector<uint32_t> crypto_ids(const AovLayer& pairs) {
   for (size_t i = 0; i + 1 < pairs.values.size(); i += 2) {
     if (pairs.values[i + 1] <= 0) continue;
     const auto id = std::bit_cast<uint32_t>(pairs.values[i]);
-    // Neighbours have the same ids: now and then is enough to keep the list short.
+    // Neighbouring pixels mostly have the same ids, so occasional deduplication bounds the list.
     if (ids.empty() || ids.back() != id) ids.push_back(id);
     if (ids.size() < limit) continue;
     keep_once(ids);

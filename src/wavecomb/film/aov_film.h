@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a film keeps beside the beauty: only what is asked for takes room. How the samples of an
-/// AOV are put together is said by its row (core/aov.h); what they are, by who adds them.
+/// Storage for the AOVs (arbitrary output variables) of a render. Only requested AOVs take memory.
+/// The AOV's row in core/aov.h says how samples are combined; the caller supplies their values.
 #pragma once
 
 #include <array>
@@ -17,68 +17,72 @@
 
 namespace wavecomb {
 
-/// Material, instance or object where nothing was hit.
+/// Material, instance or object id of a sample that hit nothing.
 inline constexpr uint32_t kNothingHit = 0xffffffffu;
 
-/// Ids are counted from 1 in pictures; 0 is nothing.
+/// Returns the value written to an id layer: the id plus 1, or 0 if nothing was hit.
 inline float id_value(uint32_t id) {
   return id == kNothingHit ? 0.f : static_cast<float>(id) + 1.f;
 }
 
-/// A layer of a picture: `channels` values a pixel, row 0 at the top.
+/// Image layer with `channels` interleaved values per pixel; row 0 is at the top.
 struct AovLayer {
   std::string name;
   uint32_t channels = 1;
   std::vector<float> values;
 };
 
-/// The sums behind the AOVs of a film, pixel by pixel.
+/// Per-pixel sums from which the AOV layers of a film are computed.
 ///
-/// Contract: as Film's: one thread a pixel at a time, a pixel's samples in sample order.
+/// Contract: at most one thread writes to a pixel at a time and adds its samples in sample order.
 class AovFilm {
  public:
   AovFilm() = default;
   AovFilm(size_t pixels, const AovLayout& layout);
 
+  /// Cryptomatte levels: object, material, asset.
   static constexpr uint32_t kCryptoLevels = 3;
-  /// Ids given for each pixel, of those that CryptoPixel holds: three layers of a file.
+  /// Ids written per pixel, of the CryptoPixel::kIds that are counted. Two fit in an RGBA layer, so
+  /// files have three layers per level.
   static constexpr uint32_t kCryptoRanks = 6;
 
   const AovLayout& layout() const { return layout_; }
 
-  // ---- one sample's values ----------------------------------------------------------------------
+  // ---- adding samples ---------------------------------------------------------------------------
 
-  /// Sums of an AOV that is a mean, a sum or a median, by channel; null where it is not kept. Those
-  /// of light groups stand side by side, and those of expressions.
+  /// Returns the sums of a mean, sum or median AOV at `pixel`, one per channel, or null if the AOV
+  /// is not stored. Light groups are consecutive RGB triples, and so are light path expressions.
   double* sums(Aov aov, size_t pixel) {
     std::vector<double>& all = sums_[place_of(aov)];
     return all.empty() ? nullptr : all.data() + pixel * words_of(row_of(aov));
   }
-  /// Adds the channels of an AOV that is kept.
+  /// Adds `values`, one per channel, to an AOV that is stored.
   void add(Aov aov, size_t pixel, const float* values) {
     double* to = sums(aov, pixel);
     for (uint32_t c = 0; c < row_of(aov).channels; ++c) to[c] += double{values[c]};
   }
-  /// Adds a number, infinite where there is none, to an AOV that is a median.
+  /// Adds a value to a median AOV that is stored; infinity means that the sample has no value.
   void add_to_median(Aov aov, size_t pixel, float value) {
     MedianSketch(sums(aov, pixel)).add(double{value});
   }
-  /// A sample has hit something: counts for means of hits.
+  /// Counts a sample that hit something, for AOVs that are means over hits.
   void count_hit(size_t pixel) { ++hits_[pixel]; }
-  /// Whether a sample at this squared distance from the pixel's centre, in pixels, is the nearest
-  /// so far, the first among equals. It is to be put then.
+  /// Returns whether a sample at squared distance `centre2` (pixels^2) from the pixel centre is
+  /// closer than all earlier samples, and records the distance. If so, the caller must put() its
+  /// values.
   bool is_nearest(size_t pixel, float centre2) {
     if (!(centre2 < centre2_[pixel])) return false;
     centre2_[pixel] = centre2;
     return true;
   }
-  /// The channels of an AOV of the nearest sample; nothing where it is not kept.
+  /// Replaces the channels of a kNearest AOV; does nothing if the AOV is not stored.
   void put(Aov aov, size_t pixel, const float* values) {
     std::vector<float>& all = nearest_[place_of(aov)];
     for (uint32_t c = 0; c < row_of(aov).channels && !all.empty(); ++c)
       all[pixel * row_of(aov).channels + c] = values[c];
   }
-  /// What a sample has met, as ObjectNames numbers it, or kNothingHit.
+  /// Adds a sample to the Cryptomatte levels. `object`: index of ObjectNames; either id may be
+  /// kNothingHit.
   void add_ids(size_t pixel, uint32_t object, uint32_t material, const CryptoTables& tables) {
     if (object != kNothingHit) {
       if (!crypto_[0].empty()) crypto_[0][pixel].add(tables.object_id[object]);
@@ -88,39 +92,40 @@ class AovFilm {
       crypto_[1][pixel].add(tables.material_id[material]);
   }
 
-  /// The sums of a deep picture; empty where none is kept.
+  /// Sums of the deep image; empty if the render has none.
   DeepFilm& deep() { return deep_; }
 
-  // ---- light that paths from the lights bring ---------------------------------------------------
+  // ---- light splats (contributions of light paths) ----------------------------------------------
 
-  /// Keeps it from now on, in units of `unit`, for the layers that hold any.
+  /// Allocates sums for light splats in units of `unit`, for the layers that include them.
   void keep_splats(FixedPoint unit) { splats_ = SplatSums(pixels_ * splat_places_.count, unit); }
-  /// Adds light to a pixel of layer `place` (SplatPlaces), in any order.
+  /// Adds a light splat to layer `place` (see SplatPlaces) of a pixel. The order does not matter.
   void add_splat(size_t pixel, uint32_t place, float r, float g, float b) {
     splats_.add(pixel * splat_places_.count + place, r, g, b);
   }
-  /// How sums of splats are made means of, from now on.
+  /// Sets the scale that turns sums of light splats into means.
   void scale_splats(const SplatScale& scale) { splat_scale_ = scale; }
 
   // ---- layers -----------------------------------------------------------------------------------
 
-  /// The layer of an AOV that has one alone; no values where it is not kept. `samples` is by pixel.
+  /// Returns the layer of an AOV that has exactly one; its values are empty if the AOV is not
+  /// stored. `samples`: sample count of each pixel.
   AovLayer layer(Aov aov, const std::vector<uint32_t>& samples) const;
-  /// The same by name, "light_NAME" and "lpe_NAME" among them; no name where it is not
-  /// kept. `many_names`: of the light groups that are kept, then of the expressions.
+  /// Returns a layer by name, which may be "light_NAME" or "lpe_NAME"; its name is empty if no such
+  /// layer is stored. `many_names`: names of the stored light groups, then of the expressions.
   AovLayer layer(const std::string& name, const std::vector<uint32_t>& samples,
                  const std::vector<std::string>& many_names) const;
-  /// The layer of an AOV, whose sums are freed.
+  /// Returns the layer of an AOV and frees its sums.
   AovLayer take(Aov aov, const std::vector<uint32_t>& samples);
-  /// All that are kept and were not taken, and the end of the film: sums are freed as soon as they
-  /// were used. Light groups are called "light_" and their name.
+  /// Returns all stored layers that were not taken. Each AOV's sums are freed as soon as its layer
+  /// is complete. Layers of light groups are named "light_NAME", those of expressions "lpe_NAME".
   std::vector<AovLayer> finish(const std::vector<uint32_t>& samples,
                                const std::vector<std::string>& many_names) &&;
   size_t bytes() const;
-  /// The deep picture, whose sums are freed; empty where none is kept.
+  /// Returns the deep image and frees its sums; empty if the render has none.
   DeepLayer take_deep(const std::vector<uint32_t>& samples);
-  /// Runs block(name, values) for each vector of sums, for checkpoints; those
-  /// of a deep picture have DeepFilm::packed().
+  /// Calls block(name, values) for each vector of sums, for checkpoints. The sums of the deep image
+  /// are not included; use DeepFilm::packed().
   template <typename Block>
   void for_each_block(const Block& block) {
     for (const AovRow& row : kAovs) {
@@ -136,21 +141,21 @@ class AovFilm {
 
  private:
   static uint32_t level_index(Aov level) { return place_of(level) - place_of(Aov::kCryptoObject); }
-  /// Sums of a pixel.
+  /// Number of values per pixel in the sums of an AOV.
   size_t words_of(const AovRow& row) const {
     if (row.kind == AovKind::kGroups) return 3 * layout_.light_groups;
     if (row.kind == AovKind::kMedian) return MedianSketch::kWords;
     return row.kind == AovKind::kExpressions ? 3 * layout_.expressions : row.channels;
   }
   AovLayer crypto_layer(Aov level, const std::vector<uint32_t>& samples) const;
-  /// Layer `which` of the light groups or the expressions.
+  /// Returns layer `which` of the light groups or of the expressions.
   AovLayer one_of_many(Aov aov, uint32_t which, std::string name,
                        const std::vector<uint32_t>& samples) const;
-  /// Runs layer(aov, which, name) for each of those.
+  /// Calls layer(aov, which, name) for each stored light group and expression.
   template <typename Layer>
   void for_each_of_many(const std::vector<std::string>& many_names, const Layer& layer) const;
 
-  /// What splats bring channel `c` of layer `place`, which may be kNowhere.
+  /// Returns the contribution of light splats to channel `c` of layer `place` (kNowhere gives 0).
   double splat_mean(size_t pixel, uint32_t place, size_t c) const {
     if (splats_.empty() || place == SplatPlaces::kNowhere) return 0;
     return splat_scale_.of(splats_.value(pixel * splat_places_.count + place, c));
@@ -159,18 +164,18 @@ class AovFilm {
   AovLayout layout_;
   SplatPlaces splat_places_;
   size_t pixels_ = 0;
-  // By the place of an AOV's row; empty where it is not kept.
+  // Indexed by place_of(aov); empty if the AOV is not stored.
   std::array<std::vector<double>, kAovCount> sums_;
   std::array<std::vector<float>, kAovCount> nearest_;
   std::array<std::vector<CryptoPixel>, kCryptoLevels> crypto_;
-  SplatSums splats_;  ///< places of a pixel side by side; empty where there are none
+  SplatSums splats_;  ///< index: pixel * splat_places_.count + place; empty without light splats
   SplatScale splat_scale_;
   DeepFilm deep_;
-  std::vector<uint32_t> hits_;  ///< samples that have hit something
-  std::vector<float> centre2_;  ///< squared distance of the nearest sample, pixels
+  std::vector<uint32_t> hits_;  ///< number of samples that hit something
+  std::vector<float> centre2_;  ///< squared distance of the nearest sample to the centre, pixels^2
 };
 
-/// Sorted ids in a Cryptomatte's layer.
+/// Returns the ids in a Cryptomatte layer, sorted and without duplicates.
 std::vector<uint32_t> crypto_ids(const AovLayer& pairs);
 
 }  // namespace wavecomb

@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Samples of a pixel by brightness, and how far those much brighter than others are to be trusted.
+/// Firefly reduction: a cascade of brightness layers per pixel, and weights for the bright ones.
 ///
 /// T. Zirr, J. Hanika, C. Dachsbacher, "Re-weighting firefly samples for improved finite-sample
-/// Monte Carlo estimates", Computer Graphics Forum 37(6), 2018. Layer i is for samples of about the
-/// brightness B_i = B_0 b^i; one of luminance y between B_i and B_{i+1} is split between the two,
-///   w = (B_i / y - 1 / b) / (1 - 1 / b) to layer i,   1 - w to layer i + 1,
-/// so that layers change gently with y. With S_i the sum of a layer over the pixel's n samples,
+/// Monte Carlo estimates", Computer Graphics Forum 37(6), 2018. Layer i holds samples with a
+/// luminance near B_i = B_0 b^i. A sample of luminance y between B_i and B_{i+1} is split with
+/// weights
+///   w = (B_i / y - 1 / b) / (1 - 1 / b) for layer i,   1 - w for layer i + 1,
+/// so that layers vary continuously with y. With S_i the sum of layer i over the pixel's n samples,
 ///   c_i = y(S_{i-1}) / B_{i-1} + y(S_i) / B_i + y(S_{i+1}) / B_{i+1}
-/// counts the samples that are about as bright, and C_i is the mean of that over the 3 x 3 pixels
-/// around. A layer is kept as far as it has enough of them, or as one sample of it changes little:
+/// estimates the number of samples of similar brightness. C_i is the mean of c_i over the 3 x 3
+/// neighbourhood of pixels. A layer is trusted if it has enough samples, or if one of its samples
+/// changes the result little:
 ///   r_i = max(((C_i < 1 ? C_i : c_i) - 1) / kappa,   n I_i / (tau B_i)),   clamped to [0, 1],
-/// I_i the mean brightness of what is below layer i in the 3 x 3 pixels. What is taken away,
+/// where I_i is the mean brightness of all layers below i in the 3 x 3 neighbourhood. The removed
+/// energy,
 ///   sum_i (1 - r_i) S_i / n,
-/// goes to 0 as n grows. The first layer is always kept.
+/// tends to 0 as n grows. Layer 0 is always kept in full.
 #pragma once
 
 #include <array>
@@ -24,7 +27,9 @@
 
 namespace wavecomb {
 
-/// Contract: as Film's: a pixel is written by one thread at a time, its samples in sample order.
+/// Brightness cascades of all pixels of a window.
+///
+/// Contract: at most one thread writes to a pixel at a time and adds its samples in sample order.
 class Cascades {
  public:
   static constexpr uint32_t kLayers = 8;
@@ -33,17 +38,17 @@ class Cascades {
   static constexpr float kTolerance = 8;  ///< tau
 
   Cascades() = default;
-  /// Of the pixels of `window`. `darkest`: B_0.
+  /// Creates empty cascades for the pixels of `window`. `darkest`: B_0, a luminance.
   Cascades(const Region& window, float darkest);
 
   bool empty() const { return sums_.empty(); }
   /// Adds a sample of pixel `pixel` (Film::index).
   void add(size_t pixel, const float* rgb);
-  /// What reweighting takes from the pixels' means, rgb interleaved; empty where nothing is kept.
-  /// `samples`: by pixel.
+  /// Returns what firefly reduction subtracts from the pixel means, interleaved rgb; empty if no
+  /// cascades are stored. `samples`: sample count of each pixel.
   std::vector<float> excess(const std::vector<uint32_t>& samples) const;
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Runs block(name, values) for the sums, for checkpoints.
+  /// Calls block(name, values) for the sums, for checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     block("cascades", sums_);
@@ -52,9 +57,11 @@ class Cascades {
  private:
   using Layer = std::array<float, 3>;
   using Sum = std::array<Layer, kLayers>;
-  /// Luminances of a pixel's layers, or sums of several pixels'.
+  /// Luminance of each layer, of one pixel or summed over several.
   using Levels = std::array<float, kLayers>;
 
+  /// Returns r_i of `layer` from the layers of the pixel (`own`) and the sums over its
+  /// neighbourhood (`around`, of `pixels` pixels with `samples_around` samples).
   float share_kept(const Levels& own, const Levels& around, float pixels, float samples,
                    float samples_around, uint32_t layer) const;
 

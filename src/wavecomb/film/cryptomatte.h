@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cryptomatte: ids of names, and bounded lists of ids and coverage (J. Friedman and A. Jones,
-/// "Fully Automatic ID Mattes with Support for Motion Blur and Transparency", SIGGRAPH 2015
-/// poster; specification 1.2.0).
+/// Cryptomatte: hashed ids of names, and bounded per-pixel lists of ids and coverage (J. Friedman
+/// and A. Jones, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency",
+/// SIGGRAPH 2015 poster; specification 1.2.0).
 #pragma once
 
 #include <array>
@@ -17,25 +17,25 @@ namespace wavecomb {
 
 class Scene;
 
-/// MurmurHash3_x86_32 (A. Appleby, public domain).
+/// Returns the MurmurHash3_x86_32 hash of `text` (A. Appleby, public domain).
 uint32_t murmur3_32(std::string_view text, uint32_t seed);
 
-/// The id of a name: its hash with seed 0, where bits that would make a float that is zero,
-/// denormal, infinite or NaN have the lowest bit of their exponent flipped (specification, "ID
+/// Returns the Cryptomatte id of a name: its hash with seed 0. If the hash read as a float would be
+/// zero, denormal, infinite or NaN, the lowest exponent bit is flipped (specification, "ID
 /// Generation").
 uint32_t crypto_id(std::string_view name);
 
-/// The ids in one pixel and how many samples each got, in bounded room.
+/// Ids seen in one pixel with their sample counts, in bounded memory.
 ///
-/// While there are at most kIds ids, all counts are exact. A further one takes the place of the
-/// id with the fewest samples, and its count with it (A. Metwally, D. Agrawal, A. El Abbadi,
-/// "Efficient Computation of Frequent and Top-k Elements in Data Streams", 2005): counts always add
-/// up to the samples that hit something, no count is too small, and every id with more than
-/// 1 / kIds of the samples is there.
+/// Counts are exact while there are at most kIds ids. A further id replaces the one with the fewest
+/// samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient Computation of
+/// Frequent and Top-k Elements in Data Streams", 2005). Hence counts always add up to the number of
+/// samples that hit something, no count is too small, and every id with more than 1 / kIds of the
+/// samples is present.
 struct CryptoPixel {
   static constexpr uint32_t kIds = 8;
   uint32_t id[kIds] = {};
-  uint32_t count[kIds] = {};  ///< 0: free; free places come last
+  uint32_t count[kIds] = {};  ///< 0 marks a free entry; free entries come last
 
   void add(uint32_t new_id) {
     uint32_t least = 0;
@@ -56,20 +56,20 @@ struct CryptoPixel {
   }
 };
 
-/// What kernels' indices mean to Cryptomatte. Made once a render, and only where asked for.
+/// Cryptomatte ids of the indices that kernels use. Built once per render and only if requested.
 struct CryptoTables {
-  std::vector<uint32_t> first_object;  ///< of each instance: object = first_object[inst] + geom
-  uint32_t first_light = 0;            ///< object of light record 0
-  uint32_t first_volume = 0;           ///< object of volume 0
-  std::vector<uint32_t> object_id, asset_id;  ///< by object
-  std::vector<uint32_t> material_id;
+  std::vector<uint32_t> first_object;  ///< by instance: object = first_object[instance] + geometry
+  uint32_t first_light = 0;            ///< object index of light record 0
+  uint32_t first_volume = 0;           ///< object index of volume 0
+  std::vector<uint32_t> object_id, asset_id;  ///< by object index
+  std::vector<uint32_t> material_id;          ///< by material index
 
   CryptoTables() = default;
   CryptoTables(const Scene& scene, AovSet aovs);
 };
 
-/// (name, id) of all of `level` whose ids are in `ids`, which is sorted; by name. Several names of
-/// one id are all given.
+/// Returns (name, id) pairs, sorted by name, for the names of `level` whose ids are in `ids`. `ids`
+/// must be sorted. Names whose hashes collide are all included.
 std::vector<std::pair<std::string, uint32_t>> crypto_manifest(const Scene& scene, Aov level,
                                                               const std::vector<uint32_t>& ids);
 

@@ -15,12 +15,12 @@ namespace {
 
 static_assert(kMostDeepSamples <= 255, "counted in a byte");
 
-/// The share of its depth that a range takes up.
+/// Returns the length of a depth range relative to its far end.
 float spread(float front, float back) {
   return back > 0 ? (back - front) / back : 0.f;
 }
 
-/// `into` gets all of `from`.
+/// Adds `from` to `into`.
 void merge(DeepBin& into, const DeepBin& from) {
   into.r += from.r;
   into.g += from.g;
@@ -39,7 +39,7 @@ DeepFilm::DeepFilm(size_t pixels, const DeepLimits& limits)
 void DeepFilm::add(size_t pixel, float z, bool in_volume, const float* rgb) {
   const DeepBin sample{rgb[0], rgb[1], rgb[2], z, z, 1, in_volume ? 1u : 0u};
   const uint32_t n = used_[pixel];
-  uint32_t at = 0;  // the first bin that does not end before z
+  uint32_t at = 0;  // the first bin whose far end is not before z
   while (at < n && bin(pixel, at).back < z) ++at;
   const auto spread_with = [&](uint32_t i) {
     if (i >= n) return std::numeric_limits<float>::infinity();
@@ -80,7 +80,7 @@ DeepLayer DeepFilm::layer(const std::vector<uint32_t>& samples) const {
   out.counts.assign(used_.begin(), used_.end());
   out.values.reserve(all * DeepLayer::kChannels);
   for (size_t pixel = 0; pixel < used_.size(); ++pixel) {
-    uint32_t left = samples[pixel];  // N r_i, exactly
+    uint32_t left = samples[pixel];  // N r_i, an exact integer
     for (uint32_t i = 0; i < used_[pixel]; ++i) {
       const DeepBin& b = bin(pixel, i);
       const double scale = inverse_count(left);
@@ -110,8 +110,7 @@ std::vector<std::byte> DeepFilm::packed() const {
 
 void DeepFilm::unpack(std::span<const std::byte> bytes) {
   const auto check = [](bool is_good) {
-    if (!is_good)
-      throw Error("the state to resume from has deep samples of another picture; start anew");
+    if (!is_good) throw Error("the checkpoint has deep samples of a different image; start anew");
   };
   check(bytes.size() >= used_.size());
   std::vector<uint8_t> used(used_.size());

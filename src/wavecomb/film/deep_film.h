@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A deep picture while it grows: the samples of each pixel by depth (docs/deep.md).
+/// Deep image under construction: the samples of each pixel binned by depth (docs/deep.md).
 ///
-/// A camera ray that meets something, or is stopped by a volume, is a sample of its pixel: a depth,
-/// and the light that the path brought. Samples whose depths are close are one bin. Bins of a pixel
-/// are ranges of depth that do not overlap, in order; a bin holds n of the pixel's N samples and
-/// the sum C of their light. With the share s = n / N, and r what the bins before it leave free,
-///   r_0 = 1,  r_{i+1} = r_i - s_i,   alpha_i = s_i / r_i,   color_i = C_i / (N r_i)
-/// so that one over the other, sum_i color_i prod_{j<i} (1 - alpha_j), they are sum_i C_i / N: the
-/// light of all that covers the pixel, and their alpha is its share.
+/// A camera ray that hits a surface or scatters in a volume gives its pixel one sample: a depth and
+/// the radiance of its path. Samples of similar depth share a bin. The bins of a pixel are disjoint
+/// depth ranges in ascending order; a bin stores the number n of its samples, of the pixel's N, and
+/// the sum C of their radiance. With the coverage s = n / N, and r the coverage that the bins in
+/// front leave free,
+///   r_0 = 1,  r_{i+1} = r_i - s_i,   alpha_i = s_i / r_i,   color_i = C_i / (N r_i).
+/// Compositing the bins with "over", sum_i color_i prod_{j<i} (1 - alpha_j), then gives sum_i C_i /
+/// N, the flat colour of everything that covers the pixel; the composited alpha is the covered
+/// fraction.
 ///
-/// Memory is bounded: a pixel has at most `most` bins. Where a sample would need one more, the two
-/// neighbours become one that together take up the least of their depth.
+/// Memory is bounded by `most` bins per pixel. If a sample would exceed that, the two neighbouring
+/// bins with the smallest joint extent relative to their depth are merged.
 #pragma once
 
 #include <cstddef>
@@ -25,16 +27,16 @@
 
 namespace wavecomb {
 
-/// What of a pixel lies between two depths.
+/// Samples of a pixel within one depth range.
 struct DeepBin {
-  double r = 0, g = 0, b = 0;  ///< sums of light
+  double r = 0, g = 0, b = 0;  ///< sum of radiance
   float front = 0, back = 0;   ///< least and greatest depth
-  uint32_t count = 0;          ///< samples
-  uint32_t in_volume = 0;      ///< of these, stopped by a volume
+  uint32_t count = 0;          ///< number of samples
+  uint32_t in_volume = 0;      ///< number of samples that scattered in a volume
 };
 
-/// Memory that the system has zeroed, which takes none before it is written to: of types that are
-/// zero in all their bytes when they are made.
+/// Allocator of zeroed memory that uses calloc, so that untouched pages take no physical memory.
+/// For types whose default value is all zero bytes.
 template <typename T>
 struct ZeroedMemory {
   using value_type = T;
@@ -54,36 +56,37 @@ struct ZeroedMemory {
   bool operator==(const ZeroedMemory&) const = default;
 };
 
-/// Deep samples of a picture, row by row of its window.
+/// Deep samples of an image, row by row of its window.
 struct DeepLayer {
-  /// Of one sample: R, G, B, A, Z, ZBack. Colours are premultiplied.
+  /// Channels of a sample: R, G, B, A, Z, ZBack. Colours are premultiplied.
   static constexpr size_t kChannels = 6;
-  std::vector<uint32_t> counts;  ///< samples of each pixel
-  std::vector<float> values;     ///< kChannels of each sample, the nearest first
+  std::vector<uint32_t> counts;  ///< number of samples of each pixel
+  std::vector<float> values;     ///< kChannels values per sample; nearest samples first
   bool empty() const { return counts.empty(); }
 };
 
-/// The sums behind a deep picture.
+/// Depth bins of all pixels of a deep image.
 ///
-/// Contract: as Film's: one thread a pixel at a time, a pixel's samples in sample order. Adding
-/// allocates nothing.
+/// Contract: at most one thread writes to a pixel at a time and adds its samples in sample order.
+/// Adding allocates nothing.
 class DeepFilm {
  public:
   DeepFilm() = default;
-  /// Throws std::bad_alloc.
+  /// Throws std::bad_alloc if memory for `limits.most` bins per pixel is not available.
   DeepFilm(size_t pixels, const DeepLimits& limits);
 
   bool empty() const { return used_.empty(); }
-  /// Adds a sample of depth z >= 0 to a pixel.
+  /// Adds a sample of depth z >= 0. `rgb`: radiance of the path. `in_volume`: the camera ray
+  /// scattered in a volume.
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
-  /// The samples of all pixels; `samples` are those that each pixel got.
+  /// Returns the deep samples of all pixels. `samples`: sample count of each pixel.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
-  /// All that it holds, for checkpoints: how many bins each pixel has, a byte each, then the bins
-  /// that are used, pixel by pixel.
+  /// Returns the state for checkpoints: one byte per pixel with its number of bins, then the bins
+  /// in use, pixel by pixel.
   std::vector<std::byte> packed() const;
-  /// Makes an empty film that of packed() bytes. Throws Error where they are of another picture.
+  /// Restores the state from packed() bytes. Throws Error if they do not fit this image.
   void unpack(std::span<const std::byte> bytes);
-  /// The most that it can take.
+  /// Upper bound of the memory use in bytes.
   size_t bytes() const { return used_.size() * (1 + limits_.most * sizeof(DeepBin)); }
 
  private:
@@ -92,8 +95,8 @@ class DeepFilm {
   void insert(size_t pixel, uint32_t at, const DeepBin& added);
 
   DeepLimits limits_;
-  std::vector<uint8_t> used_;  ///< bins of each pixel
-  /// Bin 0 of all pixels, then bin 1 ...: those that few pixels reach take little memory.
+  std::vector<uint8_t> used_;  ///< number of bins in use, by pixel
+  /// Bin 0 of all pixels, then bin 1 and so on. Higher bins that few pixels reach stay unmapped.
   std::vector<DeepBin, ZeroedMemory<DeepBin>> bins_;
 };
 

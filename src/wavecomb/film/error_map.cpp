@@ -9,8 +9,9 @@
 namespace wavecomb {
 namespace {
 
-/// Sums over rgb: of the pixel's mean, and of its difference from the half's mean; and of the
-/// squares of the two that this is of, of the pixel's own samples and of splats.
+/// Error terms of one pixel, summed over rgb: `light` is the pixel mean, `difference` the absolute
+/// difference between the full mean and the half mean. `own2` and `splat2` are squared differences
+/// of the pixel's own samples and of light splats. `known` is false without two full halves.
 struct PixelError {
   double light = 0, difference = 0, own2 = 0, splat2 = 0;
   bool known = false;
@@ -20,9 +21,9 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   const Film::Pixel& p = film.pixel(pixel);
   const ErrorSums& e = film.error(pixel);
   const uint32_t n = p.samples, in_half = ErrorSums::half_count(n);
-  if (n < 2 * ErrorSums::kHalfBlock) return {};  // there is no other half, or not all of it
+  if (n < 2 * ErrorSums::kHalfBlock) return {};  // the second half has no full block yet
   const double sums[3] = {p.r, p.g, p.b};
-  // Var(I - A) = var (1 / half - 1 / n), and var / n is asked for: the same where half = n / 2.
+  // Var(I - A) = var (1 / half - 1 / n). The scale makes it var / n, the variance of the mean.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
   PixelError out;
   std::array<double, 3> splats{}, splat_difference{};
@@ -42,7 +43,8 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   return out;
 }
 
-/// Sums over the window along rows of `length` values that are `step` apart.
+/// Replaces each value by the sum over a window of 2 kErrorWindow + 1 values around it, along lines
+/// of `length` values that are `step` apart.
 void sum_along(std::vector<float>& values, size_t lines, size_t line_step, size_t length,
                size_t step) {
   std::vector<float> line(length);

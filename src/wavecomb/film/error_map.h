@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How noisy a picture is, by the half buffers of its film.
+/// Estimates of image noise from the half buffers of a film.
 #pragma once
 
 #include <cstdint>
@@ -10,35 +10,36 @@
 
 namespace wavecomb {
 
-/// Pixels to each side of the square that an error is the mean of: a single pixel's two halves may
-/// agree by chance, 25 pixels' do not.
+/// Radius in pixels of the square window over which errors are averaged. The two halves of a single
+/// pixel may agree by chance; those of 25 pixels hardly do.
 inline constexpr uint32_t kErrorWindow = 2;
 
-/// Errors of a picture.
+/// Error estimates of an image.
 struct ErrorMap {
-  /// By pixel, mean over the window of
+  /// Error of each pixel: the mean over the window of
   ///   e = sum over rgb |I - A| / sqrt(sum over rgb I)
-  /// with I the mean of all samples and A that of one half (Dammertz, Hanika and Keller, "A
-  /// Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination", WSCG 2010,
-  /// equation 1). Where light comes of splats, too, I and A are sums of both, each with halves of
-  /// its own. For independent samples |I - A| has the distribution of |I - truth|. Infinite
-  /// where no pixel of the window has an error yet; pixels that are not finite count as 0.
+  /// with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
+  /// Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
+  /// WSCG 2010, equation 1). With light splats, I and A each include the splats, which have halves
+  /// of their own. For independent samples |I - A| is distributed like |I - truth|. Infinite if no
+  /// pixel of the window has an error estimate yet; pixels that are not finite count as 0.
   std::vector<float> error;
-  /// Sum |I - A| / sum I over picture and channels; infinite where no pixel has an error yet.
+  /// sum |I - A| / sum I over all pixels and channels; infinite if no pixel has an estimate yet.
   double mean_relative = 0;
-  /// sum I / sum sqrt(sum over rgb I): the e that all pixels have in a picture of mean relative
-  /// error 1 whose noise is spread evenly.
+  /// sum I / sum sqrt(sum over rgb I): the value of e in every pixel of an image whose mean
+  /// relative error is 1 and whose noise is evenly distributed.
   double even_error = 0;
 };
 
-/// Measures the film, which has error sums.
+/// Returns the error map of a film that has error sums.
 ErrorMap measure_error(const Film& film);
 
-/// What of the squared errors, over the light, comes of pixels' own samples and what of splats.
+/// Noise of an image by origin: sums over pixels of squared error / light, for the pixels' own
+/// samples and for light splats.
 struct NoiseParts {
   double own = 0, splats = 0;
 };
-/// Of the pixels in `active`; of all, where it is empty.
+/// Returns the noise of the pixels whose `active` flag is set, or of all if `active` is empty.
 NoiseParts measure_noise_parts(const Film& film, std::span<const uint8_t> active);
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a pixel keeps so that its error can be told from its own samples.
+/// Per-pixel statistics for error estimation.
 #pragma once
 
 #include <cstddef>
@@ -7,26 +7,27 @@
 
 namespace wavecomb {
 
-/// Two halves of a pixel's samples, and their running variance.
+/// Sum of one half of a pixel's samples, and the running variance of all.
 ///
-/// The halves are two estimates of one thing, each as well spread as a half can be: blocks of
-/// kHalfBlock samples in turn, since a block of Sobol's sequence is a net and its neighbour fills
-/// the gaps. The variance is Welford's (Technometrics 4(3), 1962, p. 419); it takes samples to be
-/// independent, which those of Sobol's sequence are not, so it is shown and decides nothing.
+/// The two halves are separate estimates of the same value. They alternate in blocks of kHalfBlock
+/// samples, since such a block of the Sobol sequence is a (t,m,s)-net and the next block fills its
+/// gaps, so that both halves stay well distributed. The variance is Welford's (Technometrics 4(3),
+/// 1962, p. 419). It treats samples as independent, which Sobol samples are not, so it is only an
+/// output and never controls sampling.
 struct ErrorSums {
-  /// A power of two; twice this many samples are the fewest that have an error.
+  /// Block length, a power of two. Pixels need twice as many samples for an error estimate.
   static constexpr uint32_t kHalfBlock = 8;
 
-  double half[3] = {0, 0, 0};  ///< sums of the samples of even blocks
-  double m2[3] = {0, 0, 0};    ///< sums of squared differences from the running mean
+  double half[3] = {0, 0, 0};  ///< sum of the samples in even blocks
+  double m2[3] = {0, 0, 0};    ///< sum of squared differences from the running mean
 
-  /// Of a pixel's first n samples, how many are in `half`.
+  /// Returns how many of a pixel's first n samples belong to `half`.
   static constexpr uint32_t half_count(uint32_t n) {
     const uint32_t rest = n % (2 * kHalfBlock);
     return n / (2 * kHalfBlock) * kHalfBlock + (rest < kHalfBlock ? rest : kHalfBlock);
   }
 
-  /// Adds sample number `index`; `sum` is that of the samples before it.
+  /// Adds sample number `index`; `sum` is the sum of all earlier samples.
   void add(const float* rgb, uint32_t index, const double (&sum)[3]) {
     const double before = index == 0 ? 0.0 : 1.0 / index, after = 1.0 / (index + 1.0);
     const bool in_half = index / kHalfBlock % 2 == 0;

@@ -7,7 +7,7 @@
 namespace wavecomb {
 namespace {
 
-/// Filter value at x in [-1, 1], the filter's half width being 1.
+/// Returns the filter value at x in [-1, 1], for a filter with half width 1.
 double filter_value(FilterKind kind, double x) {
   constexpr double kPi = 3.14159265358979323846;
   switch (kind) {
@@ -44,7 +44,7 @@ FilterTable::FilterTable(FilterKind kind, float width)
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
-  // What interpolation makes of the offsets: in the tails another than the filter's own.
+  // Tabulate the density of the interpolated offsets, which differs from the filter in its tails.
   uint32_t from = 0;
   const auto share_below = [&](double x) {
     while (from + 1 < kBins && double{offsets_[from + 1]} <= x) ++from;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The median of many numbers in a few words.
+/// Streaming estimate of a median in constant memory.
 #pragma once
 
 #include <algorithm>
@@ -9,12 +9,13 @@
 
 namespace wavecomb {
 
-/// About the median of numbers that come one after the other, by five markers (P^2: Jain and
-/// Chlamtac, "The P2 Algorithm for Dynamic Calculation of Quantiles and Histograms Without Storing
-/// Observations", 1985). Numbers are positive, or infinite: markers are kept of d / (d + s), which
-/// is at most 1, with s the first finite number. The state is kWords numbers, all 0 at first.
+/// Estimate of the median of a stream of values with five markers (P^2: Jain and Chlamtac, "The P2
+/// Algorithm for Dynamic Calculation of Quantiles and Histograms Without Storing Observations",
+/// 1985). Values d are positive or infinite. The markers track d / (d + s), which is at most 1,
+/// where s is the first finite value. The state is kWords doubles, all 0 initially, owned by the
+/// caller.
 ///
-/// Contract: the same for the same numbers in the same order.
+/// Contract: the result depends only on the values and their order.
 class MedianSketch {
  public:
   static constexpr uint32_t kWords = 11;
@@ -49,12 +50,12 @@ class MedianSketch {
   enum Word : uint32_t { kScale, kCount, kInfinite, kHeights, kPlaces = kHeights + 5 };
   static constexpr uint32_t kMarkers = 5;
 
-  /// How many numbers are below marker `i`.
+  /// Returns the number of values below marker `i`.
   double place(uint32_t i) const {
     if (i == 0) return 0;
     return i + 1 == kMarkers ? s_[kCount] - 1 : s_[kPlaces + i - 1];
   }
-  /// Moves marker `i` by one where it is that far from where it should be.
+  /// Moves marker `i` by one position if it is at least one away from its ideal position.
   void adjust(uint32_t i) {
     double* const q = s_ + kHeights;
     const double at = place(i), before = place(i - 1), after = place(i + 1);
@@ -76,7 +77,8 @@ class MedianSketch {
   double* s_;
 };
 
-/// The median of what such a state was told; infinite where more than half of it was, or nothing.
+/// Returns the median estimate of a MedianSketch state. Infinite if more than half of the values
+/// were infinite, or without values.
 inline double median_of(const double* state) {
   using S = MedianSketch;
   const double infinity = std::numeric_limits<double>::infinity();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How light that arrives at a point of the film counts for the pixels around it.
+/// Pixel filter for light splats.
 #pragma once
 
 #include <algorithm>
@@ -11,23 +11,24 @@
 
 namespace wavecomb {
 
-/// Where a picture of all directions shows a point again: once more after each turn, and beyond a
-/// pole upside down, half a turn on. In pixels; no turn: it is no such picture.
+/// Wrap-around of a panoramic image: points repeat after a full turn in x, and beyond a pole they
+/// appear upside down and half a turn away. `pixels` of 0 means that the image does not wrap.
 struct PictureTurn {
-  float pixels = 0;            ///< of a turn
-  float north = 0, south = 0;  ///< y of the poles
+  float pixels = 0;            ///< width of a full turn in pixels
+  float north = 0, south = 0;  ///< y coordinates of the poles in pixels
 };
 
-/// Light that arrives at (x, y), in pixels from the picture's upper left corner, counts for each
-/// pixel by the filter's density at the way from its centre: as often as samples of that pixel,
-/// which all count alike, would lie there.
+/// Distributes a light splat over pixels. A splat at (x, y), in pixels from the upper left corner
+/// of the image, contributes to each pixel with the filter density at its offset from the pixel
+/// centre. This matches the density with which the pixel's own samples, all of weight 1, would lie
+/// there.
 class SplatFilter {
  public:
-  /// `rendered`: pixels that get any.
+  /// `rendered`: pixels that receive light splats.
   SplatFilter(const FilterTable& filter, const Region& rendered, const PictureTurn& turn = {})
       : filter_(filter), rendered_(rendered), turn_(turn) {}
 
-  /// Whether any pixel gets light of (x, y).
+  /// Returns whether a splat at (x, y) contributes to any pixel.
   template <typename F>
   Mask<F> reaches(const F& x, const F& y) const {
     if (turn_.pixels == 0) [[likely]]
@@ -38,7 +39,7 @@ class SplatFilter {
             comes_round<F>(half));
   }
 
-  /// Runs add(pixel, weight) for each pixel (Film::index) that light at (x, y) counts for.
+  /// Calls add(pixel, weight) for each pixel (Film::index) to which a splat at (x, y) contributes.
   template <typename Add>
   void spread(const Film& film, float x, float y, const Add& add) const {
     if (turn_.pixels == 0) [[likely]] {
@@ -52,7 +53,7 @@ class SplatFilter {
   }
 
  private:
-  // Whose filter reaches a pixel.
+  // Bounds of the splat positions whose filter footprint reaches a rendered pixel.
   float left() const { return low(rendered_.x0); }
   float right() const { return high(rendered_.x1); }
   float low(uint32_t edge) const { return static_cast<float>(edge) + 0.5f - filter_.radius(); }
@@ -61,11 +62,12 @@ class SplatFilter {
   Mask<F> holds_row(const F& y) const {
     return (y >= low(rendered_.y0)) & (y < high(rendered_.y1));
   }
-  /// x less whole turns, so that it is less than one right of left().
+  /// Shifts x by whole turns to within one turn to the right of left().
   template <typename F>
   F after_left(const F& x) const {
     return x - floor(F(F(x - left()) * (1.f / turn_.pixels))) * turn_.pixels;
   }
+  /// Whether a position reaches a rendered column after whole turns.
   template <typename F>
   Mask<F> comes_round(const F& x) const {
     return after_left<F>(x) < right();

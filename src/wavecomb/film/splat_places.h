@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Which layers hold light that paths from the lights bring, and where a pixel keeps it.
+/// Layout of the light splats of AOV layers within a pixel.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,15 @@
 
 namespace wavecomb {
 
-/// Numbers of the layers of a layout that are beside each other in a pixel's sums: such light is
-/// scattered once, which is direct, or more often, and of a light group. None is emission.
+/// Position of each layer among the splat sums of a pixel. A light path that reaches the camera has
+/// scattered at least once: once is direct light, more often is indirect light. It is never
+/// emission.
 struct SplatPlaces {
-  static constexpr uint32_t kNowhere = 0xffffffffu;  ///< that layer is not kept
+  static constexpr uint32_t kNowhere = 0xffffffffu;  ///< the layer is not stored
 
   uint32_t direct = kNowhere, indirect = kNowhere;
   uint32_t first_group = kNowhere, first_expression = kNowhere;
-  uint32_t count = 0;  ///< of them all
+  uint32_t count = 0;  ///< number of splat sums per pixel
 
   SplatPlaces() = default;
   explicit SplatPlaces(const AovLayout& layout) {
@@ -30,7 +31,7 @@ struct SplatPlaces {
     first_expression = take(layout.set.has(Aov::kExpressions), layout.expressions);
   }
 
-  /// Of an AOV that has one layer, or layer `which` of its several.
+  /// Returns the position of an AOV with one layer, or of layer `which` of an AOV with several.
   uint32_t of(Aov aov, uint32_t which = 0) const {
     const uint32_t first = aov == Aov::kDirect        ? direct
                            : aov == Aov::kIndirect    ? indirect

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light that reaches pixels other than a path's own, as that of paths from the lights does.
+/// Light splats: contributions of light paths, which may land on any pixel.
 ///
-/// Sums are integers, so they are the same in any order: any wave adds to any pixel, at any time.
-/// A wave collects its splats in a SplatList of its own; between stages its worker adds them to the
-/// film's SplatLayer.
+/// Sums are integers, so that the result does not depend on order and any wave may add to any pixel
+/// at any time. Each wave collects its splats in its own SplatList; between wave stages, its worker
+/// adds them to the film's SplatLayer.
 #pragma once
 
 #include <algorithm>
@@ -18,19 +18,21 @@
 
 namespace wavecomb {
 
-/// Contract: owned by one worker; allocates only when it is made.
+/// Bounded buffer of light splats.
+///
+/// Contract: owned by one worker; allocates only on construction.
 class SplatList {
  public:
   struct Splat {
     uint32_t pixel;  ///< Film::index
     float r, g, b;
-    bool in_half = false;  ///< SplatLayer::is_in_half of the path's sample
+    bool in_half = false;  ///< SplatLayer::is_in_half of the light path's sample
   };
 
   SplatList() = default;
   explicit SplatList(size_t capacity) { splats_.reserve(capacity); }
 
-  /// Adds light to a pixel; false where the list is full, and the splat is not in it.
+  /// Adds a light splat. Returns false if the list is full; the splat is then not stored.
   [[nodiscard]] bool add(const Splat& splat) {
     if (splats_.size() == splats_.capacity()) return false;
     splats_.push_back(splat);
@@ -44,17 +46,18 @@ class SplatList {
   std::vector<Splat> splats_;
 };
 
-/// Sums of splats by place.
+/// Fixed-point sums of light splats. A `place` is an index into the sums.
 ///
-/// Sizes of splats differ more than the bits of a sum allow for: those of `kLeastCoarse` units and
-/// more go to a second sum in units 2^kCoarseExponent as large, whichever path they came of.
+/// The range of splat values exceeds the bits of one sum. Values of `kLeastCoarse` units and more
+/// go to a second sum whose unit is 2^kCoarseExponent times as large.
 ///
-/// Contract: add() may be called by all workers at once; the others while none adds.
+/// Contract: add() may be called concurrently; all other members only while no thread adds.
 class SplatSums {
  public:
-  /// Red, green and blue in units; then the same of large splats.
+  /// Red, green and blue in fine units, then red, green and blue in coarse units.
   using Sum = std::array<int64_t, 6>;
-  /// A coarse unit in fine ones, and the least splat that is counted in them, in fine units.
+  /// Ratio of coarse to fine unit as a power of two, and the least value, in fine units, that is
+  /// added to the coarse sum.
   static constexpr int kCoarseExponent = 20;
   static constexpr double kLeastCoarse = 0x1p40;
 
@@ -64,7 +67,7 @@ class SplatSums {
 
   bool empty() const { return sums_.empty(); }
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
-  /// Adds with atomic additions.
+  /// Adds a value to a sum atomically.
   void add(size_t place, float r, float g, float b) {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     Sum& sum = sums_[place];
@@ -77,6 +80,7 @@ class SplatSums {
         plus(sum[c + 3], coarse.from(rgb[c]));
     }
   }
+  /// Returns the sum in the units of the added values.
   double value(size_t place, size_t channel) const {
     const FixedPoint coarse{unit_.exponent + kCoarseExponent};
     const Sum& sum = sums_[place];
@@ -95,8 +99,8 @@ class SplatSums {
   std::vector<Sum> sums_;
 };
 
-/// What makes of sums of splats what all paths bring: the mean over the `paths` that were traced,
-/// times the `numbers` of paths that a sample has.
+/// Scale that turns sums of light splats into pixel values: `numbers` light paths per pixel sample
+/// over `paths` light paths traced.
 struct SplatScale {
   double numbers = 1, paths = 0;
 
@@ -106,17 +110,17 @@ struct SplatScale {
   }
 };
 
-/// Splats by pixel, of numbered paths.
+/// Light splats of the beauty, by pixel, and counts of the light paths traced.
 ///
-/// Contract: add() and done() may be called by all workers at once, done() for its own paths; the
-/// others while none adds.
+/// Contract: add() and done() may be called concurrently, done() by one thread per light path
+/// index; all other members only while no thread adds.
 class SplatLayer {
  public:
   using Sum = SplatSums::Sum;
 
   SplatLayer() = default;
-  /// `paths`: how many numbers of paths there are, each of which stands for `scale` paths a sample.
-  /// `with_error`: keeps a half of the samples by itself.
+  /// `paths`: number of light path indices, each of which stands for `scale` light paths per
+  /// sample. `with_error`: also sums one half of the samples separately.
   SplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1,
              bool with_error = false)
       : sums_(pixels, unit),
@@ -133,28 +137,28 @@ class SplatLayer {
       if (s.in_half && has_error()) half_.add(s.pixel, s.r, s.g, s.b);
     }
   }
-  /// Adds `list`, which came of `paths` paths.
+  /// Adds `list`, which came from `paths` light paths.
   void add(const SplatList& list, uint32_t paths) {
     add(list);
     SplatSums::plus(paths_[0], paths);
   }
-  /// Whether a path's sample is of the half: samples are sequences of their own, so every other
-  /// one is.
+  /// Returns whether a light path's sample belongs to the half. Every second sample does, since
+  /// each sample of all light paths uses its own sequence (integrate/light_path.h).
   static bool is_in_half(uint32_t sample) { return sample % 2 == 0; }
-  /// The path of number `path` was traced for samples [first, first + count) too.
+  /// Records that light path index `path` was traced for samples [first, first + count).
   void done(size_t path, uint32_t first, uint32_t count) {
     samples_[path] += count;
     SplatSums::plus(paths_[0], count);
     if (has_error()) SplatSums::plus(paths_[1], (first + count + 1) / 2 - (first + 1) / 2);
   }
-  /// By path, how many samples of it there are.
+  /// Number of samples traced, by light path index.
   const std::vector<uint32_t>& samples() const { return samples_; }
-  /// Makes means of sums of these paths' splats.
+  /// Scale that turns the current sums into means.
   SplatScale scale() const { return scale_of(paths_[0]); }
-  /// What all paths bring a pixel.
+  /// Returns the mean contribution of light paths to a pixel, rgb.
   std::array<double, 3> mean(size_t pixel) const { return scale().of(sums_, pixel); }
-  /// The same less what the half alone says of it, as large as the error of the mean is: the two
-  /// halves are independent. Zero where there is no other half.
+  /// Returns the mean minus the estimate of the half alone, scaled to the standard error of the
+  /// mean (the halves are independent). Zero if either half has no light paths.
   std::array<double, 3> difference(size_t pixel) const {
     if (!has_error() || paths_[1] == 0 || paths_[1] == paths_[0]) return {};
     std::array<double, 3> out = mean(pixel);
@@ -168,7 +172,7 @@ class SplatLayer {
   size_t bytes() const {
     return sums_.bytes() + half_.bytes() + samples_.size() * sizeof(uint32_t);
   }
-  /// Runs block(name, values) for each vector of sums, for checkpoints.
+  /// Calls block(name, values) for each vector of sums, for checkpoints.
   template <typename Block>
   void for_each_block(const Block& block) {
     if (empty()) return;
@@ -185,7 +189,7 @@ class SplatLayer {
   }
 
   SplatSums sums_, half_;
-  std::vector<int64_t> paths_ = std::vector<int64_t>(2);  ///< all; those of the half
+  std::vector<int64_t> paths_ = std::vector<int64_t>(2);  ///< light paths: all; those of the half
   std::vector<uint32_t> samples_;
   double scale_ = 1;
 };

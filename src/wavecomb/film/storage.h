@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What the sums of a picture share: how they become means, and how they are let go.
+/// Helpers for per-pixel sums.
 #pragma once
 
 #include <cstdint>
@@ -7,12 +7,12 @@
 
 namespace wavecomb {
 
-/// 1 / n, or 0 where n is 0: the factor that makes a mean of a sum of n samples.
+/// Returns 1 / n, or 0 if n is 0: the factor that turns a sum of n samples into a mean.
 inline double inverse_count(uint32_t n) {
   return n == 0 ? 0.0 : 1.0 / n;
 }
 
-/// Frees what a vector holds.
+/// Frees the memory of a vector.
 template <typename T>
 void release(std::vector<T>& values) {
   std::vector<T>().swap(values);
