@@ -8,7 +8,7 @@ namespace wavecomb {
 
 size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
   const uint32_t calls = ++calls_[row(depth)];
-  // First each in turn, so that short renders do not spend themselves on one.
+  // Try each arm a few times first, so that short renders do not spend their time on one arm.
   size_t newest = 0;
   for (size_t arm = 1; arm < arms_; ++arm)
     if (stat(depth, arm).tries < stat(depth, newest).tries) newest = arm;
@@ -24,8 +24,8 @@ size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
     }
   }
   if (calls % kRetryPeriod != 0) return best;
-  // A turn for one of the others: if it is nearly as good, and now and then in any case, since what
-  // was measured may have been another program's doing.
+  // Retry another arm: if its prediction is nearly as good, and rarely in any case, since a bad
+  // measurement may have been caused by other programs on the machine.
   const uint32_t turn = calls / kRetryPeriod;
   const size_t other = turn % arms_;
   if (turn / arms_ % kAnywayPeriod == kAnywayPeriod - 1) return other;
@@ -41,7 +41,7 @@ void Chooser::learn(uint32_t depth, size_t arm, const Work& work, double run_ns,
   Stat& s = stat(depth, arm);
   const auto update = [&](double& mean, double ns) {
     if (s.tries <= 1)
-      mean = ns;  // the first meets cold caches; it is replaced by the second
+      mean = ns;  // the first measurement ran with cold caches, so the second replaces it
     else if (s.tries < kFirstTries)
       mean = std::min(mean, ns);
     else

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Learns, per depth, which of several ways to do the same work is quickest.
+/// Online choice among several ways to do the same work, by measured time.
 #pragma once
 
 #include <array>
@@ -9,31 +9,32 @@
 
 namespace wavecomb {
 
-/// What a way of doing a queue is expected to need: packets to run, records to prepare.
+/// Expected work of an arm for one queue: packets to run and records to prepare.
 struct Work {
   double packets = 0;
   double records = 0;
 };
 
-/// Predicts the time of each way ("arm") as
-///   packets * (ns per packet) + records * (ns per record to prepare),
-/// both learned by exponential averages per depth and arm, and chooses the least. An arm that was
-/// not tried at a depth is tried first; later a way that is not far behind is tried again now and
-/// then, since scenes change from place to place, and any other rarely. A slow measurement counts
-/// as twice the average at most, since it may be the machine's doing.
+/// Chooser among several ways ("arms") to process a queue. It predicts the time of each arm as
+///   packets * (ns per packet) + records * (ns per record to prepare)
+/// and chooses the smallest. Both costs are exponential averages per depth and arm. Untried arms
+/// come first; later an arm that is not far behind is retried now and then, since costs vary over
+/// the image, and any other arm rarely. Measurements are clamped to twice the average, since slow
+/// ones may be caused by the machine.
 ///
-/// Contract: owned by one worker. What it chooses changes no picture, only time.
+/// Contract: owned by one worker. The choice affects time only, never the image.
 class Chooser {
  public:
-  static constexpr uint32_t kDepths = 16;  ///< deeper ones share the last
+  static constexpr uint32_t kDepths = 16;  ///< deeper queues share the last entry
 
   explicit Chooser(size_t arms = 0) : arms_(arms), stats_(arms * kDepths) {}
 
-  /// The arm to use for a queue of this depth; `work` has an entry for each arm.
+  /// Returns the arm to use for a queue of this depth; `work` has one entry per arm.
   size_t choose(uint32_t depth, std::span<const Work> work);
-  /// What it took.
+  /// Records the measured times of an arm: `run_ns` to run its packets, `prepare_ns` to prepare its
+  /// records, both in nanoseconds.
   void learn(uint32_t depth, size_t arm, const Work& work, double run_ns, double prepare_ns);
-  /// How often each arm was used.
+  /// Number of uses of each arm.
   std::span<const uint64_t> used() const { return used_; }
 
  private:

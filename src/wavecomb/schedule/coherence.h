@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-/// How coherent an order is. Worked out on a sample of queues, outside the phases that it
-/// describes.
+/// Statistics of the coherence of a shading order, measured on a sample of queues outside the timed
+/// phases.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +9,15 @@
 
 namespace wavecomb {
 
-/// Sums of one worker; ratios are taken at the end.
+/// Coherence counts of one worker; ratios are computed after merging.
 struct CoherenceCounts {
-  uint64_t records = 0;        ///< of the queues looked at
+  uint64_t records = 0;        ///< records in the measured queues
   uint64_t runs = 0;           ///< maximal runs of consecutive records of one material
-  uint64_t pairs = 0;          ///< neighbours in shading order
-  uint64_t same_material = 0;  ///< pairs that read the same material record (its own cache lines)
-  uint64_t texture_pairs = 0;  ///< pairs of which both read a texture
-  uint64_t same_texels =
-      0;  ///< of those: same texture, tile, level and cell of the 128 x 128 uv grid
+  uint64_t pairs = 0;          ///< pairs of consecutive records in shading order
+  uint64_t same_material = 0;  ///< pairs that read the same material record, hence its cache lines
+  uint64_t texture_pairs = 0;  ///< pairs in which both records read a texture
+  /// Texture pairs with the same texture, tile, mip level and cell of the 128 x 128 uv grid.
+  uint64_t same_texels = 0;
 
   void add(const CoherenceCounts& o) {
     records += o.records;
@@ -41,7 +40,7 @@ struct CoherenceCounts {
   }
 };
 
-/// Adds a queue in the order in which it is shaded (`order` empty: as it stands).
+/// Adds a queue to `counts` in shading order; an empty `order` means arrival order.
 void measure_coherence(std::span<const uint32_t> material, std::span<const uint32_t> texture_key,
                        std::span<const uint32_t> order, std::span<const MaterialTraits> materials,
                        CoherenceCounts& counts);

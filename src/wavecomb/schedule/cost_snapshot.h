@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+/// Frozen cost estimates that scheduling policies read.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +9,12 @@ namespace wavecomb {
 
 /// Estimated cost of shading one record, in nanoseconds, frozen while a pass runs.
 struct CostSnapshot {
-  std::vector<float> material_ns;  ///< per material
-  std::vector<float> texture_ns;   ///< per texture: mean of the records that read it
-  float mean_ns = 1;               ///< over the records seen, or over materials
+  std::vector<float> material_ns;  ///< by material
+  std::vector<float> texture_ns;   ///< by texture: mean over the records that read it
+  float mean_ns = 1;               ///< over the measured records; initially over the materials
 
   float material(uint32_t id) const { return material_ns[id]; }
-  /// Cost of a texture, 0 for none.
+  /// Returns the cost of a texture, or 0 if there is none.
   float texture(uint32_t id) const { return id < texture_ns.size() ? texture_ns[id] : 0.f; }
 };
 

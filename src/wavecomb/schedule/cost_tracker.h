@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What shading costs, per material and texture: measured by workers, merged between passes.
+/// Shading cost per material and texture, measured by workers and merged between passes.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// A worker's measurements. Time is taken per batch and charged to the batch's records alike.
+/// Cost measurements of one worker. The time of a batch is divided evenly among its records.
 ///
 /// Contract: owned by one worker; nothing is allocated after construction.
 class CostTracker {
@@ -22,26 +22,29 @@ class CostTracker {
         seen_(materials),
         seen_before_(materials) {}
 
-  /// A timed batch: `ns` for records of these materials.
+  /// Adds a timed batch: `ns` nanoseconds for one record of each entry of `materials`.
   void charge(std::span<const uint32_t> materials, double ns);
-  /// What records of a material cost beside their shading, whether that is timed or not: `ns` for
-  /// some of those that have been counted.
+  /// Adds time spent on records of a material outside their timed batches, such as subsurface
+  /// random walks. `ns` covers all counted records, timed or not.
   void charge_beside(uint32_t material, double ns) { beside_ns_[material] += ns; }
   /// Counts records, timed or not.
   void count(std::span<const uint32_t> materials) {
     for (uint32_t m : materials) ++seen_[m];
   }
-  /// Whether the next batch of `records` is to be timed: large ones now and then, small ones
-  /// rarely, so that reading the clock stays below 1 % of shading.
+  /// Returns whether to time the next batch of `records`: one in 8 large batches and one in 32
+  /// small ones, so that reading the clock takes less than 1 % of shading time.
   bool wants(size_t records) {
     return records >= 32 ? (++large_ & 7u) == 0 : (++small_ & 31u) == 0;
   }
 
+  /// Total nanoseconds of timed records, by material.
   std::span<const double> ns() const { return ns_; }
+  /// Number of timed records, by material.
   std::span<const uint64_t> timed() const { return timed_; }
+  /// Number of records, timed or not, by material.
   std::span<const uint64_t> seen() const { return seen_; }
-  /// Adds the other's measurements, and empties it but for `seen`. Its timed records get what all
-  /// cost beside, on the mean.
+  /// Adds the measurements of `other` and clears them, except for `seen`. The time charged beside
+  /// batches is averaged over all records of a material and added to its timed records.
   void take(CostTracker& other);
 
  private:
@@ -50,18 +53,18 @@ class CostTracker {
   uint32_t large_ = 0, small_ = 0;
 };
 
-/// How well the costs that a pass was scheduled by met what the pass then measured, over materials
-/// that were measured, weighed by timed records.
+/// Accuracy of the cost estimates that a pass was scheduled with, compared with its measurements.
+/// Covers the measured materials that had an estimate, weighted by timed records w.
 struct CostPrediction {
   double r2 = 0;           ///< 1 - sum w (measured - predicted)^2 / sum w (measured - mean)^2
   double mean_error = 0;   ///< sum w |measured - predicted| / sum w measured
-  uint64_t materials = 0;  ///< how many were compared
+  uint64_t materials = 0;  ///< number of materials compared
 };
 
-/// Moves the snapshot towards what was measured in the last pass:
-///   cost <- (1 - weight) cost + weight * measured, or measured where nothing was known (cost 0).
-/// A texture's cost is the mean over the timed records of materials that read it.
-/// Returns how well the old snapshot had predicted.
+/// Updates the snapshot with the measurements of the last pass:
+///   cost <- (1 - weight) cost + weight * measured, or measured if there was no estimate (cost 0).
+/// The cost of a texture is the mean over the timed records of materials that read it. Returns the
+/// accuracy of the old snapshot.
 CostPrediction merge_costs(const CostTracker& measured, std::span<const MaterialTraits> materials,
                            float weight, CostSnapshot& costs);
 

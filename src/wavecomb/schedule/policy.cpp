@@ -13,32 +13,32 @@ struct Entry {
 };
 
 constexpr Entry kPolicies[] = {
-    {{"none", "Arrival order; nothing is paid for it."}, &make_none_policy},
-    {{"program", "By program, the kind of material: what lanes need and no more."},
+    {{"none", "Keeps arrival order; nothing is sorted."}, &make_none_policy},
+    {{"program", "Sorts by program, the kind of material, which suffices to fill lanes."},
      &make_program_policy},
     {{"code",
-      "By program, then by material where textures or a graph give its inputs: what lanes run and "
-      "read together."},
+      "Sorts by program, then by material if textures or a graph drive its inputs, so that lanes "
+      "run and read the same."},
      &make_code_policy},
-    {{"material", "By program, then by estimated cost of the material, then by material."},
+    {{"material", "Sorts by program, then by estimated cost of the material, then by material."},
      &make_material_policy},
-    {{"texture", "By program, then by the size of the material's largest texture."},
+    {{"texture", "Sorts by program, then by the size of the material's largest texture."},
      &make_texture_policy},
     {{"texture-locality",
-      "By program, material and place in its texture (tile, mip level, uv), as MoonRay's shade "
-      "queues."},
+      "Sorts by program, material and texture coordinates (tile, mip level, uv), as MoonRay's "
+      "shade queues do."},
      &make_texture_locality_policy},
     {{"cost-benefit",
-      "By program, then by throughput over cost of a material, highest first, then by place in the "
-      "scene."},
+      "Sorts by program, then by the material's throughput over cost, highest first, then by "
+      "position in the scene."},
      &make_cost_benefit_policy},
-    {{"random-runs", "The placebo: the runs of 'material' in an order that means nothing."},
+    {{"random-runs", "Placebo: the runs of 'material' in a random order."},
      &make_random_runs_policy},
 };
 
 constexpr PolicyInfo kAdaptive{"adaptive",
                                "Chooses among none, code, material, texture and "
-                               "texture-locality, queue by queue, by the times that it learns."};
+                               "texture-locality for each queue, by measured times."};
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// One stable sort for every policy and ray order.
+/// Stable radix sort used by all policies and ray orders.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Least-significant-digit radix sort of 64-bit keys, 8 bits a pass; digits that are equal in all
-/// keys cost one look and no pass.
+/// Least-significant-digit radix sort of 64-bit keys with 8 bits per pass. Digits that are equal in
+/// all keys are skipped.
 ///
 /// Contract: owned by one wave; allocates in the constructor only.
 class RadixSorter {
@@ -18,11 +18,11 @@ class RadixSorter {
   explicit RadixSorter(size_t capacity)
       : key_(capacity), key_swap_(capacity), index_swap_(capacity) {}
 
-  /// Where a policy writes its keys.
+  /// Buffer for the keys to sort.
   uint64_t* keys() { return key_.data(); }
 
-  /// Writes to `order` the indices 0 .. n-1 by ascending key, equal keys in ascending index.
-  /// Returns false when the keys were in order already, and then `order` is not written.
+  /// Writes the indices 0 .. n-1 to `order` by ascending key, ties by ascending index. Returns
+  /// false, and leaves `order` unwritten, if the keys are already sorted.
   bool sort(size_t n, uint32_t* order);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Orders of rays before traversal. They are made from the rays alone.
+/// Sorting of rays before traversal, by properties of the rays alone.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +9,16 @@
 
 namespace wavecomb {
 
-/// The box that origins are quantised in, for Morton codes of 10 bits an axis.
+/// Bounding box in which ray origins are quantised to Morton codes of 10 bits per axis.
 struct OrderGrid {
   float lo[3] = {0, 0, 0};
   float scale[3] = {1, 1, 1};  ///< 1024 / extent
 };
 
-/// Keys of directions lie below this.
+/// Number of distinct direction keys.
 inline constexpr uint32_t kDirectionKeys = 64;
 
-/// Writes the n slots by ascending key, equal keys in the order in which they come: a counting
-/// sort.
+/// Counting sort: writes the n slots in ascending key order; ties keep their input order.
 void sort_by_direction(const uint32_t* key, const uint32_t* slot, size_t n, uint32_t* sorted);
 
 }  // namespace wavecomb

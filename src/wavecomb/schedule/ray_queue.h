@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The rays of a wave that are to be traced next, and what traversal finds.
+/// Rays of a wave that are traced next, shadow rays, and the results of traversal.
 #pragma once
 
 #include "wavecomb/core/soa.h"
 
 namespace wavecomb {
 
-/// Rays side by side, in traversal order, as traversal reads them; the rest of a path stays in its
-/// slot of the pool. The order is made from the rays alone: slot order as generated, survivors
-/// keeping their places, so it is the same under every shading policy.
+/// Rays in SoA layout and traversal order. All other path state stays in the path's slot of the
+/// pool. The order depends on the rays alone (slot order as generated; survivors keep their
+/// positions), so it is the same under every shading policy.
 ///
-/// Contract: owned by one wave; `size` entries are valid; arrays have room for a packet past the
+/// Contract: owned by one wave; `size` entries are valid; arrays are padded by one packet past the
 /// end.
 class RayQueue {
  public:
@@ -24,8 +24,8 @@ class RayQueue {
   float *ox, *oy, *oz;     ///< origin, world space
   float *dx, *dy, *dz;     ///< unit direction
   uint32_t* slot;          ///< path slot in the pool
-  uint32_t* ordered_slot;  ///< where slots go when they are put in another order
-  uint32_t* direction;     ///< direction_key of the rays, as shading listed them
+  uint32_t* ordered_slot;  ///< output buffer for reordered slots
+  uint32_t* direction;     ///< direction_key of each ray, written by shading
   size_t size = 0;
 
   static constexpr size_t kColumns = 9;
@@ -37,7 +37,7 @@ class RayQueue {
   size_t capacity_ = 0;
 };
 
-/// What traversal found for the rays of a RayQueue, entry by entry.
+/// Traversal results for the rays of a RayQueue, at the same indices.
 class HitBuffer {
  public:
   HitBuffer() = default;
@@ -50,18 +50,18 @@ class HitBuffer {
     inst = block_.uints(5);
   }
 
-  float* t;        ///< distance
+  float* t;        ///< hit distance
   float *u, *v;    ///< barycentric coordinates: p = (1 - u - v) p0 + u p1 + v p2
-  uint32_t* prim;  ///< triangle within its mesh
-  uint32_t* geom;  ///< geometry within the instance's group, or number of the light
-  uint32_t* inst;  ///< instance, or what EmbreeAccelerator puts there for a miss or a light's shape
+  uint32_t* prim;  ///< primitive index within its geometry, such as a triangle of a mesh
+  uint32_t* geom;  ///< geometry index within the instance's group, or light index
+  uint32_t* inst;  ///< instance index, or a marker of EmbreeAccelerator for a miss or a light
   size_t bytes() const { return block_.bytes(); }
 
  private:
   SoaBlock block_;
 };
 
-/// Shadow rays of one depth, at most one a path, in the order of the paths' rays.
+/// Shadow rays of one depth, at most one per path, in the order of the paths' rays.
 class ShadowQueue {
  public:
   ShadowQueue() = default;
@@ -73,9 +73,9 @@ class ShadowQueue {
 
   float *ox, *oy, *oz, *dx, *dy, *dz;
   float* tfar;
-  float *r, *g, *b;  ///< what arrives in the slot's radiance when nothing is in the way
+  float *r, *g, *b;  ///< radiance added to the path if the ray is unoccluded
   uint32_t *slot, *ordered_slot, *direction;  ///< as in RayQueue
-  uint32_t* occluded;                         ///< after traversal: 1 where something is in the way
+  uint32_t* occluded;                         ///< result of traversal: 1 if occluded
   size_t size = 0;
   static constexpr size_t kColumns = 14;
   size_t bytes() const { return block_.bytes(); }

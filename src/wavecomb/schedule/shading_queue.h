@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The hits of a wave that wait for shading.
+/// Queue of a wave's hits that await shading.
 #pragma once
 
 #include <array>
@@ -11,23 +11,23 @@
 
 namespace wavecomb {
 
-/// Hits in arrival order (which is the rays' order), with a logical order beside them: columns of
-/// ids, which policies look at, and a row a record for the rest, which shading loads whole
-/// (docs/decisions/path-rows.md). `sorted_indices` says in which order records are shaded;
-/// `materialize()` moves them into it.
+/// Hits in arrival order, which is ray order, plus a shading order. Ids are stored in columns,
+/// which policies read; the rest of each record is a contiguous row, which shading loads at once
+/// (docs/decisions/path-rows.md). `sorted_indices` is the shading order; `materialize()` moves the
+/// records into it.
 ///
-/// Contract: owned by one wave; `size` records are valid. The record's number in arrival order is
-/// where shading notes what became of the path, so that no shading order shows in the ray order.
+/// Contract: owned by one wave; `size` records are valid. Shading writes its results at the
+/// record's arrival index, so that the shading order does not affect the ray order.
 class ShadingQueue {
  public:
   enum Column : uint32_t {
     kMaterial,
     kProgram,
-    kPositionKey,  ///< Morton code of the hit; where a policy asks
+    kPositionKey,  ///< Morton code of the hit; only if the policy requests it
     kColumns
   };
   ShadingQueue() = default;
-  /// `row_words`: of a record's row, whatever those words mean.
+  /// `row_words`: 32-bit words per record row.
   ShadingQueue(size_t capacity, size_t row_words)
       : block_(kColumns, capacity),
         moved_(kColumns, capacity),
@@ -41,21 +41,21 @@ class ShadingQueue {
   }
 
   size_t size = 0;
-  uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 while `ordered` or `moved`
-  bool ordered = false;                ///< false: shaded as records stand
-  bool moved = false;  ///< record i stands where it is shaded; it arrived as sorted_indices[i]
+  uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 if `ordered` or `moved`
+  bool ordered = false;                ///< sorted_indices gives the shading order of the records
+  bool moved = false;  ///< records are in shading order; record i arrived as sorted_indices[i]
 
-  /// By arrival, whatever the order: the path's slot, and what shading made of it (Outcome).
+  /// Path slot and shading outcome, always in arrival order.
   uint32_t *slot = nullptr, *outcome = nullptr;
   enum Outcome : uint32_t { kAlive = 1, kShadowRay = 2 };
-  /// Above those, direction keys of the next ray and of the shadow ray.
+  /// Bit offsets in `outcome` of the direction keys of the next ray and of the shadow ray.
   static constexpr uint32_t kRayKeyShift = 8, kShadowKeyShift = 16;
 
   uint32_t* uints(Column c) const { return block_.uints(c); }
-  /// The row of record `i`, and behind it those that follow.
+  /// Returns the row of record `i`; the rows of later records follow it.
   float* row(size_t i) const { return rows_.floats(0) + i * row_words_; }
 
-  /// Makes the physical order the logical one: afterwards records stand as they are shaded.
+  /// Moves all records into shading order.
   void materialize();
   size_t bytes() const {
     return block_.bytes() + moved_.bytes() + rows_.bytes() + moved_rows_.bytes() + arrival_.bytes();

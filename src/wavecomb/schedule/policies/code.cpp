@@ -4,9 +4,9 @@
 namespace wavecomb {
 namespace {
 
-/// What lanes run and read together: the program, and within it the material where textures or a
-/// value graph give its inputs, since those that meet in a packet are read one after another. Where
-/// all materials are constant, the keys are those of "program", and the sort has one digit.
+/// Sorts by program, and within it by material if textures or a value graph drive its inputs, since
+/// a packet evaluates the textures and graphs of different materials one after another. If all
+/// materials are constant, the keys equal those of "program", and the sort takes a single pass.
 class CodePolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "code"; }

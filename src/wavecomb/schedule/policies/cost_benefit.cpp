@@ -6,9 +6,9 @@
 namespace wavecomb {
 namespace {
 
-/// Material type (the program), then
+/// Sorts by program, then by
 ///   score = sum of the throughput of the material's records / (material cost + texture cost),
-/// highest first, then the Morton code of the hit. The score is one number a material and queue.
+/// highest first, then by the Morton code of the hit. There is one score per material and queue.
 class CostBenefitPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "cost-benefit"; }
@@ -23,8 +23,8 @@ class CostBenefitPolicy final : public SchedulingPolicy {
       score[m] /= std::max(cost, 1e-3f);
     }
     for (size_t i = 0; i < queue.size(); ++i) {
-      // 26 bits of the score suffice to tell materials apart; inverted, so that the highest comes
-      // first.
+      // 26 bits of the score suffice to separate materials. They are inverted to sort the highest
+      // score first.
       const uint64_t rank = (~ascending_bits(score[queue.material[i]]) & 0xffffffffu) >> 6;
       keys[i] = (uint64_t{queue.program[i]} << 56) | (rank << 30) | queue.position_key[i];
     }

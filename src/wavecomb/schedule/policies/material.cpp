@@ -4,8 +4,8 @@
 namespace wavecomb {
 namespace {
 
-/// Material type (the program), then estimated cost of the material, cheapest first; equal costs by
-/// material id, so that a material's records stay together.
+/// Sorts by program, then by estimated material cost in ascending order, then by material id, so
+/// that the records of a material stay together.
 class MaterialPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "material"; }

@@ -4,7 +4,7 @@
 namespace wavecomb {
 namespace {
 
-/// Arrival order: the baseline that every other policy is measured against.
+/// Keeps arrival order: the baseline for all other policies.
 class NonePolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "none"; }

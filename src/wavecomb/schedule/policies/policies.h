@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Every policy's maker; one file each beside this one. How to add one: docs/writing-a-policy.md.
+/// Factories of all policies, each defined in its own file. docs/writing-a-policy.md explains how
+/// to add one.
 #pragma once
 
 #include <bit>
@@ -18,7 +19,7 @@ std::unique_ptr<SchedulingPolicy> make_texture_locality_policy();
 std::unique_ptr<SchedulingPolicy> make_cost_benefit_policy();
 std::unique_ptr<SchedulingPolicy> make_random_runs_policy();
 
-/// Bits of a non-negative float: ascending as integers exactly as the floats ascend.
+/// Returns the bits of a non-negative float; as integers they sort like the floats.
 inline uint64_t ascending_bits(float x) {
   return std::bit_cast<uint32_t>(x > 0.f ? x : 0.f);
 }

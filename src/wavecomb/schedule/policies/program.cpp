@@ -4,7 +4,7 @@
 namespace wavecomb {
 namespace {
 
-/// Program only: what lanes need to be full.
+/// Sorts by program only, which suffices to fill SIMD lanes.
 class ProgramPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "program"; }

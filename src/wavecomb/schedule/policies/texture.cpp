@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-/// Material type (the program), then memory size of the material's largest texture, smallest first.
+/// Sorts by program, then by the memory size of the material's largest texture in ascending order.
 class TexturePolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "texture"; }

@@ -4,8 +4,8 @@
 namespace wavecomb {
 namespace {
 
-/// Program and material, then where in its textures a record reads: UDIM tile, mip level, Morton
-/// code of uv on a 128 x 128 grid (the key of MoonRay's shade queues: Lee et al., HPG 2017).
+/// Sorts by program and material, then by texture coordinates: UDIM tile, mip level and Morton code
+/// of uv on a 128 x 128 grid (the key of MoonRay's shade queues: Lee et al., HPG 2017).
 class TextureLocalityPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "texture-locality"; }
