@@ -240,13 +240,13 @@ def test_programs_that_read_what_is_not_there_are_refused():
         (changed(code=200), "unknown operation"),
         (changed(width=9), "wrong size"),
         (changed(to=126), "too many values"),
-        (changed(operands=50), "operand that is not there"),
-        (changed(operands=0x8000), "operand that is not there"),
-        (changed(to=1), "place of an operand"),
+        (changed(operands=50), "operand that does not exist"),
+        (changed(operands=0x8000), "operand that does not exist"),
+        (changed(to=1), "overwrites its operand"),
     ):
         with pytest.raises(ValueError, match=match):
             builder.add_graph(bad, graph.constants, graph.images, graph.outputs)
-    with pytest.raises(ValueError, match="drives nothing"):
+    with pytest.raises(ValueError, match="drives no parameter"):
         builder.add_graph(graph.ops, graph.constants, graph.images, [(4000, 0)])
     image = assemble({0: make.image(3, make.input("uv"), 1.0)[0]})
     with pytest.raises(ValueError, match="image that was never added"):

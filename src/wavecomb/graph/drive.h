@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Puts what value graphs compute in the place of a material's parameters.
+/// Overrides material parameters with the outputs of value graphs.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Where the components of GraphParameter are in `p`, in their order.
+/// Returns pointers to the components of `p` in the order of kGraphParameters.
 template <typename F>
 inline std::array<F*, kFirstOpenPbrOutput> parameter_places(ShadingParams<F>& p) {
   return {&p.base_color.x,
@@ -35,7 +35,7 @@ inline std::array<F*, kFirstOpenPbrOutput> parameter_places(ShadingParams<F>& p)
 
 namespace detail {
 
-/// A unit normal of the upper half; (0, 0, 1) where `n` is no direction.
+/// Returns `n` as a unit normal in the upper hemisphere, or (0, 0, 1) if it is degenerate.
 template <typename F>
 inline Vec3<F> sane_normal(const Vec3<F>& n) {
   const Vec3<F> up(n.x, n.y, max(n.z, F(0.01f)));
@@ -45,9 +45,9 @@ inline Vec3<F> sane_normal(const Vec3<F>& n) {
   return select<F>(good, up * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
 }
 
-/// Runs the graphs of the active lanes, which all have one, and puts what they drive into `p`. A
-/// program beside "openpbr" has no place for what that one alone reads. Never inlined, so that
-/// materials without graphs do not pay for its registers.
+/// Runs the graphs of the active lanes, each of which must have one, and writes their outputs to
+/// `p`. Outputs that only "openpbr" reads are skipped. Never inlined, so that materials without
+/// graphs do not pay for its registers.
 template <typename F, typename Params>
 [[gnu::noinline]] void drive_parameters(const MaterialView& view, const UInt<F>& material,
                                         const GraphPoint<F>& at, const Mask<F>& active, Params& p) {
@@ -70,7 +70,7 @@ template <typename F, typename Params>
     }
     if (tilts) p.normal = select<F>(same, sane_normal(p.normal), p.normal);
   });
-  // Presence is what rays ask for; those who met the surface see all of it.
+  // Presence is handled during traversal; a surface that was hit keeps its full opacity.
   const Mask<F> presence = Mask<F>((p.flags & U(uint32_t{kPresence})) != U(0u));
   p.opacity = select(presence, opacity, p.opacity);
 }

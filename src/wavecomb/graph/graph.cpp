@@ -10,7 +10,7 @@
 namespace wavecomb {
 namespace {
 
-/// Operands of an operation; how many components of operand 0 it reads where that is not its width.
+/// Number of operands, number of components read from operand 0, and number of results.
 struct Shape {
   uint32_t operands, first_width, results;
 };
@@ -61,6 +61,7 @@ Shape shape_of(const GraphOp& op) {
   }
 }
 
+/// Returns the smallest allowed vector width of an operation.
 uint32_t least_width(GraphCode code) {
   const bool three =
       code == GraphCode::kCross || code == GraphCode::kRgbToHsv || code == GraphCode::kHsvToRgb;
@@ -110,7 +111,7 @@ uint32_t graph_inputs(const Graph& graph) {
 void check_graph(const Graph& graph, const std::string& name, size_t texture_count,
                  uint32_t parameters) {
   const auto require = [&](bool good, const char* what) {
-    if (!good) throw Error(name + " has a graph with " + what + "; compile it anew");
+    if (!good) throw Error(name + " has a graph with " + what + "; compile it again");
   };
   require(graph.ops.size() <= kMaxGraphOps, "too many operations");
   require(graph.constants.size() < kGraphConstant, "too many constants");
@@ -132,9 +133,9 @@ void check_graph(const Graph& graph, const std::string& name, size_t texture_cou
       const bool steps = (op.steps >> k & 1) != 0;
       const uint32_t width = k == 0 ? shape.first_width : uint32_t{op.width};
       const uint32_t read = code != GraphCode::kCopy && steps ? width : 1;
-      require(readable(op.from[k], read), "an operand that is not there");
+      require(readable(op.from[k], read), "an operand that does not exist");
       require(op.from[k] + read <= op.to || op.to + shape.results <= op.from[k],
-              "a result in the place of an operand");
+              "a result that overwrites its operand");
     }
     if (code == GraphCode::kInput)
       require(op.number < kGraphInputCount && op.width <= kInputWidths[op.number],
@@ -151,8 +152,8 @@ void check_graph(const Graph& graph, const std::string& name, size_t texture_cou
     for (uint32_t i = 0; i < shape.results; ++i) written[op.to + i] = true;
   }
   for (const GraphOutput& o : graph.outputs) {
-    require(o.parameter < parameters, "an output that drives nothing");
-    require(readable(o.from, 1), "an output that is not there");
+    require(o.parameter < parameters, "an output that drives no parameter");
+    require(readable(o.from, 1), "an output that does not exist");
   }
 }
 

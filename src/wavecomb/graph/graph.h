@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Value graphs as data: flat programs over a small file of registers.
+/// Value graphs: flat programs over a small register file that compute material parameters.
 ///
-/// A register holds one float for each lane; a vector of 2 to 4 components is as many neighbours.
-/// Python compiles the node networks of a stage to programs (wavecomb/usd/graphs/expressions.py);
-/// here they are only run.
+/// A register holds one float per SIMD lane; a vector of 2 to 4 components occupies consecutive
+/// registers. Python compiles the shader networks of a stage to such programs
+/// (wavecomb/usd/graphs/expressions.py); this folder only runs them.
 #pragma once
 
 #include <cstdint>
@@ -14,64 +14,64 @@
 
 namespace wavecomb {
 
-/// What an operation does, component by component unless it says otherwise. a, b and c are its
-/// operands. The order is that of `graph_codes` in the bindings.
+/// Operations, which work per component unless noted. a, b and c are the operands. The order must
+/// match `graph_codes` in the bindings.
 enum class GraphCode : uint8_t {
-  kCopy,   ///< component k is operand k
-  kInput,  ///< of GraphInput `number`
-  kImage,  ///< image `number` at a: r, g, b, alpha
+  kCopy,   ///< result component k is operand k
+  kInput,  ///< GraphInput `number`
+  kImage,  ///< image `number` at uv coordinates a: r, g, b, alpha
   kAdd,
   kSubtract,
   kMultiply,
-  kDivide,  ///< 0 where b is 0
+  kDivide,  ///< a / b, 0 if b is 0
   kModulo,  ///< a - b floor(a / b), 0 where b is 0
-  kPower,   ///< 0 where a < 0
+  kPower,   ///< a^b, 0 if a < 0
   kMin,
   kMax,
-  kAtan2,  ///< of a / b
-  kLess,   ///< 1 where a < b, else 0
-  kEqual,
+  kAtan2,       ///< atan2(a, b), radians
+  kLess,        ///< 1 if a < b, else 0
+  kEqual,       ///< 1 if a = b, else 0
   kMix,         ///< a + (b - a) c
-  kClamp,       ///< of a to [b, c]
-  kSelect,      ///< b where a is not 0, else c
-  kSmoothstep,  ///< of a, from b to c
+  kClamp,       ///< a clamped to [b, c]
+  kSelect,      ///< b if a is not 0, else c
+  kSmoothstep,  ///< smooth step of a from b to c
   kAbs,
   kFloor,
   kSign,
-  kSqrt,  ///< of max(a, 0)
+  kSqrt,  ///< square root of max(a, 0)
   kExp,
-  kLog,  ///< of max(a, 1.2e-38)
+  kLog,  ///< natural logarithm of max(a, 1.2e-38)
   kSin,
   kCos,
-  kAcos,  ///< of a clamped to [-1, 1]
-  kDot,   ///< one number, of vectors of `width` components
+  kAcos,  ///< arc cosine of a clamped to [-1, 1]
+  kDot,   ///< scalar product of vectors of `width` components
   kCross,
   kRgbToHsv,
   kHsvToRgb,
-  kNoise2,  ///< at a, `width` values that are not alike
+  kNoise2,  ///< gradient noise at a; `width` uncorrelated values
   kNoise3,
-  kFractal3,  ///< at a; `number` octaves, lacunarity b, diminish c
-  kCell2,     ///< `width` values
+  kFractal3,  ///< fractal noise at a; `number` octaves, lacunarity b, diminish c
+  kCell2,     ///< cell noise at a; `width` values
   kCell3,
-  kWorley2,  ///< at a, jitter b: distances to the nearest `width` points; the cell's number if
-             ///< `number` is 1
+  kWorley2,  ///< Worley noise at a with jitter b: the `width` smallest distances, or the value of
+             ///< the nearest cell if `number` is 1
   kWorley3,
-  kAttribute,  ///< attribute `number` of the mesh; a where it has none of `width` components
+  kAttribute,  ///< attribute `number` of the mesh; a if it has none with `width` components
 };
 inline constexpr uint32_t kGraphCodeCount = 39;
 
-/// What the surface tells a graph.
+/// Inputs that a hit provides to graphs.
 enum class GraphInput : uint8_t {
-  kUv,             ///< 2
-  kPosition,       ///< 3, in the world
-  kLocalPosition,  ///< in the space of the group of meshes that is instanced
-  kNormal,         ///< unit shading normal in the world
-  kLocalNormal,
-  kTangent,    ///< unit, along u in the world
-  kBitangent,  ///< unit, along v as far as that is across the tangent
-  kView,       ///< unit, to the viewer in the world
-  /// In the world, what the axes of the group's space are to normals: rows of the inverse of its
-  /// map.
+  kUv,             ///< texture coordinates, 2 components; all others have 3
+  kPosition,       ///< position in world space
+  kLocalPosition,  ///< position in the space of the instanced group of meshes
+  kNormal,         ///< unit shading normal in world space
+  kLocalNormal,    ///< unit shading normal in the space of the instanced group
+  kTangent,        ///< unit tangent along u in world space
+  kBitangent,      ///< unit, perpendicular to normal and tangent, on the side of increasing v
+  kView,           ///< unit direction to the viewer in world space
+  /// Images of the local axes under the normal transform, in world space: rows of the inverse of
+  /// the instance transform.
   kNormalX,
   kNormalY,
   kNormalZ,
@@ -83,7 +83,7 @@ inline constexpr uint32_t graph_input_bit(GraphInput i) {
 
 inline constexpr uint32_t kMaxGraphRegisters = 128;
 inline constexpr uint32_t kMaxGraphOps = 4096;
-/// An operand with this bit is a constant of the program, else a register.
+/// Bit of an operand that marks an index of a constant; without it, the operand is a register.
 inline constexpr uint16_t kGraphConstant = 1u << 15;
 inline constexpr uint32_t kNoGraph = 0xffffffffu;
 
@@ -91,32 +91,33 @@ inline constexpr uint32_t kNoGraph = 0xffffffffu;
 struct GraphOp {
   uint8_t code;   ///< GraphCode
   uint8_t width;  ///< components, 1 to 4
-  uint8_t steps;  ///< bit k: operand k is a vector; else one number for all components
+  uint8_t steps;  ///< bit k set: operand k is a vector; otherwise one value for all components
   uint8_t pad = 0;
-  uint16_t to;  ///< first register that it writes, none that it reads
+  uint16_t to;  ///< first register written; must not overlap registers that are read
   uint16_t from[4];
   uint16_t number;
 };
 static_assert(sizeof(GraphOp) == 16);
 
-/// An image that a program reads.
+/// Image that a program reads.
 struct GraphImage {
   uint32_t texture;
-  float stretch;  ///< lengths in its coordinates for one in those of the mesh
+  float stretch;  ///< scale from lengths in mesh uv to lengths in image coordinates
 };
 
-/// A result: what it drives, and the operand that holds it.
+/// Output of a program: index of the parameter it drives, and operand that holds its value.
 struct GraphOutput {
   uint16_t parameter, from;
 };
 
-/// One program as it is made.
+/// Graph program under construction.
 struct Graph {
   std::vector<GraphOp> ops;
   std::vector<float> constants;
   std::vector<GraphImage> images;
   std::vector<GraphOutput> outputs;
-  std::vector<std::string> attributes;  ///< names of those that operations number
+  std::vector<std::string> attributes;  ///< attribute names; kAttribute operations index them
+  /// Returns whether an output drives any of `count` components from `first` on.
   bool drives(uint32_t first, uint32_t count = 1) const {
     for (const GraphOutput& o : outputs)
       if (o.parameter >= first && o.parameter < first + count) return true;
@@ -124,23 +125,23 @@ struct Graph {
   }
 };
 
-/// Where a program is in the arrays of all.
+/// Ranges of a program in the arrays of GraphSet.
 struct GraphProgram {
   uint32_t first_op, op_count, first_constant, first_image, first_output, output_count;
 };
 
-/// What kernels need of all programs.
+/// Read-only view of all programs for kernels.
 struct GraphView {
   const GraphProgram* programs = nullptr;
   const GraphOp* ops = nullptr;
   const float* constants = nullptr;
   const GraphImage* images = nullptr;
   const GraphOutput* outputs = nullptr;
-  uint32_t inputs = 0;  ///< graph_input_bit of what any program reads
+  uint32_t inputs = 0;  ///< graph_input_bit of all inputs that any program reads
   AttributeView attributes{};
 };
 
-/// All programs of a scene, in arrays that lanes read.
+/// All programs of a scene in packed arrays.
 struct GraphSet {
   std::vector<GraphProgram> programs;
   std::vector<GraphOp> ops;
@@ -149,11 +150,12 @@ struct GraphSet {
   std::vector<GraphOutput> outputs;
   uint32_t inputs = 0;
 
-  /// Adds a program that check_graph found good, with the scene's numbers of attributes.
+  /// Adds a program that passed check_graph; its attribute numbers must be those of the scene.
   void add(const Graph& graph);
-  /// Whether program `graph` (kNoGraph: none) drives component `parameter`.
+  /// Returns whether program `graph`, which may be kNoGraph, drives component `parameter`.
   bool drives(uint32_t graph, uint32_t parameter) const;
-  /// Whether program `graph` (kNoGraph: none) reads an input of `bits` (graph_input_bit).
+  /// Returns whether program `graph`, which may be kNoGraph, reads an input of `bits`
+  /// (graph_input_bit).
   bool reads(uint32_t graph, uint32_t bits) const;
   GraphView view() const {
     if (programs.empty()) return {};
@@ -162,11 +164,11 @@ struct GraphSet {
   }
 };
 
-/// Inputs that a program reads, as bits of graph_input_bit.
+/// Returns the inputs that a program reads, as bits of graph_input_bit.
 uint32_t graph_inputs(const Graph& graph);
 
-/// Throws Error where a program would read or write what is not there. `name` is of what it belongs
-/// to, `parameters` is how many an output may name.
+/// Throws Error if a program reads or writes out of range. `name`: the owner of the graph, for the
+/// message. `parameters`: number of components that outputs may drive.
 void check_graph(const Graph& graph, const std::string& name, size_t texture_count,
                  uint32_t parameters);
 

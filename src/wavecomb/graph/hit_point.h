@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What value graphs may ask of a hit.
+/// Inputs of value graphs at a hit.
 #pragma once
 
 #include "wavecomb/graph/run.h"
@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// The GraphPoint of a hit on surface `s`, seen along `dir`. Not inline: kernels without graphs
-/// keep their size.
+/// Returns the GraphPoint of a hit on surface `s` by a ray along `dir`. Not inlined, to keep
+/// kernels without graphs small.
 template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> graph_point(const SceneView& scene,
                                                        const MeshHit<F>& hit, const Surface<F>& s,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Body of hit_point.h, for the units that instantiate it.
+/// Definitions for hit_point.h; include only where the templates are instantiated.
 #pragma once
 
 #include "wavecomb/graph/hit_point.h"
@@ -38,7 +38,7 @@ template <typename F>
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   if (scene.has_motion)
     maps.place(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
-  // The inverse of the transform, by its cofactors.
+  // Inverse of the transform by cofactors.
   const Vec3<F>* m = maps.row;
   const Vec3<F> c[3] = {cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
   const F det = dot(m[0], c[0]), inv = 1.f / select(det == 0.f, F(1.f), det);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Procedural noise as MaterialX defines it: gradient noise (Perlin, "Improving Noise", 2002) over
-/// Bob Jenkins' lookup3 hash of the lattice, values of cells, and distances to jittered points
-/// (Worley, "A Cellular Texture Basis Function", 1996). Scales and gradients are those of Open
-/// Shading Language, which MaterialX's generators share.
+/// Procedural noise as defined by MaterialX: gradient noise (Perlin, "Improving Noise", 2002) on
+/// Bob Jenkins' lookup3 hash of the lattice, cell noise, and distances to jittered points (Worley,
+/// "A Cellular Texture Basis Function", 1996). Scales and gradients are those of Open Shading
+/// Language, which MaterialX's code generators share.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -10,7 +10,7 @@
 
 namespace wavecomb::noise {
 
-/// x brought to where its floor fits an integer with room for neighbours; NaN gives 0.
+/// Clamps x so that its floor and neighbouring cells fit an integer; NaN becomes 0.
 template <typename F>
 inline F bounded(const F& x) {
   return clamp(select(x == x, x, F(0.f)), F(-1e9f), F(1e9f));
@@ -21,7 +21,7 @@ inline U rotate_left(const U& x, uint32_t k) {
   return (x << k) | (x >> (32 - k));
 }
 
-/// Jenkins' lookup3 for N words: mixes the first three, then what is left.
+/// Jenkins' lookup3 hash of N words: mixes the first three, then the remaining one.
 template <typename U, size_t N>
 inline U hash(const U (&words)[N]) {
   static_assert(N >= 1 && N <= 4);
@@ -53,10 +53,10 @@ inline U hash(const U (&words)[N]) {
   return c;
 }
 
-/// A number in [0, 1] of 32 bits, to the precision of a float.
+/// Converts 32 bits to a float in [0, 1].
 template <typename F>
 inline F unit_of(const UInt<F>& bits) {
-  // Exact halves, so that no conversion of unsigned numbers is needed.
+  // Converts two 16-bit halves exactly, which avoids an unsigned conversion.
   const F high = F(Int<F>(bits >> 16)), low = F(Int<F>(bits & 0xffffu));
   return fma(high, F(65536.f), low) * (1.f / 4294967296.f);
 }
@@ -66,20 +66,20 @@ inline F fade(const F& t) {
   return t * t * t * fma(t, fma(t, F(6.f), F(-15.f)), F(10.f));
 }
 
-/// `x`, or -x where bit `bit` of `hash` is set.
+/// Returns `x`, or -x if bit `bit` of `hash` is set.
 template <typename F>
 inline F signed_by(const F& x, const UInt<F>& hash, uint32_t bit) {
   return bits_float<F>(float_bits<F>(x) ^ ((hash >> bit) << 31));
 }
 
-/// The product with one of 8 directions (+-1, +-2), (+-2, +-1).
+/// Scalar product with one of 8 gradients (+-1, +-2), (+-2, +-1).
 template <typename F>
 inline F gradient(const UInt<F>& h, const F (&p)[2]) {
   const Mask<F> swap = Mask<F>((h & 4u) != UInt<F>(0u));
   const F u = select(swap, p[1], p[0]), v = select(swap, p[0], p[1]);
   return signed_by<F>(u, h, 0) + signed_by<F>(F(2.f * v), h, 1);
 }
-/// The product with one of 12 directions, to the edges of a cube.
+/// Scalar product with one of 12 gradients, towards the edges of a cube.
 template <typename F>
 inline F gradient(const UInt<F>& hash, const F (&p)[3]) {
   using U = UInt<F>;
@@ -90,7 +90,8 @@ inline F gradient(const UInt<F>& hash, const F (&p)[3]) {
   return signed_by<F>(u, h, 0) + signed_by<F>(v, h, 1);
 }
 
-/// Gradient noise at a point of N dimensions, about [-1, 1]: K values that are not alike (1 or 3).
+/// Evaluates gradient noise in N dimensions, range about [-1, 1]. Writes K uncorrelated values (1
+/// or 3).
 template <size_t K, typename F, size_t N>
 inline void perlin(const F (&p)[N], F* out) {
   using U = UInt<F>;
@@ -130,14 +131,14 @@ inline void perlin(const F (&p)[N], F* out) {
   }
 }
 
-/// One number in [0, 1] for each cell of the lattice.
+/// Returns the hashed value in [0, 1] of the lattice cell of `p`.
 template <typename F, size_t N>
 inline F cell(const F (&p)[N]) {
   UInt<F> at[N];
   for (size_t i = 0; i < N; ++i) at[i] = UInt<F>(to_int<F>(floor(bounded<F>(p[i]))));
   return unit_of<F>(hash(at));
 }
-/// The same for number `k` of several.
+/// Returns value `k` of several of the lattice cell of `p`.
 template <typename F, size_t N>
 inline F cell(const F (&p)[N], uint32_t k) {
   UInt<F> at[N + 1];
@@ -146,12 +147,13 @@ inline F cell(const F (&p)[N], uint32_t k) {
   return unit_of<F>(hash(at));
 }
 
-/// Distances to the nearest three of a point in each cell, ascending, and the number of the
-/// nearest's cell. `jitter` 0 puts the points in the middle of their cells.
+/// Distances to the three nearest feature points, ascending, and the value of the nearest one's
+/// cell.
 template <typename F>
 struct Worley {
   F nearest[3], cell;
 };
+/// Evaluates Worley noise in N dimensions. A `jitter` of 0 puts the points at the cell centres.
 template <typename F, size_t N>
 inline Worley<F> worley(const F (&p)[N], const F& jitter) {
   using U = UInt<F>;
@@ -167,7 +169,7 @@ inline Worley<F> worley(const F (&p)[N], const F& jitter) {
   for (F& x : to_nearest) x = F(0.f);
   constexpr uint32_t kCells = N == 2 ? 9 : 27;
   for (uint32_t c = 0; c < kCells; ++c) {
-    // The first axis counts slowest, as the definition's loops do.
+    // The first axis varies slowest, as in MaterialX's loops.
     const uint32_t digits[3] = {N == 2 ? c / 3 : c / 9, N == 2 ? c % 3 : c / 3 % 3, c % 3};
     U at[N + 1];
     for (size_t i = 0; i < N; ++i) at[i] = base[i] + U(digits[i]) - U(1u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a value graph can drive: parameters of programs, component by component.
+/// Material parameters that value graphs can drive, by component.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,15 @@
 
 namespace wavecomb {
 
-/// One parameter. Values of graphs are brought to [low, high], NaN to `low`.
+/// Parameter that a graph can drive. Graph values are clamped to [low, high]; NaN becomes `low`.
 struct GraphParameter {
   const char* name;
   uint32_t components;
   float low, high;
 };
 
-/// Inputs and ior first, then what program "openpbr" has beside them, as OpenPbrRecord has it.
+/// Textured inputs and ior first, then the additional inputs of "openpbr" in the order of
+/// OpenPbrRecord.
 inline constexpr GraphParameter kGraphParameters[] = {{"base_color", 3, 0, 1},
                                                       {"specular_color", 3, 0, 1},
                                                       {"emission", 3, 0, 1e18f},
@@ -34,7 +35,8 @@ inline constexpr GraphParameter kGraphParameters[] = {{"base_color", 3, 0, 1},
 #undef WAVECOMB_PARAMETER
 };
 
-/// Number of the first component of a parameter; of the one after all for an unknown name.
+/// Returns the index of a parameter's first component, or the total number of components if the
+/// name is unknown.
 constexpr uint32_t graph_parameter(std::string_view name) {
   uint32_t first = 0;
   for (const GraphParameter& p : kGraphParameters) {
@@ -44,7 +46,7 @@ constexpr uint32_t graph_parameter(std::string_view name) {
   return first;
 }
 inline constexpr uint32_t kGraphOutputCount = graph_parameter("");
-/// Components before this one are of ShadingParams.
+/// Components below this index are members of ShadingParams.
 inline constexpr uint32_t kFirstOpenPbrOutput = graph_parameter("diffuse_roughness");
 inline constexpr uint32_t kEmissionOutput = graph_parameter("emission");
 inline constexpr uint32_t kOpacityOutput = graph_parameter("opacity");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Runs value graphs at hits. Bodies are in run.inl.
+/// Evaluation of value graphs at hits. Definitions are in run.inl.
 #pragma once
 
 #include "wavecomb/graph/graph.h"
@@ -8,12 +8,12 @@
 
 namespace wavecomb {
 
-/// What graphs may ask of a hit; fields are those of GraphInput. Only uv and its width are needed
-/// where no graph reads more.
+/// Inputs of value graphs at a hit; see GraphInput for the members. Inputs other than uv and
+/// footprint need to be set only if a graph reads them.
 template <typename F>
 struct GraphPoint {
   Vec2<F> uv{F(0.f), F(0.f)};
-  Footprint<F> footprint = F(0.f);  ///< the ray's in uv
+  Footprint<F> footprint = F(0.f);  ///< ray footprint in uv
   Vec3<F> position = Vec3<F>(F(0.f)), local_position = Vec3<F>(F(0.f));
   Vec3<F> normal{F(0.f), F(0.f), F(1.f)}, local_normal{F(0.f), F(0.f), F(1.f)};
   Vec3<F> tangent{F(1.f), F(0.f), F(0.f)};
@@ -21,18 +21,18 @@ struct GraphPoint {
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
   Vec3<F> normal_x{F(1.f), F(0.f), F(0.f)}, normal_y{F(0.f), F(1.f), F(0.f)},
       normal_z{F(0.f), F(0.f), F(1.f)};
-  MeshPlace<F> place;  ///< where attributes are read
+  MeshPlace<F> place;  ///< position on the mesh, for attributes
 };
 
-/// Runs program `program` at `at`, the same in all active lanes; `registers` holds
-/// kMaxGraphRegisters. A lane's results depend on nothing but its own point. Images are read as
-/// `textures` have them.
+/// Runs `program` for all active lanes at `at`. `registers` has room for kMaxGraphRegisters values
+/// and receives the results. The result of a lane depends on its own point only. `textures`:
+/// textures of the scene that images refer to.
 template <typename F>
 [[gnu::noinline]] void run_graph(const GraphView& view, const GraphProgram& program,
                                  const TextureView* textures, const GraphPoint<F>& at,
                                  const Mask<F>& active, F* registers);
 
-/// What a program's output is after run_graph.
+/// Returns the value of an output after run_graph.
 template <typename F>
 inline F graph_output(const GraphView& view, const GraphProgram& program, const GraphOutput& output,
                       const F* registers) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of run.h, for the units that instantiate them.
+/// Definitions for run.h; include only where the templates are instantiated.
 #pragma once
 
 #include "wavecomb/graph/noise.h"
@@ -38,7 +38,7 @@ inline Vec3<F> input_value(const GraphPoint<F>& at, GraphInput input) {
   return Vec3<F>(F(0.f));
 }
 
-/// Hue in turns, saturation and value (Smith, "Color Gamut Transform Pairs", 1978).
+/// Returns hue in turns, saturation and value (Smith, "Color Gamut Transform Pairs", 1978).
 template <typename F>
 inline Vec3<F> rgb_to_hsv(const Vec3<F>& c) {
   const F top = max(max(c.x, c.y), c.z), low = min(min(c.x, c.y), c.z), range = top - low;
@@ -51,11 +51,12 @@ inline Vec3<F> rgb_to_hsv(const Vec3<F>& c) {
   const F saturation = select(top > 0.f, F(range / select(top > 0.f, top, F(1.f))), F(0.f));
   return {select(grey, F(0.f), hue), saturation, top};
 }
+/// Inverse of rgb_to_hsv; hue wraps around.
 template <typename F>
 inline Vec3<F> hsv_to_rgb(const Vec3<F>& c) {
   const F turns = noise::bounded<F>(c.x), hue = (turns - floor(turns)) * 6.f;
   const auto channel = [&](float shift) {
-    // 1 over two sixths of the circle, 0 over two, ramps between: value times what it leaves.
+    // The ramp is 1 over two sixths of the hue circle, 0 over two sixths, and linear in between.
     const F k = hue + shift, wrapped = select(k >= 6.f, F(k - 6.f), k);
     const F ramp = clamp(min(wrapped, F(4.f - wrapped)), F(0.f), F(1.f));
     return F(c.z * fma(-c.y, ramp, F(1.f)));
@@ -63,7 +64,7 @@ inline Vec3<F> hsv_to_rgb(const Vec3<F>& c) {
   return {channel(5.f), channel(3.f), channel(1.f)};
 }
 
-/// sin or cos of radians as core/math.h gives them, wherever x is.
+/// Returns sin and cos of an angle in radians, which may be large or NaN.
 template <typename F>
 inline SinCos<F> sincos_radians(const F& x) {
   const F turns = x * kInv2Pi;
@@ -75,13 +76,13 @@ inline F truth(const Mask<F>& m) {
   return select(m, F(1.f), F(0.f));
 }
 
-/// x^y; 1 for y = 0 and 0 for x < 0.
+/// Returns x^y; 1 for y = 0, and 0 for x < 0 otherwise.
 template <typename F>
 inline F power(const F& x, const F& y) {
   return select(y == 0.f, F(1.f), wavecomb::pow(x, y));
 }
 
-/// `width` values of noise: three of one hash, and a fourth from elsewhere.
+/// Computes `width` noise values: three from one hash, and a fourth at an offset position.
 template <typename F, size_t N>
 inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   if (width == 1) {
@@ -98,7 +99,7 @@ inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   noise::perlin<1, F>(q, out + 3);
 }
 
-/// Octaves of gradient noise, each `lacunarity` times finer and `diminish` times weaker.
+/// Sums `count` octaves of gradient noise, each `lacunarity` times finer and scaled by `diminish`.
 template <size_t K, typename F>
 inline void octaves(const F (&p)[3], uint32_t count, const F& lacunarity, const F& diminish,
                     F* out) {
@@ -143,7 +144,7 @@ template <typename F>
       return (from & kGraphConstant) != 0 ? F(constants[from & (kGraphConstant - 1u)])
                                           : registers[from];
     };
-    // No result takes the place of one of its own operands, which are read while it is written.
+    // An operation reads its operands while it writes results, so check_graph forbids overlap.
     const auto one = [&](const auto& f) {
       for (uint32_t i = 0; i < width; ++i) to[i] = f(in(0, i));
     };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// One parameter that a value graph drives.
+/// Evaluation of single parameters that a value graph drives.
 #pragma once
 
 #include "wavecomb/graph/parameters.h"
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Calls f(program, lanes) for each program among the active lanes, those of one in one call.
-/// `graph` is an id or kNoGraph in each lane.
+/// Calls f(program, lanes) once for each distinct program among the active lanes. `graph` holds a
+/// program index or kNoGraph in each lane.
 template <typename F, typename Function>
 inline void for_each_graph(const UInt<F>& graph, const Mask<F>& active, const Function& f) {
   Mask<F> pending = active & Mask<F>(graph != UInt<F>(kNoGraph));
@@ -21,13 +21,13 @@ inline void for_each_graph(const UInt<F>& graph, const Mask<F>& active, const Fu
   }
 }
 
-/// The value of component `i` of all parameters, in the range of that one.
+/// Clamps a graph value to the range of component `i`.
 template <typename F>
 inline F sane_output(uint32_t i, const F& value) {
   return clamp(value, F(kGraphRanges.low[i]), F(kGraphRanges.high[i]));
 }
 
-/// Components first, first + 1 and first + 2 where lanes' graphs drive them, else those of `plain`.
+/// Returns components first .. first + 2 where the lanes' graphs drive them, else those of `plain`.
 template <typename F>
 [[gnu::noinline]] Vec3<F> graph_value(const MaterialView& view, const UInt<F>& graph,
                                       uint32_t first, const GraphPoint<F>& at,
