@@ -577,7 +577,7 @@ TEST(Tiles, BadOnesAreRefusedByName) {
   EXPECT_EQ(refuse({{1101, tile}}), "texture 'face': tile 1101 is not one of 1001 to 1100");
   EXPECT_EQ(refuse({{1000, tile}}), "texture 'face': tile 1000 is not one of 1001 to 1100");
   EXPECT_EQ(refuse({{1004, tile}, {1004, tile}}), "texture 'face': has tile 1004 twice");
-  EXPECT_EQ(refuse({{1004, whole}}), "texture 'face': tile 1004 is no plain texture");
+  EXPECT_EQ(refuse({{1004, whole}}), "texture 'face': tile 1004 is not a plain texture");
 }
 
 TEST(Texture, BadValuesBecome0AndAreCounted) {

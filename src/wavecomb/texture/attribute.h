@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads values that vary over meshes at hits.
+/// Lookup of mesh attributes (primvars) at hits.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// A place on a mesh: its number, primitive, and barycentrics of vertices 1 and 2, or along a
-/// segment in u.
+/// Position on a mesh: mesh and primitive index, and the barycentric coordinates u and v of
+/// vertices 1 and 2 of a triangle. For curves, u is the position along the segment.
 template <typename F>
 struct MeshPlace {
   UInt<F> mesh = UInt<F>(kNoMesh), prim = UInt<F>(0u);
@@ -19,7 +19,7 @@ struct MeshPlace {
 
 namespace detail {
 
-/// The attribute `id` of a mesh with at least `width` components; null where it has none.
+/// Returns attribute `id` of a mesh if it has at least `width` components, else null.
 inline const AttributeRecord* find_attribute(const AttributeView& view, uint32_t mesh, uint32_t id,
                                              uint32_t width) {
   const AttributeRecord* record = view.records + view.of_mesh[mesh];
@@ -27,8 +27,8 @@ inline const AttributeRecord* find_attribute(const AttributeView& view, uint32_t
   return record->id == id && record->width >= width ? record : nullptr;
 }
 
-/// Which of the values are at the three corners of a triangle, or at the ends of a segment (the
-/// last one twice).
+/// Computes the indices of the values at the three corners of a triangle, or at the two ends of a
+/// segment; for segments, the third index repeats the first.
 inline void corner_values(const AttributeRecord& record, uint32_t prim, size_t (&at)[3]) {
   const size_t first = prim;
   switch (record.rate) {
@@ -55,11 +55,11 @@ inline void corner_values(const AttributeRecord& record, uint32_t prim, size_t (
 
 }  // namespace detail
 
-/// Puts `width` (1 to 4) components of attribute `id` into `out`, linear between corners; lanes
-/// whose mesh has no such attribute, or one of fewer components, keep what is there.
+/// Writes `width` (1 to 4) components of attribute `id` to `out`, linearly interpolated between
+/// corners. Lanes whose mesh lacks the attribute, or has fewer components, keep their value.
 ///
-/// The addresses differ by lane, so corners are fetched lane by lane; the arithmetic is the same
-/// for packets and for scalars.
+/// Addresses differ by lane, so values are fetched lane by lane; the arithmetic is the same for
+/// packets and scalars.
 template <typename F>
 inline void read_attribute(const AttributeView& view, uint32_t id, uint32_t width,
                            const MeshPlace<F>& place, const Mask<F>& active, F* out) {
@@ -77,7 +77,7 @@ inline void read_attribute(const AttributeView& view, uint32_t id, uint32_t widt
     const AttributeRecord* record = detail::find_attribute(view, mesh.value[i], id, width);
     if (record == nullptr) continue;
     found.value[i] = 1u;
-    // Ends of curves are met a little beyond them.
+    // Hits at the ends of a curve may lie slightly beyond them.
     if (record->rate == AttributeRate::kEnd) {
       if (!(along[i] > 0.f)) along[i] = 0.f;
       if (along[i] > 1.f) along[i] = 1.f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Values that vary over meshes (primvars), as data.
+/// Packed mesh attributes (primvars).
 #pragma once
 
 #include <cstdint>
@@ -7,23 +7,23 @@
 namespace wavecomb {
 
 inline constexpr uint32_t kNoAttribute = 0xffffffffu;
-/// A mesh that has no attributes, whatever the scene.
+/// Mesh index that means "no attributes" in every scene.
 inline constexpr uint32_t kNoMesh = 0xffffffffu;
 
-/// Where the values of an attribute are.
+/// Interpolation of an attribute.
 enum class AttributeRate : uint32_t {
-  kConstant,   ///< one for all
-  kPrimitive,  ///< one per triangle, segment of a curve, or point
-  kVertex,     ///< one per vertex of triangles
-  kCorner,     ///< 3 per triangle in order
-  kEnd,        ///< 2 per segment of a curve
+  kConstant,   ///< one value per mesh
+  kPrimitive,  ///< one value per triangle, curve segment or point
+  kVertex,     ///< one value per vertex of a triangle mesh
+  kCorner,     ///< three values per triangle, in corner order
+  kEnd,        ///< two values per curve segment
 };
 
-/// An attribute of a mesh. Those of one mesh lie side by side; behind the last is one with the id
+/// Attribute of a mesh. The records of a mesh are contiguous and end with one whose id is
 /// kNoAttribute.
 struct AttributeRecord {
-  uint64_t values;   ///< floats, `width` for each value
-  uint64_t indices;  ///< kVertex: 3 per triangle
+  uint64_t values;   ///< address of floats, `width` per value
+  uint64_t indices;  ///< address of three vertex indices per triangle, for kVertex
   uint32_t id;
   AttributeRate rate;
   uint32_t width;
@@ -31,10 +31,10 @@ struct AttributeRecord {
 };
 static_assert(sizeof(AttributeRecord) == 32);
 
-/// What kernels need of all attributes.
+/// Read-only view of all attributes for kernels.
 struct AttributeView {
   const AttributeRecord* records = nullptr;
-  const uint32_t* of_mesh = nullptr;  ///< first record of each mesh; null: no mesh has any
+  const uint32_t* of_mesh = nullptr;  ///< first record of each mesh; null if no mesh has attributes
 };
 
 }  // namespace wavecomb

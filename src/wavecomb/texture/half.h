@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-/// IEEE 754 binary16 from and to float.
+/// Conversion between IEEE 754 binary16 and float.
 #pragma once
 
 #include "wavecomb/core/lanes.h"
 
 namespace wavecomb {
 
-/// The float of the half in the low 16 bits; exact, infinities and NaN included. No denormal float
-/// takes part, so that flush-to-zero modes change nothing.
+/// Converts the half in the low 16 bits to float. Exact, including infinities and NaN. Uses no
+/// denormal floats, so that flush-to-zero modes have no effect.
 template <typename F>
 inline F half_to_float(const UInt<F>& half) {
   const UInt<F> exponent = half & 0x7c00u;
   const UInt<F> shifted = (half & 0x7fffu) << 13;
-  // Rebias the exponent by 127 - 15 = 112; infinity and NaN once more, from 143 to 255.
+  // Rebias the exponent by 127 - 15 = 112, and for infinity and NaN twice (31 to 143 to 255).
   const UInt<F> again = select(exponent == UInt<F>(0x7c00u), UInt<F>(112u << 23), UInt<F>(0u));
   const UInt<F> normal = shifted + (112u << 23) + again;
   const F denormal = F(Int<F>(half & 0x3ffu)) * 0x1p-24f;
@@ -20,14 +20,14 @@ inline F half_to_float(const UInt<F>& half) {
   return bits_float<F>(bits | ((half & 0x8000u) << 16));
 }
 
-/// The nearest half, ties to even; overflow gives infinity, NaN stays NaN. Without branches, so
-/// that loops over it become vector code.
+/// Converts to the nearest half, ties to even. Overflow gives infinity; NaN stays NaN. Branch-free,
+/// so that compilers vectorise loops over it.
 inline uint16_t float_to_half(float x) {
   const uint32_t bits = float_bits<float>(x);
   const uint32_t sign = (bits >> 16) & 0x8000u;
   const uint32_t magnitude = bits & 0x7fffffffu;
   const uint32_t rounded = (magnitude + 0xfffu + ((magnitude >> 13) & 1u) - (112u << 23)) >> 13;
-  // Below 2^-14: the multiple of 2^-24 that 2^-1 has as its last bits in a sum.
+  // Below 2^-14, adding 0.5 rounds to a multiple of 2^-24 in the low bits of the sum.
   const uint32_t small =
       float_bits<float>(bits_float<float>(magnitude) + 0.5f) - float_bits<float>(0.5f);
   uint32_t half = magnitude < 0x38800000u ? small : rounded;

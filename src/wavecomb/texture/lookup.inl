@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of lookup.h, for the units that instantiate them.
+/// Definitions for lookup.h; include only where the templates are instantiated.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -12,26 +12,26 @@ namespace wavecomb {
 
 namespace detail {
 
-/// a + (b - a) t: exactly a where a == b.
+/// Returns a + (b - a) t, which is exactly a if a == b.
 template <typename F>
 inline Texel<F> lerp_texel(const Texel<F>& a, const Texel<F>& b, const F& t) {
   return {fma(F(b.r - a.r), t, a.r), fma(F(b.g - a.g), t, a.g), fma(F(b.b - a.b), t, a.b),
           fma(F(b.a - a.a), t, a.a)};
 }
 
-/// Size and place of the mip level that each lane reads.
+/// Size and storage offset of the mip level of each lane.
 template <typename F>
 struct LevelLanes {
   UInt<F> width, height, tiles_x, offset;
 };
 
-/// The same level in all lanes.
+/// Returns the same level in all lanes.
 template <typename F>
 inline LevelLanes<F> broadcast_level(const TextureLevel& level) {
   using U = UInt<F>;
   return {U(level.width), U(level.height), U(level.tiles_x), U(level.offset)};
 }
-/// Level `index` (< level_count) in each lane.
+/// Returns level `index` (< level_count) in each lane.
 template <typename F>
 inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& index,
                                   const Mask<F>& active) {
@@ -42,15 +42,15 @@ inline LevelLanes<F> gather_level(const TextureView& texture, const UInt<F>& ind
           word(word_of(&TextureLevel::tiles_x)), word(word_of(&TextureLevel::offset))};
 }
 
-/// Two neighbouring texels along one axis and how far the point is from the first to the second.
+/// Two neighbouring texels along one axis, and the interpolation weight.
 template <typename F>
 struct Taps {
-  UInt<F> i0, i1;    ///< always below the size
-  F weight;          ///< of i1, in [0, 1)
-  Mask<F> in0, in1;  ///< false: the tap is off the image of a texture that is black there
+  UInt<F> i0, i1;    ///< indices, always below the size
+  F weight;          ///< weight of i1, in [0, 1)
+  Mask<F> in0, in1;  ///< false if the tap is outside the image with Wrap::kBlack
 };
 
-/// Brings a coordinate into [0, 1] (black: [-2, 3]); NaN gives 0.
+/// Maps a coordinate into [0, 1], or [-2, 3] for Wrap::kBlack; NaN becomes 0.
 template <typename F>
 inline F wrap_coordinate(Wrap wrap, const F& x) {
   const F zero(0.f), one(1.f);
@@ -69,7 +69,7 @@ inline F wrap_coordinate(Wrap wrap, const F& x) {
   return zero;
 }
 
-/// The taps at `x` texels from the image's edge, minus a half: texel i has its centre at x = i.
+/// Returns the taps at texel coordinate `x`, where texel i has its centre at x = i.
 template <typename F>
 inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
   const F base = floor(x);
@@ -78,7 +78,7 @@ inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
   const Mask<F> a_low = Mask<F>(a < zero), b_high = Mask<F>(b > last);
   Taps<F> taps{UInt<F>(0u), UInt<F>(0u), F(x - base), Mask<F>(true), Mask<F>(true)};
   if (wrap == Wrap::kRepeat) {
-    // a is -1 to size - 1 (size where rounding took x there), b one more.
+    // a lies in [-1, size - 1], or is `size` after rounding; b = a + 1.
     const Int<F> a_in = select(Mask<F>(a > last), zero, a);
     taps.i0 = UInt<F>(select(a_low, last, a_in));
     taps.i1 = UInt<F>(select(
@@ -98,7 +98,7 @@ inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
   return taps;
 }
 
-/// Storage index, in texels, of column x and row y of a level.
+/// Returns the storage index, in texels, of column x and row y of a level.
 template <typename F>
 inline UInt<F> texel_place(const LevelLanes<F>& level, const UInt<F>& x, const UInt<F>& y) {
   static_assert(TextureView::kTile == 8);
@@ -111,14 +111,14 @@ inline UInt<F> fetch_word(const TextureView& texture, const UInt<F>& word, const
   return float_bits<F>(gather<F>(texture.texels, word, active));
 }
 
-/// Linear value of a byte.
+/// Converts a byte to its linear value.
 template <typename F>
 inline F decode_u8(bool srgb, const UInt<F>& byte) {
   if (srgb) return lookup256<F>(kSrgbToLinear.data(), byte);
   return F(Int<F>(byte)) * (1.f / 255.f);
 }
 
-/// The texel at storage place `i`.
+/// Reads the texel at storage index `i`.
 template <typename F>
 inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F>& active) {
   const F one(1.f);
@@ -159,8 +159,8 @@ inline Texel<F> fetch(const TextureView& texture, const UInt<F>& i, const Mask<F
   return t;
 }
 
-/// The texel of column x and row y of a level; `in`: whether they are on the image, which is black
-/// beyond it where the texture wraps so.
+/// Reads the texel at column x and row y of a level. `in` is false for taps outside the image,
+/// which are black with Wrap::kBlack.
 template <typename F>
 inline Texel<F> tap(const TextureView& texture, const LevelLanes<F>& level, const UInt<F>& x,
                     const UInt<F>& y, const Mask<F>& in, const Mask<F>& active) {
@@ -170,12 +170,12 @@ inline Texel<F> tap(const TextureView& texture, const LevelLanes<F>& level, cons
   return select_texel<F>(in, texel, {zero, zero, zero, texture.has_alpha ? zero : F(1.f)});
 }
 
-/// Bilinear lookup in one level; s and t as wrap_coordinate gives them.
+/// Bilinear lookup in one level; s and t must come from wrap_coordinate.
 template <typename F>
 inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level, const F& s,
                          const F& t, const Mask<F>& active) {
   const F width(Int<F>(level.width)), height(Int<F>(level.height));
-  // Rows count from the top, t from the bottom.
+  // Rows are stored from the top, but t points up.
   const Taps<F> x = make_taps<F>(texture.wrap_s, fma(s, width, F(-0.5f)), level.width);
   const Taps<F> y = make_taps<F>(texture.wrap_t, fnma(t, height, F(height - 0.5f)), level.height);
   const auto at = [&](const UInt<F>& i, const UInt<F>& j, const Mask<F>& in) {
@@ -188,7 +188,7 @@ inline Texel<F> bilinear(const TextureView& texture, const LevelLanes<F>& level,
   return lerp_texel<F>(top, low, y.weight);
 }
 
-/// One texel of one level, each with the probability that is its weight in `bilinear`.
+/// Reads one texel of one level, chosen with its weight in `bilinear` as probability.
 template <typename F>
 inline Texel<F> one_texel(const TextureView& texture, const LevelLanes<F>& level, const F& s,
                           const F& t, const Footprint<F>& footprint, const Mask<F>& active) {
@@ -199,7 +199,7 @@ inline Texel<F> one_texel(const TextureView& texture, const LevelLanes<F>& level
   return tap<F>(texture, level, x.i0, y.i0, x.in0 & y.in0, active);
 }
 
-/// `lookup` in a texture that is not made of tiles.
+/// `lookup` in a texture without UDIM tiles.
 template <typename F>
 inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
                              const Footprint<F>& footprint, const Mask<F>& active) {
@@ -216,7 +216,7 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
                                : bilinear<F>(texture, level, s_in, t_in, active);
   }
   const uint32_t last = texture.level_count - 1;
-  // Lanes that are not coarse have lod 0: level 0 with weight 0 of the next, the same as above.
+  // Lanes that are not coarse have lod 0, which gives level 0 as above.
   const F lod = min(log2(clamp(texels_wide, F(1.f), F(1e9f))), F(static_cast<float>(last)));
   if (footprint.one_texel) {
     const F nearest = max(floor(F(lod + footprint.number(22, 10))), F(0.f));
@@ -237,14 +237,15 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
   return select_texel<F>(mixed, lerp_texel<F>(fine, rough, weight), fine);
 }
 
-/// `lookup` in a UDIM texture: `lookup_plain` once for each tile that the active lanes are in. A
-/// point on the border of two tiles belongs to the upper or right one; filters do not cross it.
+/// `lookup` in a UDIM texture: calls `lookup_plain` once for each tile that active lanes read. A
+/// point on the border of two tiles belongs to the upper or right one. Filters do not cross
+/// borders.
 template <typename F>
 [[gnu::noinline]] Texel<F> lookup_tiles(const TextureView& texture, const F& s, const F& t,
                                         const Footprint<F>& footprint, const Mask<F>& active) {
   using U = UInt<F>;
   const F zero(0.f), columns(static_cast<float>(TileSet::kColumns));
-  // NaN counts as 0; what is far off stays off and fits an integer.
+  // NaN counts as 0; coordinates far outside stay outside but fit an integer.
   const auto clean = [&](const F& x) { return clamp(select(x == x, x, zero), F(-1.f), columns); };
   const F column = floor(clean(s)), row = floor(clean(t));
   const Mask<F> inside =
@@ -270,7 +271,7 @@ template <typename F>
 inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t,
                        const Footprint<F>& footprint, const Mask<F>& active) {
   if (texture.tiles) [[unlikely]] {
-    // Copies, so that what all other textures use may stay in registers.
+    // Copies allow the values that all other textures use to stay in registers.
     const F u = s, v = t;
     const Footprint<F> f = footprint;
     const Mask<F> on = active;

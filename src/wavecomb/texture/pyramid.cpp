@@ -13,11 +13,11 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kTile = TextureView::kTile;
-/// Halvings that one task carries out on its own rows, while they are in the cache.
+/// Number of halvings that one task applies to its rows while they are in the cache.
 constexpr uint32_t kBandLevels = 6;
 
-/// Source texels under destination texel i of n, when `size` texels shrink to n: the first, and the
-/// part of each that is covered (source texels; they sum to size / n).
+/// Source texels under destination texel i of n when `size` texels are reduced to n: index of the
+/// first, and the weight of each, proportional to the covered part; weights sum to 1.
 struct Box {
   uint32_t first;
   std::vector<float> weights;
@@ -25,7 +25,7 @@ struct Box {
 std::vector<Box> make_boxes(uint32_t size, uint32_t n) {
   std::vector<Box> boxes(n);
   for (uint64_t i = 0; i < n; ++i) {
-    // Exact in units of 1 / n source texels.
+    // Integer arithmetic in units of 1 / n source texels is exact.
     const uint64_t begin = i * size, end = begin + size;
     boxes[i].first = static_cast<uint32_t>(begin / n);
     for (uint64_t j = begin / n; j * n < end; ++j) {
@@ -36,7 +36,7 @@ std::vector<Box> make_boxes(uint32_t size, uint32_t n) {
   return boxes;
 }
 
-/// Adds `weight` times a row that is shrunk by boxes to `to`.
+/// Filters a row with `columns` and adds it, times `weight`, to `to`.
 void add_row(const std::vector<Box>& columns, uint32_t channels, float weight, const float* from,
              float* to) {
   for (size_t x = 0; x < columns.size(); ++x) {
@@ -50,26 +50,26 @@ void add_row(const std::vector<Box>& columns, uint32_t channels, float weight, c
   }
 }
 
-/// The same for two rows and boxes of two texels: n texels at `to`.
+/// Averages boxes of 2 x 2 texels of the rows `a` and `b`: n texels at `to`.
 template <uint32_t C>
 void average_rows(const float* a, const float* b, size_t n, float* to) {
   for (size_t x = 0; x < n; ++x)
     for (uint32_t c = 0; c < C; ++c) {
       const float upper = 0.5f * a[2 * x * C + c] + 0.5f * a[2 * x * C + C + c];
       const float lower = 0.5f * b[2 * x * C + c] + 0.5f * b[2 * x * C + C + c];
-      // As sums that start from 0, so that they are never -0.
+      // Adding 0 prevents -0, as in add_row, whose sums start from 0.
       to[x * C + c] = 0.5f * upper + 0.5f * lower + 0.f;
     }
 }
 
-/// One texture under construction.
+/// Builder of one texture's mip levels.
 class Pyramid {
  public:
   Pyramid(const TextureDesc& desc, const TextureView& view, std::byte* storage)
       : desc_(desc), view_(view), storage_(storage), channels_(view.channels) {
     for (uint32_t n = 1; n < view.level_count; ++n)
       columns_.push_back(make_boxes(view.levels[n - 1].width, view.levels[n].width));
-    // A band starts and ends with a texel of the level at its top.
+    // Each row of level band_top_ is one band, so lower levels must divide evenly into bands.
     while (band_top_ + 1 < view.level_count && band_top_ < kBandLevels &&
            view.levels[band_top_].height % 2 == 0)
       ++band_top_;
@@ -104,7 +104,7 @@ class Pyramid {
   }
 
  private:
-  /// Two rows of each level of a band.
+  /// Buffers for two rows of each level of a band.
   class Scratch {
    public:
     explicit Scratch(const Pyramid& p) {
@@ -127,7 +127,7 @@ class Pyramid {
 
   size_t row_size(uint32_t level) const { return size_t{view_.levels[level].width} * channels_; }
 
-  /// Texels of tiles beyond the edge of a level are 0.
+  /// Zeroes the tiles at the edges of levels, whose texels outside the image stay 0.
   void clear_margins() {
     for (uint32_t n = 0; n < view_.level_count; ++n) {
       const TextureLevel& level = view_.levels[n];
@@ -138,7 +138,7 @@ class Pyramid {
     }
   }
 
-  /// Row y of a level at or below the top of the bands, to `out` and to the storage.
+  /// Computes row y of a level up to band_top_ recursively, and writes it to `out` and the storage.
   void make_row(uint32_t level, uint32_t y, float* out, Scratch& scratch,
                 std::vector<PyramidTotals>& totals) {
     if (level == 0) {
@@ -164,7 +164,7 @@ class Pyramid {
     store_row(level, y, out, totals[size_t{y} << level]);
   }
 
-  /// Level n of the one before, which is `image`, or the caller's pixels where n is 1.
+  /// Computes level n from level n - 1, which is `image`, or from the caller's pixels if n is 1.
   void shrink(uint32_t n, std::vector<float>& image, std::vector<float>& next,
               const ForEach& for_each, std::vector<PyramidTotals>& totals) {
     const auto rows = make_boxes(view_.levels[n - 1].height, view_.levels[n].height);
@@ -181,7 +181,7 @@ class Pyramid {
     });
   }
 
-  // ---- the caller's pixels, as linear floats with the channels that are stored ----
+  // ---- reading the caller's pixels as linear floats with the stored channels ----
 
   PyramidTotals read_row(uint32_t y, float* out) const {
     switch (desc_.channels) {
@@ -237,9 +237,9 @@ class Pyramid {
     return totals;
   }
 
-  // ---- the storage ----
+  // ---- writing the storage ----
 
-  /// Stores a row, and notes in `totals` between what its values are.
+  /// Stores a row and adds its value range to `totals`.
   void store_row(uint32_t level, uint32_t y, const float* row, PyramidTotals& totals) {
     switch (view_.format) {
       case TexelFormat::kU8:
@@ -294,7 +294,7 @@ class Pyramid {
   const TextureView& view_;
   std::byte* storage_;
   uint32_t channels_;
-  uint32_t band_top_ = 0;  ///< level of which a band is one row
+  uint32_t band_top_ = 0;  ///< level of which one row makes a band
   std::vector<std::vector<Box>> columns_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Between what the values of a row of texels lie, while the row is stored.
+/// Value range of a row of texels, computed while the row is stored.
 #pragma once
 
 #include <algorithm>
@@ -12,11 +12,11 @@
 
 namespace wavecomb {
 
-/// The least and the largest of values that are stored as T, of C interleaved channels. They are
-/// noted `kRow` at a time, each place of those apart, so that they are compared in lanes.
+/// Minimum and maximum of values that are stored as T, with C interleaved channels. Values are
+/// added `kRow` at a time with a separate range per position, so that the comparisons vectorise.
 ///
-/// Codes of halfs are not in the order of what they stand for, so that these are noted as they are
-/// before they are stored; those of bytes are, and are less to go through.
+/// Bytes are compared as stored codes, which sort like their values and are smaller. Codes of halfs
+/// do not sort like their values, so those are compared before encoding.
 template <typename T, size_t C, size_t kRow>
 class RowRange {
   static constexpr bool kByCode = std::is_same_v<T, uint8_t>;
@@ -28,14 +28,15 @@ class RowRange {
     std::fill(high_, high_ + kRow, std::numeric_limits<Value>::lowest());
   }
 
-  /// `n` values, at least C and kRow at most, and what they are stored as.
+  /// Adds `n` values, C <= n <= kRow, and their stored codes.
   void note(const float* values, const T* codes, size_t n) {
     const Value* noted;
     if constexpr (kByCode)
       noted = codes;
     else
       noted = values;
-    // Copies, which alias nothing: the loops are of a known length, and become a few comparisons.
+    // Local copies do not alias and have a fixed length, so that the loops become a few
+    // comparisons.
     Value all[kRow];
     if (n == kRow) {
       std::copy_n(noted, kRow, all);
@@ -46,8 +47,8 @@ class RowRange {
     for (size_t i = 0; i < kRow; ++i) high_[i] = std::max(high_[i], all[i]);
   }
 
-  /// Adds the range of what was stored to `totals`: encode(value, channel) is what a value is
-  /// stored as, decode(code, channel) what that stands for.
+  /// Adds the range of the stored values to `totals`. encode(value, channel) returns the stored
+  /// code of a value; decode(code, channel) returns its linear value.
   template <typename Encode, typename Decode>
   void add_to(PyramidTotals& totals, const Encode& encode, const Decode& decode) const {
     const auto stored = [&](Value value, size_t c) {

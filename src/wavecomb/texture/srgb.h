@@ -10,18 +10,18 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Linear light of the encoded value c in [0, 1], in double precision.
+/// Converts an sRGB-encoded value c in [0, 1] to linear, in double precision.
 constexpr double srgb_to_linear(double c) {
   if (c <= 0.04045) return c / 12.92;
   const double x = (c + 0.055) / 1.055;
-  // x^2.4 = x^2 y with y the fifth root of x^2, by Newton's method from above.
+  // x^2.4 = x^2 y, where y is the fifth root of x^2, by Newton's method starting above the root.
   const double x2 = x * x;
   double y = 1;
   for (int i = 0; i < 60; ++i) y -= (y * y * y * y * y - x2) / (5 * y * y * y * y);
   return x2 * y;
 }
 
-/// Linear light of (i + offset) / 255.
+/// Returns a table of the linear values of (i + offset) / 255.
 constexpr std::array<float, 256> make_srgb_table(double offset) {
   std::array<float, 256> table{};
   for (int i = 0; i < 256; ++i) {
@@ -32,20 +32,21 @@ constexpr std::array<float, 256> make_srgb_table(double offset) {
 
 }  // namespace detail
 
-/// Linear light of each 8-bit sRGB value.
+/// Linear value of each 8-bit sRGB code.
 inline constexpr std::array<float, 256> kSrgbToLinear = detail::make_srgb_table(0);
 
 namespace detail {
 
-/// Entry i lies half a step above the 8-bit value i.
+/// Linear value half a code above each 8-bit sRGB code: the rounding boundaries.
 inline constexpr std::array<float, 256> kSrgbSteps = make_srgb_table(0.5);
 
-/// Floats from 2^-13 to 1 in buckets by exponent and 8 bits of mantissa: none holds two steps.
+/// Buckets of floats from 2^-13 to 1 by exponent and 8 mantissa bits. Each holds at most one
+/// rounding boundary.
 inline constexpr int kSrgbBucketShift = 23 - 8;
 inline constexpr uint32_t kSrgbFirstBits = (127u - 13u) << 23;
 inline constexpr uint32_t kSrgbBuckets = (13u << 8) + 1;
 
-/// Value at the lower end of each bucket.
+/// Returns the sRGB code at the lower end of each bucket.
 constexpr std::array<uint8_t, kSrgbBuckets> make_srgb_buckets() {
   std::array<uint8_t, kSrgbBuckets> buckets{};
   uint32_t value = 0;
@@ -60,7 +61,7 @@ inline constexpr std::array<uint8_t, kSrgbBuckets> kSrgbBucket = make_srgb_bucke
 
 }  // namespace detail
 
-/// The 8-bit sRGB value nearest to a linear one (nearest as encoded); NaN gives 0.
+/// Converts a linear value to the nearest 8-bit sRGB code (nearest after encoding); NaN gives 0.
 inline uint8_t linear_to_srgb(float linear) {
   const float x = linear > 0x1p-13f ? (linear < 1.f ? linear : 1.f) : 0x1p-13f;
   const uint32_t bits = std::bit_cast<uint32_t>(x) - detail::kSrgbFirstBits;

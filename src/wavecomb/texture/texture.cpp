@@ -15,9 +15,9 @@ namespace wavecomb {
 namespace {
 
 constexpr std::align_val_t kAlignment{64};
-constexpr uint64_t kMaxBytes = uint64_t{1}
-                               << 33;  // 2^31 words: what a signed 32-bit gather reaches
-constexpr uint64_t kMaxTexels = uint64_t{1} << 32;  // what lanes number them by
+/// 2^31 words, the range of a gather with signed 32-bit indices.
+constexpr uint64_t kMaxBytes = uint64_t{1} << 33;
+constexpr uint64_t kMaxTexels = uint64_t{1} << 32;  ///< range of 32-bit texel indices
 
 using Color4 = std::array<float, 4>;
 
@@ -36,11 +36,11 @@ void check(const TextureDesc& desc) {
   if (!desc.data) throw Error(where + "has no data");
 }
 
-/// What lookups may give of texels of [low, high].
+/// Returns a bound of lookup results for texels in [low, high].
 ///
-/// A filter takes a + (b - a) t up to three times, t in [0, 1]. Where all texels are the same that
-/// is exact; else each step is off by its two roundings, at most. No step leads past 0: where a and
-/// b are at least 0, b - a is at least -a when rounded, too, and so is its product with t.
+/// A filter interpolates a + (b - a) t up to three times with t in [0, 1]. If all texels are equal,
+/// this is exact; otherwise each step adds at most two rounding errors. No step crosses 0: for a
+/// and b >= 0, the rounded b - a is at least -a, and so is its product with t.
 TexelRange filtered(const TexelRange& texels) {
   constexpr float kRoundings = 1e-6f;
   TexelRange range = texels;
@@ -54,7 +54,7 @@ TexelRange filtered(const TexelRange& texels) {
   return range;
 }
 
-/// What lookups may give of the texels that a pyramid has.
+/// Returns a bound of lookup results for the texels of a pyramid.
 TexelRange range_of(const TextureView& view, const PyramidTotals& totals) {
   TexelRange range{{0, 0, 0, 1}, {0, 0, 0, 1}};
   for (size_t c = 0; c < view.channels; ++c) {
@@ -87,7 +87,7 @@ uint64_t lay_out(const TextureDesc& desc, TextureView& view) {
   uint32_t width = desc.width, height = desc.height;
   for (uint32_t& n = view.level_count; n < TextureView::kMaxLevels;) {
     const uint32_t tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;
-    // Of images that are refused below, it may not fit.
+    // The offset may overflow for images that are rejected below.
     view.levels[n++] = {width, height, tiles_x, static_cast<uint32_t>(texels)};
     texels += uint64_t{tiles_x} * tiles_y * kTile * kTile;
     if (width == 1 && height == 1) break;
@@ -173,7 +173,7 @@ Texture::Texture(std::string name,
       throw Error(where + "tile " + std::to_string(number) + " is not one of 1001 to 1100");
     if (tile_set_->views[i]) throw Error(where + "has tile " + std::to_string(number) + " twice");
     if (!tile || tile->view().tiles)
-      throw Error(where + "tile " + std::to_string(number) + " is no plain texture");
+      throw Error(where + "tile " + std::to_string(number) + " is not a plain texture");
     tile_set_->views[i] = &tile->view();
     for (size_t c = 0; c < 4; ++c) sum[c] += tile->mean()[c];
     range_.add(tile->range());

@@ -19,7 +19,7 @@ int open_unnamed(const std::string& folder) {
   const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0) return file;
 #endif
-  // Not every file system can do that.
+  // Fallback for file systems without O_TMPFILE: create a named file and unlink it.
   std::string path = folder + "/wavecomb-textures-XXXXXX";
   const int named = ::mkstemp(path.data());
   if (named < 0) return -1;
@@ -75,7 +75,7 @@ bool TileFile::read(std::byte* to, size_t bytes, uint64_t offset) const {
 
 void TileFile::discard(uint64_t offset, uint64_t bytes) {
 #if defined(FALLOC_FL_PUNCH_HOLE)
-  // Only saves room: where the file system cannot do it, the next texture there takes the place.
+  // Only frees disk space. If unsupported, the next texture stored here reuses the space.
   [[maybe_unused]] const int done =
       ::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset),
                   static_cast<off_t>(bytes));

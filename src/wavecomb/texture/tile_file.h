@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A temporary file that has no name.
+/// Unnamed temporary file.
 #pragma once
 
 #include <atomic>
@@ -9,24 +9,24 @@
 
 namespace wavecomb {
 
-/// Goes when it is closed, or when the process ends in any way.
+/// Temporary file without a name. It disappears when it is closed or the process ends in any way.
 ///
-/// Contract: any thread may read and write at any time.
+/// Contract: all members may be called concurrently.
 class TileFile {
  public:
-  /// Throws Error where none can be made in `folder`.
+  /// Throws Error if no file can be created in `folder`.
   explicit TileFile(std::string folder);
   ~TileFile();
   TileFile(const TileFile&) = delete;
   TileFile& operator=(const TileFile&) = delete;
 
-  /// Writes `bytes` at `offset`. Throws Error where there is no room for them.
+  /// Writes `bytes` bytes at `offset`. Throws Error if the disk is full.
   void write(const std::byte* from, size_t bytes, uint64_t offset);
-  /// Reads what was written; false where that fails.
+  /// Reads bytes that were written before; returns false on failure.
   [[nodiscard]] bool read(std::byte* to, size_t bytes, uint64_t offset) const;
-  /// Says that a part is not needed any more.
+  /// Frees the disk space of a range that is no longer needed.
   void discard(uint64_t offset, uint64_t bytes);
-  /// Up to the last byte that was ever written.
+  /// End of the last byte ever written.
   uint64_t bytes() const { return bytes_; }
 
  private:

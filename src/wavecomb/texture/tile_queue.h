@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-/// Which tiles are in memory, and which of them goes next.
+/// Replacement policy for texture tiles in memory. Which tiles are in memory, and which of them
+/// goes next.
 #pragma once
 
 #include <cstddef>
@@ -8,38 +8,39 @@
 
 namespace wavecomb {
 
-/// Two queues of tiles. Nothing tells when a tile that is there is read, only when one is missed.
-/// So one that is missed soon after it went (before as many others went as there is room for) is
-/// taken for one that is read often, and goes to the second queue; the first one goes first. After
-/// 2Q (Johnson and Shasha, VLDB 1994) and the kernel's refault distance.
+/// Resident tiles in two queues, which decide which tile is evicted next. Reads of resident tiles
+/// cannot be observed, only misses. A tile that is missed soon after its eviction, before as many
+/// others were evicted as fit in memory, is considered hot and goes to the second queue. Tiles of
+/// the first queue are evicted first. After 2Q (Johnson and Shasha, VLDB 1994) and the refault
+/// distance of the Linux kernel.
 class TileQueue {
  public:
   enum class State : uint8_t { kAbsent, kLoading, kFirst, kSecond };
 
-  /// Makes room for tiles up to `count`, absent at first.
+  /// Extends the set of tiles to `count`; new ones are absent.
   void resize(size_t count) { tiles_.resize(count); }
   size_t size() const { return tiles_.size(); }
   size_t bytes() const { return tiles_.capacity() * sizeof(Tile); }
   State state(uint32_t tile) const { return tiles_[tile].state; }
-  /// Tiles that are loading or there.
+  /// Number of tiles that are loading or resident.
   size_t resident() const { return loading_ + queues_[0].size + queues_[1].size; }
 
-  /// Says that an absent tile is being loaded.
+  /// Marks an absent tile as loading.
   void begin(uint32_t tile);
-  /// Says that it is there; `room`: for how many there is.
+  /// Marks a loading tile as resident. `room`: number of tiles that fit in memory.
   void end(uint32_t tile, size_t room);
-  /// Forgets a tile, of which there will be another content.
+  /// Forgets a tile whose contents will be replaced.
   void drop(uint32_t tile);
-  /// Takes out the tile that goes next; false where none is there.
+  /// Removes the next tile to evict and writes it to `tile`; returns false if none is resident.
   bool release(uint32_t& tile);
 
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
-  /// The part of the room that the second queue may have, in eighths.
+  /// Maximum fraction of `room` for the second queue, in eighths.
   static constexpr size_t kSecondEighths = 6;
   struct Tile {
     uint32_t older = kNone, newer = kNone;
-    uint32_t left_at = 0;  ///< releases when it went; 0: it never did
+    uint32_t left_at = 0;  ///< value of releases_ at its last eviction; 0 if never evicted
     State state = State::kAbsent;
   };
   struct Queue {

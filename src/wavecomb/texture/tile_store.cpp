@@ -16,9 +16,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Tiles of a chunk of address space, unless a texture needs more.
+/// Tiles per chunk of address space, unless a texture needs more.
 constexpr uint32_t kChunkTiles = 4096;
-/// Readers that one thread of the store can serve; it also has the file to wait for.
+/// Number of reader threads served by one keeper thread, which also waits for the file.
 constexpr unsigned kReadersPerKeeper = 8;
 constexpr unsigned kMaxKeepers = 8;
 
@@ -64,7 +64,7 @@ uint64_t TileStore::resident_bytes() const {
 }
 
 size_t TileStore::room() const {
-  // Never so few that readers take turns for ever.
+  // Enough tiles that concurrent readers do not evict each other's tiles for ever.
   constexpr size_t kLeast = 32;
   const uint64_t own = std::min(queue_.bytes() + counts_.grid_bytes, limit_bytes_);
   return std::max<size_t>(kLeast, (limit_bytes_ - own) / tile_bytes_);
@@ -120,7 +120,7 @@ const std::byte* TileStore::add(const std::byte* data, size_t bytes) {
       }
       held_bytes_ += pages;
     } else {
-      // Nobody reads it yet, so that those who read others need not wait for the disk.
+      // No thread reads the new range yet, so release the lock: readers need not wait for the disk.
       lock.unlock();
       file_->write(data, bytes, uint64_t{first} * tile_bytes_);
       std::vector<std::byte> rest(size_t{count} * tile_bytes_ - bytes);
@@ -193,7 +193,7 @@ uint32_t TileStore::allocate(uint32_t count) {
 }
 
 void TileStore::free(uint32_t first, uint32_t count) {
-  // Joined to its neighbours, but not across chunks, which may be apart in memory.
+  // Merge with free neighbours, but not across chunks, which may not be contiguous in memory.
   const auto joins = [&](uint32_t tile) {
     return std::none_of(chunks_.begin(), chunks_.end(),
                         [&](const Chunk& chunk) { return chunk.first == tile; });
@@ -237,7 +237,7 @@ void TileStore::spill() {
     file->write(address(first), bytes, offset);
     file->write(nothing.data(), range.count * tile_bytes_ - bytes, offset + bytes);
   }
-  // Before anything leaves memory: only they bring it back.
+  // Start the threads before memory is released, since only they can bring tiles back.
   start_keepers();
   for (const auto& [first, range] : ranges_)
     faults_.release(address(first), range.count * tile_bytes_);
@@ -251,7 +251,7 @@ void TileStore::start_keepers() {
   if (!keepers_.empty()) return;
   buffers_.resize(count * tile_bytes_);
   keepers_.reserve(count);
-  // Signals are for the threads that were there before.
+  // Block signals in the new threads, so that the existing threads handle them.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -263,7 +263,7 @@ void TileStore::start_keepers() {
     reason = error.code().value();
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  // A few of them can do what all should.
+  // A few threads suffice if not all could be started.
   if (keepers_.empty()) throw Error(no_memory(reason));
 }
 
@@ -274,7 +274,7 @@ void TileStore::put(const std::byte* at, const std::byte* from, size_t bytes) {
 void TileStore::make_room() {
   uint32_t tile;
   while (queue_.resident() > room() && queue_.release(tile)) {
-    // With the lock held, so that the state of a tile is always that of its memory.
+    // The lock is held, so that the state of a tile always matches its memory.
     faults_.release(address(tile), tile_bytes_);
     ++counts_.releases;
   }
@@ -291,13 +291,13 @@ void TileStore::serve(const std::byte* at, std::byte* buffer) {
   std::unique_lock lock(mutex_);
   const uint32_t tile = tile_at(at);
   const std::byte* place = address(tile);
-  if (queue_.state(tile) == TileQueue::State::kLoading) return;  // who loads it wakes all
+  if (queue_.state(tile) == TileQueue::State::kLoading) return;  // the loading thread wakes readers
   if (queue_.state(tile) != TileQueue::State::kAbsent) return faults_.wake(place, tile_bytes_);
   queue_.begin(tile);
   make_room();
   counts_.peak_bytes = std::max(counts_.peak_bytes, resident_bytes());
   lock.unlock();
-  // Readers must go on in any case; the render is told at the next look.
+  // Readers must be resumed in any case; check() reports the failure to the render later.
   Failure failure = Failure::kNone;
   if (!file_->read(buffer, tile_bytes_, uint64_t{tile} * tile_bytes_)) {
     std::fill_n(buffer, tile_bytes_, std::byte{0});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Keeps textures within a limit of memory, beside grids of volumes, and the rest of them in a
-/// file.
+/// Storage of textures within a memory limit, which is shared with volume grids; the rest is in a
+/// temporary file.
 #pragma once
 
 #include <atomic>
@@ -19,93 +19,100 @@
 
 namespace wavecomb {
 
-/// What a store holds and did.
+/// Statistics of a TileStore.
 struct StoreStatistics {
+  /// Memory limit.
   uint64_t limit_bytes = 0;
-  uint64_t texture_bytes = 0;   ///< of all textures that are there
-  uint64_t file_bytes = 0;      ///< of the temporary file; 0: all fits in memory
-  uint64_t resident_bytes = 0;  ///< memory in use, with that of the store itself
-  uint64_t peak_bytes = 0;      ///< the most that resident_bytes ever was
-  uint64_t grid_bytes = 0;      ///< of grids of volumes, which leave less for textures
-  uint64_t loads = 0;           ///< tiles read back from the file
-  uint64_t releases = 0;        ///< tiles that made way for others
-  double load_s = 0;            ///< seconds that reading back took, summed over threads
+  uint64_t texture_bytes = 0;   ///< size of all stored textures
+  uint64_t file_bytes = 0;      ///< size of the temporary file; 0 if everything fits in memory
+  uint64_t resident_bytes = 0;  ///< memory in use, including the store's own tables
+  uint64_t peak_bytes = 0;      ///< maximum of resident_bytes
+  uint64_t grid_bytes = 0;      ///< memory of volume grids, which reduces the room for textures
+  uint64_t loads = 0;           ///< number of tiles read back from the file
+  uint64_t releases = 0;        ///< number of tiles evicted
+  double load_s = 0;            ///< seconds spent reading back, summed over threads
 };
 
-/// Memory of textures, of which at most `limit_bytes` are there at a time, with grids of volumes.
-/// Grids are in memory as a whole: what they take is taken from the textures, down to a few tiles.
+/// Texture memory of which at most `limit_bytes`, including volume grids, is resident. Grids stay
+/// in memory as a whole; their size reduces the room for textures, down to a few tiles.
 ///
-/// Readers use plain pointers. While all textures fit they lie in memory. The first one that does
-/// not fit makes the store write all to a temporary file; from then on a tile of kTileBytes comes
-/// into memory when it is read, and another one goes. Threads of the store do that while the reader
-/// waits in the kernel, so that readers see nothing of it but time.
+/// Readers use plain pointers. While all textures fit, they stay in memory. When one does not fit,
+/// the store writes all textures to a temporary file. From then on, reading an absent tile of
+/// kTileBytes loads it, and evicts another if needed. Threads of the store do this while the reader
+/// waits in a page fault, so that readers notice only the delay.
 ///
-/// Contract: any thread may call any function at any time. Who removes sees to it that nobody reads
-/// any more. Only user code may read textures: the kernel cannot, so they are passed to no system
-/// call.
+/// Contract: all members may be called concurrently. A caller of remove() must ensure that no
+/// thread reads the memory. Only user code may read textures: the kernel cannot resolve these
+/// faults, so never pass them to a system call.
 class TileStore {
  public:
-  /// What moves between memory and the file: 64 of the squares that a TextureView is made of, where
-  /// texels are four values of 8 bits.
+  /// Unit of transfer between memory and file: 64 texel tiles of a TextureView with four 8-bit
+  /// channels.
   static constexpr size_t kTileBytes = 16384;
-  /// The least limit: some tiles for each reader.
+  /// Smallest limit, which allows some tiles for each reader.
   static constexpr uint64_t kLeastBytes = 1'000'000;
 
-  /// `folder`: for the temporary file, which may take as much as all textures. Throws Error for a
-  /// limit below kLeastBytes, and where the system cannot do it (UserFaults::obstacle).
+  /// `folder`: for the temporary file, which may grow to the size of all textures. Throws Error if
+  /// the limit is below kLeastBytes or the system lacks support (UserFaults::obstacle).
   TileStore(uint64_t limit_bytes, std::string folder);
   ~TileStore();
   TileStore(const TileStore&) = delete;
   TileStore& operator=(const TileStore&) = delete;
 
-  /// Says that `bytes` of images that textures will be made of lie ready outside of the store.
+  /// Sets the size of images in memory outside the store that textures will be built from.
   void set_waiting(uint64_t bytes);
-  /// Says that a texture is being made: from here on `bytes` and `scratch_bytes` beside them are
-  /// used outside of the store, and count with what waits. Throws Error where all must go to the
-  /// file and cannot.
+  /// Announces that a texture is being built, which uses `bytes` and `scratch_bytes` outside the
+  /// store, in addition to set_waiting(). Throws Error if textures must move to the file and
+  /// cannot.
   void expect(uint64_t bytes, uint64_t scratch_bytes);
-  /// Keeps a copy; it stays where it is until it is removed. Throws Error where there is no room.
+  /// Stores a copy of `data` and returns its address, valid until remove(). Throws Error if there
+  /// is no room.
   const std::byte* add(const std::byte* data, size_t bytes);
-  /// Frees what `add` gave.
+  /// Frees memory returned by add().
   void remove(const std::byte* at);
 
-  /// Says that a grid of `bytes` is in memory, which makes way for it; each `drop_grid` undoes one
-  /// call, the last one for all. Throws Error as `expect`.
+  /// Registers a grid of `bytes` bytes in memory and evicts textures to make room. Each drop_grid()
+  /// undoes one call; the last one unregisters the grid. Throws Error like expect().
   void keep_grid(const void* grid, size_t bytes);
   void drop_grid(const void* grid);
 
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
-  /// Throws Error where a tile could not be read back, or there was no memory for it: what was read
-  /// there since is black.
+  /// Throws Error if a tile could not be read back or there was no memory for it. Such tiles read
+  /// as black.
   void check() const;
 
  private:
   struct Chunk {
     const std::byte* base;
-    uint32_t first, count;  ///< tiles
+    uint32_t first, count;  ///< range of tiles
   };
   struct Range {
-    uint32_t count;  ///< tiles
+    uint32_t count;  ///< number of tiles
     size_t bytes;
   };
 
-  // All with the lock held.
+  // The caller holds the lock.
   uint32_t allocate(uint32_t count);
   void free(uint32_t first, uint32_t count);
   const std::byte* address(uint32_t tile) const;
   uint32_t tile_at(const std::byte* at) const;
   uint64_t resident_bytes() const;
-  /// Throws as `spill` where textures, grids and `more` bytes are above the limit in memory.
+  /// Calls spill() if textures, grids and `more` bytes would exceed the limit in memory.
   void spill_before(uint64_t more);
+  /// Number of tiles that fit within the limit.
   size_t room() const;
+  /// Evicts tiles until the resident ones fit.
   void make_room();
+  /// Moves all textures to the temporary file. Throws Error on failure.
   void spill();
   void start_keepers();
   void put(const std::byte* at, const std::byte* from, size_t bytes);
 
-  // On threads of the store, where nobody would catch what is thrown.
+  // On threads of the store, where exceptions would not be caught.
+  /// Serves page faults until stopped.
   void keep(std::byte* buffer) noexcept;
+  /// Loads the tile of address `at` and wakes its readers.
   void serve(const std::byte* at, std::byte* buffer);
 
   const uint64_t limit_bytes_;
@@ -113,13 +120,13 @@ class TileStore {
   const std::string folder_;
   UserFaults faults_;
   mutable std::mutex mutex_;
-  std::unique_ptr<TileFile> file_;             ///< there once not all fits
-  std::vector<Chunk> chunks_;                  ///< by first tile
-  std::map<const std::byte*, size_t> places_;  ///< index into chunks_ by base
-  std::map<uint32_t, Range> ranges_;           ///< in use, by first tile
-  std::map<uint32_t, uint32_t> free_;          ///< first tile and count
+  std::unique_ptr<TileFile> file_;             ///< null while everything fits in memory
+  std::vector<Chunk> chunks_;                  ///< sorted by first tile
+  std::map<const std::byte*, size_t> places_;  ///< index into chunks_ by base address
+  std::map<uint32_t, Range> ranges_;           ///< ranges in use, by first tile
+  std::map<uint32_t, uint32_t> free_;          ///< free ranges: first tile and count
   TileQueue queue_;
-  uint64_t held_bytes_ = 0;  ///< in memory, while there is no file
+  uint64_t held_bytes_ = 0;  ///< size of textures in memory while there is no file
   uint64_t waiting_bytes_ = 0;
   struct Grid {
     size_t bytes;
@@ -128,11 +135,11 @@ class TileStore {
   std::map<const void*, Grid> grids_;
   StoreStatistics counts_;
   uint64_t load_ns_ = 0;
-  /// Of the first tile that could not be had.
+  /// Cause of the first failure to load a tile.
   enum class Failure : uint8_t { kNone, kFile, kMemory };
   std::atomic<Failure> failure_{Failure::kNone};
-  int reason_ = 0;                  ///< of kMemory: the number of the system's error
-  std::vector<std::byte> buffers_;  ///< a tile for each keeper
+  int reason_ = 0;                  ///< errno of a kMemory failure
+  std::vector<std::byte> buffers_;  ///< one tile per keeper
   std::vector<std::thread> keepers_;
 };
 

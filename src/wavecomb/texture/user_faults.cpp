@@ -25,9 +25,9 @@ namespace wavecomb {
 
 namespace {
 
-/// Descriptor of the kernel's part; -1 and errno.
+/// Opens a userfaultfd descriptor; returns -1 and sets errno on failure.
 int open_faults() {
-  // Faults of the kernel's own stay errors: that is what unprivileged users may have.
+  // User-mode only: unprivileged users may not handle faults that occur in the kernel.
   const auto fd =
       static_cast<int>(::syscall(SYS_userfaultfd, O_CLOEXEC | O_NONBLOCK | UFFD_USER_MODE_ONLY));
   if (fd < 0) return -1;
@@ -78,7 +78,7 @@ const std::byte* UserFaults::map(size_t bytes) {
   if (at == MAP_FAILED)
     throw Error(std::string("no address space for textures (") + std::strerror(errno) + ")");
   maps_.emplace_back(static_cast<std::byte*>(at), bytes);
-  // A child would find the holes full of zeros.
+  // After a fork, the child would read zeros in unfilled pages.
   ::madvise(at, bytes, MADV_DONTFORK);
   ::madvise(at, bytes, MADV_NOHUGEPAGE);
   uffdio_register range{};
@@ -97,14 +97,14 @@ int UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) n
     copy.len = bytes - done;
     if (::ioctl(faults_, UFFDIO_COPY, &copy) == 0) return 0;
     if (errno != EAGAIN) return errno;
-    // Mappings changed meanwhile; what was copied before that counts.
+    // Mappings changed concurrently; the part that was copied counts.
     if (copy.copy > 0) done += static_cast<size_t>(copy.copy);
   }
   return 0;
 }
 
 void UserFaults::give_up(const std::byte* at, size_t bytes) noexcept {
-  // From here on the kernel serves the place by itself, as any other memory.
+  // From here on the kernel fills the range with zero pages like other memory.
   uffdio_range range{number(at), bytes};
   ::ioctl(faults_, UFFDIO_UNREGISTER, &range);
   wake(at, bytes);
@@ -122,7 +122,7 @@ void UserFaults::wake(const std::byte* at, size_t bytes) noexcept {
 size_t UserFaults::wait(const std::byte** places) noexcept {
   for (;;) {
     pollfd files[2] = {{faults_, POLLIN, 0}, {stop_, POLLIN, 0}};
-    // Whatever it says, such as that memory is short: who waits is served.
+    // Keep serving after any poll error, such as lack of memory, since readers are waiting.
     if (::poll(files, 2, -1) < 0) {
       if (errno != EINTR) ::usleep(1000);
       continue;
@@ -135,7 +135,7 @@ size_t UserFaults::wait(const std::byte** places) noexcept {
       if (messages[i].event == UFFD_EVENT_PAGEFAULT)
         places[count++] =
             reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address});
-    if (count > 0) return count;  // else another thread took them
+    if (count > 0) return count;  // otherwise another thread took the events
   }
 }
 

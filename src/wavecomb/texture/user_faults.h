@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Memory that is filled where it is read: the kernel's userfaultfd.
+/// Demand-filled memory with Linux userfaultfd.
 #pragma once
 
 #include <cstddef>
@@ -8,42 +8,42 @@
 
 namespace wavecomb {
 
-/// Address space without memory behind it. A thread that reads where nothing is waits, until
-/// another one that called `wait` fills the place. Linux only, 5.11 or later.
+/// Address space that is filled on demand. A thread that reads an unfilled page blocks until
+/// another thread, which learns of it from wait(), fills it. Requires Linux 5.11 or later.
 ///
-/// Contract: any thread may call any function at any time; ranges are multiples of pages. The
-/// kernel cannot reach what is not filled: pass it to no system call.
+/// Contract: all members may be called concurrently; ranges are multiples of pages. The kernel
+/// cannot read unfilled pages, so never pass them to a system call.
 class UserFaults {
  public:
-  /// Why this system has none, in a few words; "" where it has.
+  /// Returns a short reason why the system lacks support, or "" if it has it.
   static std::string obstacle();
 
-  /// Throws Error with `obstacle`.
+  /// Throws Error with the text of obstacle() if unsupported.
   UserFaults();
-  /// Gives all memory back. Nobody may wait or read then.
+  /// Unmaps all memory. No thread may be waiting or reading.
   ~UserFaults();
   UserFaults(const UserFaults&) = delete;
   UserFaults& operator=(const UserFaults&) = delete;
 
-  /// More address space, to be read only; it stays as long as this does. Throws Error where there
-  /// is no more.
+  /// Maps more read-only address space, which is valid until destruction. Throws Error if there is
+  /// none left.
   const std::byte* map(size_t bytes);
-  /// Puts a copy of `from` where nothing is, and wakes who waits there. Gives 0, or the number of
-  /// the error where the system cannot; part of it may be there then.
+  /// Copies `from` to an unfilled range and wakes the threads that wait for it. Returns 0, or errno
+  /// on failure, when part of the range may be filled.
   [[nodiscard]] int fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept;
-  /// Lets those go on who wait for a place that cannot be filled: they read zeros, or what is there
-  /// of it. Takes no memory.
+  /// Resumes threads that wait for a range that cannot be filled. Unfilled pages read as zero.
+  /// Needs no memory.
   void give_up(const std::byte* at, size_t bytes) noexcept;
-  /// Gives memory back. What is read there from then on waits.
+  /// Frees the memory of a range; reading it blocks again.
   void release(const std::byte* at, size_t bytes) noexcept;
-  /// Lets those go on who waited for a place that was filled before they asked.
+  /// Wakes threads that wait for a range that is already filled.
   void wake(const std::byte* at, size_t bytes) noexcept;
-  /// Places that one `wait` gives at most.
+  /// Maximum number of addresses returned by one wait().
   static constexpr size_t kMostPlaces = 16;
-  /// Waits until someone reads where nothing is, and puts some such places into `places`, which has
-  /// room for kMostPlaces; gives their number, 0 once `stop` was called.
+  /// Blocks until a thread reads an unfilled page. Writes the addresses of up to kMostPlaces such
+  /// reads to `places` and returns their number, or 0 after stop().
   size_t wait(const std::byte** places) noexcept;
-  /// Ends every `wait`, now and later.
+  /// Ends all current and future wait() calls.
   void stop();
 
  private:
@@ -51,7 +51,7 @@ class UserFaults {
   std::vector<std::pair<std::byte*, size_t>> maps_;
 };
 
-/// Bytes of a page of memory.
+/// Returns the page size in bytes.
 size_t page_bytes();
 
 }  // namespace wavecomb
