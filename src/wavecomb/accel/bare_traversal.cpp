@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kForever = std::numeric_limits<float>::infinity();
 
-/// Embree's types and calls for packets of W rays.
+/// Embree types and functions for packets of W rays.
 template <uint32_t W>
 struct Packet;
 template <>
@@ -44,7 +44,7 @@ struct Packet<16> {
   static constexpr auto occluded = &rtcOccluded16;
 };
 
-/// A lone ray's members are scalars, a packet's are arrays.
+/// Returns a pointer to the first element: members of single rays are scalars, of packets arrays.
 template <typename T>
 T* first(T& x) {
   return &x;
@@ -54,7 +54,7 @@ T* first(T (&x)[N]) {
   return x;
 }
 
-/// What Embree leaves as it is from ray to ray.
+/// Sets the members that Embree does not modify during a query.
 template <uint32_t W, typename Ray>
 void prepare(Ray& ray) {
   for (uint32_t i = 0; i < W; ++i) {
@@ -88,7 +88,8 @@ void ask(Arguments& args, bool coherent) {
   args.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
 }
 
-/// Calls trace(base, n, valid) for each packet of the rays; n < W in the last at most.
+/// Calls trace(base, n, valid) for each packet of rays; n < W only in the last packet. Returns the
+/// sum of the results.
 template <uint32_t W, typename Trace>
 size_t for_each_packet(size_t size, Trace&& trace) {
   alignas(64) int valid[W];

@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Embree alone: the limit that tracing is measured against.
+/// Plain Embree traversal, the upper bound for tracing benchmarks.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
 
 namespace wavecomb {
 
-/// Traces rays by a plain loop around rtcIntersect and rtcOccluded: no filter, nothing stored but
-/// the number of hits. Built as a render builds its hierarchy, by the same code, from the same
-/// arrays; partly present surfaces are opaque here. For benchmarks.
+/// Traces rays in a plain loop around rtcIntersect and rtcOccluded without filters, and stores only
+/// the number of hits. The BVH is built like that of a render, by the same code from the same
+/// arrays. Surfaces with partial presence are opaque. For benchmarks.
 ///
 /// Contract: reads the Scene's arrays without copies and shares its ownership; tracing is
-/// thread-safe. Columns of rays are padded by a packet, as those of SoaBlock are.
+/// thread-safe. Ray columns must be padded by one packet, as in SoaBlock.
 class BareTraversal {
  public:
-  /// Builds with up to `threads` threads (0: all). Throws Error when Embree refuses.
+  /// Builds the BVH with up to `threads` threads; 0 uses all. Throws Error if Embree fails.
   BareTraversal(std::shared_ptr<const Scene> scene, uint32_t threads);
 
-  /// How many rays hit something. `width`: rays per call, 1, 4, 8 or 16.
+  /// Returns the number of rays that hit something. `width`: rays per call, 1, 4, 8 or 16.
   size_t intersect(const RaySpan& rays, uint32_t width, bool coherent) const;
-  /// How many rays are blocked before tfar.
+  /// Returns the number of rays that are occluded before tfar.
   size_t occluded(const RaySpan& rays, uint32_t width, bool coherent) const;
-  /// Widest packets that Embree traces natively here.
+  /// Widest packet that Embree traces natively on this CPU.
   uint32_t native_width() const { return accel_.native_width(); }
 
  private:

@@ -33,7 +33,7 @@ struct PacketTypes<16> {
   using RayHit = RTCRayHit16;
 };
 
-/// How closest hits are asked for.
+/// Returns the Embree arguments for closest-hit queries and initialises `context`.
 RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView& scene,
                                           const PresenceKeys& keys, uint32_t first_world,
                                           uint32_t first_light, bool coherent) {
@@ -58,7 +58,7 @@ uint32_t widest_packet(RTCDevice device) {
   return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED) ? 4 : 1;
 }
 
-/// Whether more than half of a scene's faces and segments are segments of curves.
+/// Returns whether more than half of a scene's primitives are curve segments.
 bool is_mostly_hair(const Scene& scene) {
   size_t segments = 0, all = 0;
   for (const Mesh& mesh : scene.meshes()) {
@@ -70,16 +70,16 @@ bool is_mostly_hair(const Scene& scene) {
 
 }  // namespace
 
-/// What rays are traced with: the hierarchy, and what this scene's own materials say.
+/// Shared BVH plus the view of one scene, whose materials decide about presence.
 struct EmbreeAccelerator::Impl {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeHierarchy> hierarchy;
   SceneView view;
   RTCScene top;
-  uint32_t first_world, first_light;         ///< EmbreeHierarchy's
-  uint32_t native;                           ///< rays of the widest native packet
-  std::unique_ptr<const TriangleList> list;  ///< in place of the hierarchy where the scene is small
-  bool is_hair;                              ///< most of the scene are strands
+  uint32_t first_world, first_light;         ///< as in EmbreeHierarchy
+  uint32_t native;                           ///< rays in the widest native packet
+  std::unique_ptr<const TriangleList> list;  ///< replaces the BVH in small scenes; otherwise null
+  bool is_hair;                              ///< most primitives are curve segments
 
   Impl(std::shared_ptr<const Scene> of, std::shared_ptr<const EmbreeHierarchy> built)
       : scene(std::move(of)),
@@ -92,7 +92,7 @@ struct EmbreeAccelerator::Impl {
         list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr),
         is_hair(is_mostly_hair(*scene)) {}
 
-  /// Embree's ids to ours, for one packet; a plain loop over arrays that compilers vectorise.
+  /// Converts the Embree ids of a packet to scene ids, in a loop that compilers vectorise.
   void store_hits(const float* t, const float* u, const float* v, const unsigned* prim,
                   const unsigned* geom, const unsigned* inst, const HitSpan& out, size_t base,
                   size_t n) const {
@@ -134,7 +134,7 @@ struct EmbreeAccelerator::Impl {
   template <uint32_t W, typename Ray>
   static void load_rays(Ray& ray, int* valid, const RaySpan& rays, size_t base, size_t n) {
     for (uint32_t i = 0; i < W; ++i) valid[i] = i < n ? -1 : 0;
-    // Columns are padded: reading a whole packet past the end is fine.
+    // Columns are padded, so reading a whole packet past the end is safe.
     std::memcpy(ray.org_x, rays.ox + base, 4 * W);
     std::memcpy(ray.org_y, rays.oy + base, 4 * W);
     std::memcpy(ray.org_z, rays.oz + base, 4 * W);
@@ -204,10 +204,11 @@ struct EmbreeAccelerator::Impl {
     }
   }
 
-  /// Rays per packet. Packets that are not native Embree takes apart itself, and calls filters with
-  /// one ray, whose place in the packet they cannot know. It inverts the transform of a moving
-  /// instance by other operations for a packet than for a ray alone, and so hits differ: there each
-  /// ray is alone. So it is among strands, where rays that part soon have no box in common.
+  /// Returns the number of rays per packet. Embree splits packets wider than the native width and
+  /// calls filters with single rays, whose position in the packet is unknown, so the native width
+  /// is the limit. Moving instances use single rays, since Embree inverts their transform with
+  /// different operations for packets and single rays, which changes hits. Incoherent rays in hair
+  /// also use single rays, because they soon share no boxes.
   uint32_t packet(uint32_t width, bool coherent, const PresenceKeys& keys) const {
     const bool parts = is_hair && !coherent && !keys.object;
     return parts || view.motion.instances ? 1 : std::min(width, native);

@@ -16,9 +16,9 @@ const CurveGeometry& curves_of(const void* user) {
   return *static_cast<const CurveGeometry*>(user);
 }
 
-/// Calls found(i, primitive, hit) with the first hit, or any, on each primitive that there is, of
-/// each of a packet's rays that is there for its path. wants(slot): whether the ray asks for these
-/// curves.
+/// Calls found(i, primitive, hit) for each ray of a packet and each primitive of the BVH node, with
+/// the first hit that is present for the ray's path, or with any hit, depending on `query`.
+/// wants(slot): whether the ray may hit these curves at all.
 template <bool kBare, typename Arguments, typename Wants, typename Found>
 void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Wants& wants,
               const Found& found) {
@@ -50,7 +50,7 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
       meet({args.primID});
       continue;
     }
-    // A ray that is occluded has no tfar left.
+    // tfar is negative after an occlusion hit.
     uint32_t left = curves.clumps->may_meet(args.primID, *ray, tfar);
     for (; left != 0 && tfar >= 0; left &= left - 1)
       meet(curves.clumps->piece(args.primID, static_cast<uint32_t>(std::countr_zero(left))));
@@ -73,7 +73,7 @@ bool wants_all(unsigned) {
   return true;
 }
 
-/// Keeps the closest hit by the rule of closest_filter.
+/// Embree callback that keeps the closest hit by the rule of closest_filter.
 void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
   const unsigned n = args->N, inst = args->context->instID[0];
@@ -96,7 +96,7 @@ void intersect_curves(const RTCIntersectFunctionNArguments* args) {
   for_hits<false>(*args, RTCRayHitN_RayN(args->rayhit, n), CurveQuery::kFirst, wants, found);
 }
 
-/// The same where any closest hit will do; such queries have no context of ours.
+/// Embree callback without a tie rule. Queries of BareTraversal have no QueryContext.
 void intersect_curves_bare(const RTCIntersectFunctionNArguments* args) {
   for_hits<true>(
       *args, RTCRayHitN_RayN(args->rayhit, args->N), CurveQuery::kFirst, wants_all,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Curves and points as Embree's user geometries.
+/// Curves and points as Embree user geometries.
 #pragma once
 
 #include <embree4/rtcore.h>
@@ -11,17 +11,18 @@
 
 namespace wavecomb {
 
-/// What such a geometry's user pointer points at; must outlive it.
+/// User data of a curve geometry; must outlive the geometry.
 struct CurveGeometry {
   const Mesh* mesh;
-  uint32_t id;       ///< of the mesh
-  bool is_filtered;  ///< some of it may be partly present
-  bool is_fibre;     ///< rays meet it from outside alone
-  /// What the hierarchy is made over; points, and curves that deform, are alone in it.
+  uint32_t id;       ///< mesh index
+  bool is_filtered;  ///< some hits may be rejected by presence, visibility or light linking
+  bool is_fibre;     ///< rays hit it from outside only
+  /// Curve BVH nodes that are Embree's primitives. Null for points and deforming curves, whose
+  /// primitives are passed individually.
   std::unique_ptr<const CurveClumps> clumps;
 };
 
-/// A committed geometry of a mesh of curves or points, to be released by the caller.
+/// Creates and commits a geometry for a mesh of curves or points. The caller releases it.
 RTCGeometry make_curve_geometry(RTCDevice device, const CurveGeometry& user, HitRule rule);
 
 }  // namespace wavecomb

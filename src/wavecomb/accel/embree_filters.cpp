@@ -10,11 +10,11 @@
 namespace wavecomb {
 namespace {
 
-/// Makes the closest hit independent of the order in which triangles are tried. Embree keeps
-/// whichever of two hits it tries last when they are equally far up to rounding (on shared edges,
-/// where surfaces cross or lie in one another), and in a packet that order depends on the other
-/// rays. Here the smaller distance wins, and of equal ones the smaller id. So that no candidate is
-/// missed, the search goes on a little beyond the closest hit: tfar is put back by `slack`.
+/// Makes the closest hit independent of the order in which triangles are tested. If two hits are
+/// equally far up to rounding (on shared edges, or where surfaces intersect or coincide), Embree
+/// keeps the one tested last, and in a packet that order depends on the other rays. This filter
+/// keeps the smaller distance, and for equal distances the smaller id. It sets tfar slightly beyond
+/// the closest hit (kSlack), so that traversal tests all candidates.
 template <unsigned N>
 inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);
@@ -37,7 +37,7 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   store(valid, select(Mask<U>(take), U(0xffffffffu), U(0u)));
 }
 
-/// Leaves out what is not of the object that a ray is for.
+/// Rejects hits on other objects than PresenceKeys::object.
 [[gnu::noinline, gnu::cold]] void drop_others(const RTCFilterFunctionNArguments& args) {
   const auto& context = *reinterpret_cast<const QueryContext*>(args.context);
   const SceneView& scene = *context.scene;
@@ -58,7 +58,8 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-/// Ray i of a packet against the light that a geometry's user pointer names; 0: missed.
+/// Intersects ray i of a packet with the light in a geometry's user pointer. Returns the distance,
+/// or 0 for a miss.
 float meet_light(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
@@ -116,7 +117,8 @@ void intersect_lights(const RTCIntersectFunctionNArguments* args) {
     if (args->valid[i] == 0) continue;
     const float t = meet_light(args->geometryUserPtr, ray, n, i);
     if (t == 0.f || t > best->t[i]) continue;
-    // A tie goes to the smaller instance, which the world's is not, then to the smaller geometry.
+    // Ties go to the smaller instance id, and the world has the largest, then to the smaller
+    // geometry.
     if (t == best->t[i] && (RTCHitN_instID(hit, n, i, 0) != RTC_INVALID_GEOMETRY_ID ||
                             RTCHitN_geomID(hit, n, i) < args->geomID))
       continue;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What Embree calls back while it traces: who is there, and which hit is the closest.
+/// Embree callbacks: presence filters, the closest-hit rule, and light shapes.
 #pragma once
 
 #include <embree4/rtcore.h>
@@ -11,41 +11,41 @@
 
 namespace wavecomb {
 
-/// Handed through Embree to the filters: the rays' paths, and the closest hits so far of the
-/// packet's rays. Packets are traced at widths that Embree has natively, so lane i there is lane i
-/// here.
+/// Query state that Embree passes to the callbacks: presence data and the closest hits so far of
+/// the packet's rays. Packets have native width, so that lane i in a callback is ray i of the
+/// packet.
 struct alignas(64) QueryContext {
   RTCRayQueryContext base;
-  const SceneView* scene;  ///< whose materials say what is present
+  const SceneView* scene;  ///< scene whose materials decide about presence
   const PresenceKeys* keys;
-  uint32_t first_world, first_light;   ///< geometry ids of the world's first mesh, and of lights
-  const unsigned *inst, *geom, *prim;  ///< of the hits that Embree holds, W each
-  alignas(64) float t[16];             ///< their true distances
-  std::optional<CurveRay> curve_ray;   ///< that curves were last asked for
+  uint32_t first_world, first_light;   ///< geometry ids of the world's first mesh and first light
+  const unsigned *inst, *geom, *prim;  ///< ids of the hits that Embree holds, one per ray
+  alignas(64) float t[16];             ///< exact distances of those hits
+  std::optional<CurveRay> curve_ray;   ///< cached ray of the last curve test
 };
 
-/// Hits farther than the closest by less than this fraction are looked at still.
+/// Factor by which tfar exceeds the closest distance, so that traversal finds all tied hits.
 inline constexpr float kSlack = 1.f + 0x1p-20f;
 
-/// Whether a ray of path `slot` meets a hit, whose ids are Embree's: it is present, and for a
-/// shadow ray, in the way of its light.
+/// Returns whether the ray of path `slot` hits a surface point, given by Embree ids: its object and
+/// visibility match, it is present, and for shadow rays it casts a shadow from their light.
 bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
             uint32_t prim, float u, float v, uint32_t slot);
 
-/// Filter of geometries with partly present materials, and of all where lights are linked; their
-/// user pointer is the number of the mesh.
+/// Filter function of geometries with hits that may be rejected; see filtered_meshes(). The user
+/// pointer holds the mesh index.
 void presence_filter(const RTCFilterFunctionNArguments* args);
-/// Filter of queries: makes the closest hit independent of the order in which triangles are tried.
+/// Filter function of queries: keeps the closest hit independently of the order of tests.
 void closest_filter(const RTCFilterFunctionNArguments* args);
 
-/// A box as Embree takes it.
+/// Converts a bounding box to Embree's type.
 void put_bounds(const Bounds& b, RTCBounds& out);
 
-// Round lights: user geometries whose user pointer is a LightRecord.
+// Callbacks for light shapes other than parallelograms; the user pointer is a PlacedShape.
 void light_box(const RTCBoundsFunctionArguments* args);
-/// Keeps the closest hit by the same rule as closest_filter.
+/// Keeps the closest hit by the rule of closest_filter.
 void intersect_lights(const RTCIntersectFunctionNArguments* args);
-/// The same where any closest hit will do.
+/// Keeps any closest hit, for queries without a QueryContext.
 void intersect_lights_bare(const RTCIntersectFunctionNArguments* args);
 void occlude_lights(const RTCOccludedFunctionNArguments* args);
 

@@ -16,13 +16,13 @@
 
 namespace wavecomb {
 
-/// A device of Embree's. One hierarchy at a time is built on it, for they may share geometries;
-/// others are traced meanwhile.
+/// Embree device. Its hierarchies may share geometries, so they are built one at a time; other
+/// hierarchies may be traced meanwhile.
 struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};
   std::mutex building;
-  TaskOrder order;  ///< Embree's tasks allocate
+  TaskOrder order;  ///< for ThreadSanitizer: Embree's tasks call the memory monitor
 
   EmbreeDevice() {
     if (!handle) throw Error("the ray tracer could not start; is this CPU older than SSE2?");
@@ -139,7 +139,7 @@ RTCGeometry EmbreeHierarchy::make_mesh(uint32_t mesh_id) {
   }
   RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   const float* positions = mesh.positions.data();
-  // Embree loads 16 bytes per vertex. A last vertex that ends at the end of a page is copied.
+  // Embree loads 16 bytes per vertex, so an array that ends at a page boundary must be copied.
   const uint64_t end = reinterpret_cast<uint64_t>(positions + mesh.positions.size());
   if (((end + 3) & 4095) < 4) {
     auto copy = std::make_shared<std::vector<float>>(mesh.positions.begin(), mesh.positions.end());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Embree's side of an accelerator: what edited scenes share.
+/// Embree objects of an accelerator, which edited scenes share.
 #pragma once
 
 #include <embree4/rtcore.h>
@@ -16,22 +16,22 @@ namespace wavecomb {
 
 struct EmbreeDevice;
 
-/// Geometries of meshes, scenes of groups, and the top level with the shapes of lights.
+/// Embree geometries of meshes, scenes of groups, and the top-level scene with light shapes.
 ///
-/// Contract: immutable. Keeps the arrays of meshes alive; knows no materials but which meshes ask
-/// for the presence filter, which reads the materials of the scene that is traced.
+/// Contract: immutable. Keeps the mesh arrays alive. Of the materials it depends only on which
+/// meshes need the presence filter; the filter reads the materials of the traced scene.
 class EmbreeHierarchy {
  public:
-  /// `origin`: whose geometries and groups to share as far as they fit, with its device; or null.
-  /// It must be of a scene with the same geometry. `threads`: 0: all. Throws Error when Embree
-  /// refuses.
+  /// `origin`: hierarchy of a scene with the same geometry, whose device, geometries and groups are
+  /// shared if unchanged; may be null. `threads`: 0 uses all. Throws Error if Embree fails.
   EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeHierarchy* origin,
                   uint32_t threads);
   ~EmbreeHierarchy();
   EmbreeHierarchy(const EmbreeHierarchy&) = delete;
   EmbreeHierarchy& operator=(const EmbreeHierarchy&) = delete;
 
-  /// Whether it is what would be built for `scene`, which has the same geometry.
+  /// Returns whether a hierarchy built for `scene`, which must have the same geometry, would be
+  /// equal.
   bool fits(const Scene& scene) const;
 
   HitRule rule() const { return rule_; }
@@ -39,7 +39,7 @@ class EmbreeHierarchy {
   RTCScene top() const { return top_; }
   uint32_t first_world() const { return first_world_; }  ///< geometry id of the world's first mesh
   uint32_t first_light() const { return first_light_; }  ///< geometry id of light record 0
-  /// Memory that Embree holds, for all hierarchies of the device.
+  /// Memory of all hierarchies of the device, in bytes.
   size_t bytes() const;
 
  private:
@@ -53,13 +53,13 @@ class EmbreeHierarchy {
   std::shared_ptr<const SceneGeometry> geometry_;
   HitRule rule_;
   std::shared_ptr<EmbreeDevice> device_;
-  std::vector<uint8_t> filtered_;    ///< by mesh: some of it may be partly present
-  std::vector<uint8_t> fibres_;      ///< by mesh: it is met from outside alone
-  std::vector<PlacedShape> shapes_;  ///< by record
+  std::vector<uint8_t> filtered_;    ///< by mesh: see filtered_meshes()
+  std::vector<uint8_t> fibres_;      ///< by mesh: see fibre_meshes()
+  std::vector<PlacedShape> shapes_;  ///< by light record
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;
   std::vector<RTCGeometry> mesh_geometries_;
-  /// By mesh: copies of arrays that end at a page boundary.
+  /// Padded copies, by mesh, of vertex arrays that end at a page boundary.
   std::map<uint32_t, std::shared_ptr<const std::vector<float>>> padded_;
   std::map<uint32_t, std::shared_ptr<const CurveGeometry>> curves_;  ///< by mesh
   uint32_t first_world_ = 0, first_light_ = 0;

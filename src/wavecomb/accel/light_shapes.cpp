@@ -9,9 +9,9 @@
 namespace wavecomb {
 namespace {
 
-/// Distance along d to the parallelogram of a record, as LightKindInfo::intersect has it, from
-/// either side: o + t d = a u + b v, by T. Moller and B. Trumbore, "Fast, Minimum Storage
-/// Ray-Triangle Intersection", 1997.
+/// Returns the distance along d to the parallelogram of a light record, from either side, with the
+/// conventions of LightKindInfo::intersect. Solves o + t d = a u + b v (T. Moller and B. Trumbore,
+/// "Fast, Minimum Storage Ray-Triangle Intersection", 1997).
 double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
                                const double (&d)[3]) {
   const auto cross = [](const double* a, const double* b, double (&c)[3]) {
@@ -33,7 +33,7 @@ double intersect_parallelogram(const LightRecord& light, const double (&o)[3],
   return dot(v, ou) / det;
 }
 
-/// A box around what does not move, in place of the whole way.
+/// Returns the bounds of a light without its motion.
 Bounds box_at_rest(const PlacedShape& shape) {
   const LightRecord& l = shape.light;
   if (shape.kind->box) return shape.kind->box(l);

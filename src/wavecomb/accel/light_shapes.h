@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays against the shapes of lights.
+/// Intersection of rays with light shapes.
 #pragma once
 
 #include <vector>
@@ -9,26 +9,26 @@
 
 namespace wavecomb {
 
-/// Where a light is; nothing of what it shines.
+/// Geometry of a light, without its emission.
 struct PlacedShape {
   LightShape shape = LightShape::kNone;
-  LightRecord light{};                  ///< kind, p, u, v and radius
-  const LightKindInfo* kind = nullptr;  ///< of shapes of their own
-  LightMotion motion{};                 ///< of what moves, which has a shape of its own
+  LightRecord light{};                  ///< only kind, p, u, v and radius are set
+  const LightKindInfo* kind = nullptr;  ///< null for kNone
+  LightMotion motion{};                 ///< motion, if any; such lights use LightShape::kOwn
   std::vector<LightStep> steps;
 
   bool operator==(const PlacedShape& other) const;
 };
 
-/// By record; kNone where rays do not meet it.
+/// Returns the shapes by light record; kNone if rays do not hit the light.
 std::vector<PlacedShape> light_shapes(const Scene& scene);
 
-/// A box around a shape of its own and all its way, a little larger.
+/// Returns conservative bounds of a kOwn shape over its whole motion.
 Bounds own_shape_bounds(const PlacedShape& shape);
 
-/// Distance along dir to a shape of its own, in units of |dir|; 0 where it is not ahead. One ray at
-/// a time and in double precision, so that a hit is the same whatever the rays beside it are:
-/// Embree's own spheres and discs round differently in packets and alone. `time`: of the shutter.
+/// Returns the distance along `dir` to a kOwn shape in units of |dir|, or 0 if it is not in front.
+/// Tests one ray at a time in double precision, so that hits do not depend on other rays: Embree's
+/// spheres and discs round differently in packets and single rays. `time`: shutter time in [0, 1].
 float intersect_own_shape(const PlacedShape& shape, const float (&origin)[3], const float (&dir)[3],
                           float time);
 

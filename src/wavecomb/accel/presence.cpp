@@ -12,7 +12,7 @@
 namespace wavecomb {
 namespace {
 
-/// Marks meshes that some kind of ray passes by where some instance places them.
+/// Marks meshes that are invisible to some kind of ray in some instance.
 void mark_unseen(const Scene& scene, std::vector<uint8_t>& filtered) {
   const SceneGeometry& geometry = *scene.geometry();
   const SceneView view = scene.view();
@@ -24,7 +24,8 @@ void mark_unseen(const Scene& scene, std::vector<uint8_t>& filtered) {
   }
 }
 
-/// Whether what is there with that probability is.
+/// Returns whether a surface with this opacity is present, by the random number of path and
+/// primitive.
 bool is_drawn(float opacity, uint32_t instance, uint32_t mesh, uint32_t prim, uint32_t slot,
               const PresenceKeys& keys) {
   if (opacity >= 1.f) return true;
@@ -72,7 +73,7 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
                    [](const Material& m) { return m.program == ProgramId::kHair; }))
     return fibres;
   const auto is_other = [&](uint32_t m) { return materials[m].program != ProgramId::kHair; };
-  // What instances hand on to meshes that have no material: the world is instance 0.
+  // Materials that meshes without one inherit from their instances; the world is instance 0.
   std::vector<uint8_t> group_hands_on(geometry.groups.size(), 0), mesh_gets(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)
     if (is_other(geometry.instance_records[i].material))
@@ -103,7 +104,7 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
                     keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[instance].material, mesh, prim, true);
-  // Who looks what shadow rays pass inside of meshes finds the bounds himself (medium/interiors.h).
+  // The transmittance of shadow rays handles medium boundaries separately (medium/interiors.h).
   if (keys.ray_kind == kSeenByShadowRays && scene.interiors.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
   const Vec2<float> uv = hit_uv<float>(scene.meshes, mesh, prim, u, v, true);

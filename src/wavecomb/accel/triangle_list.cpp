@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kForever = std::numeric_limits<float>::infinity();
 
-/// Stores the first `n` lanes, all where there are more.
+/// Stores the first `n` lanes, or all if there are fewer.
 template <typename T>
 void store_first(void* p, const T& value, size_t n) {
   if (n >= kWidth<T>) {
@@ -31,31 +31,31 @@ void store_first(void* p, const T& value, size_t n) {
 
 }  // namespace
 
-/// A packet of rays on its way through a list.
+/// Intersection of a packet of rays with a triangle list.
 struct ListTracer {
   const TriangleList& list;
   const SceneView& scene;
   const RaySpan& rays;
   const PresenceKeys& keys;
 
-  /// Where rays cross a plane: at distance height / slope, slope positive.
+  /// Intersection of rays with a plane, at distance height / slope with slope >= 0.
   template <typename F>
   struct Plane {
     F height, slope;
   };
-  /// Where rays cross a triangle's plane with respect to its edges.
+  /// Intersection of rays with a triangle's plane relative to its edges.
   template <typename F>
   struct Crossing {
     F b, c;      ///< barycentrics of the second and third vertex, times `sum`
-    F sum;       ///< twice the triangle's area as the ray sees it
-    Mask<F> in;  ///< within the triangle
+    F sum;       ///< twice the signed area of the triangle projected along the ray
+    Mask<F> in;  ///< inside the triangle
   };
 
-  /// Rays [base, base + width) and what they share with all triangles.
+  /// Rays [base, base + width), with data that all triangle tests share.
   template <typename F>
   struct Packet {
     Vec3<F> o, d;
-    std::array<F, TriangleList::kMostVertices> x, y;  ///< of vertices, in the frame of the ray
+    std::array<F, TriangleList::kMostVertices> x, y;  ///< of vertices, in the frame of each ray
 
     Packet(const TriangleList& list, const RaySpan& rays, size_t base)
         : o(load<F>(rays.ox + base), load<F>(rays.oy + base), load<F>(rays.oz + base)),
@@ -79,7 +79,7 @@ struct ListTracer {
 
     WAVECOMB_INLINE Crossing<F> cross(const TriangleList::Triangle& t) const {
       const auto [i, j, k] = t.vertex;
-      // No fma: a shared edge has the same products on both sides.
+      // No fma, so that both triangles of a shared edge compute the same products.
       const F a = x[k] * y[j] - y[k] * x[j], b = x[i] * y[k] - y[i] * x[k],
               c = x[j] * y[i] - y[j] * x[i];
       const F sum = a + b + c;
@@ -88,7 +88,7 @@ struct ListTracer {
     }
   };
 
-  /// Of the lanes, those that meet triangle `t`, by its materials and links.
+  /// Returns the lanes whose hits on triangle `entry` are accepted by is_met().
   template <typename F>
   Mask<F> met(const Mask<F>& in, uint32_t entry, const F& b, const F& c, const F& sum,
               size_t base) const {
@@ -104,14 +104,14 @@ struct ListTracer {
     return in & Mask<F>(load<UInt<F>>(keep.data()) != UInt<F>(0u));
   }
 
-  /// Distances to a light's shape of the lanes whose rays pass near; 0: missed.
+  /// Returns distances to a light shape for lanes that pass near its bounding sphere; 0 for a miss.
   template <typename F>
   F meet_shape(const TriangleList::Shape& shape, const Packet<F>& packet, const F& limit,
                const Mask<F>& active) const {
     const Vec3<F> to(Vec3<float>{shape.centre[0], shape.centre[1], shape.centre[2]});
     const Vec3<F> p = to - packet.o;
     const F along = dot(p, packet.d), distance2 = length_squared(p);
-    // A little more than the ball, by what rounding may take from it.
+    // Enlarges the bounding sphere by a bound of the rounding error.
     const F reach = fma(F(abs(along) + shape.radius), F(1e-3f), F(shape.radius));
     const Mask<F> near =
         active & (distance2 - along * along <= reach * reach) & (along + reach >= 0.f);
@@ -204,7 +204,7 @@ struct ListTracer {
 
 namespace {
 
-/// Runs trace(F*) with the lane type F of a width.
+/// Calls trace(F*) with the lane type F for `width`.
 template <typename Trace>
 void in_lanes(uint32_t width, const Trace& trace) {
   switch (width) {
@@ -219,7 +219,7 @@ void in_lanes(uint32_t width, const Trace& trace) {
   }
 }
 
-/// A ball around a shape of its own.
+/// Returns a light shape with its bounding sphere.
 TriangleList::Shape in_a_ball(const PlacedShape& placed) {
   const Bounds box = own_shape_bounds(placed);
   const Vec3<float> centre = (box.lo + box.hi) * 0.5f, half = (box.hi - box.lo) * 0.5f;
@@ -260,7 +260,7 @@ std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene) {
       ++geom;
     }
   };
-  // In the order of Embree's numbers, by which ties are decided there: instances, world, lights.
+  // The order matches the tie rule of Embree's ids: instances, world, lights.
   for (uint32_t i = 0; i < geometry.instances.size(); ++i)
     add_group(geometry.instances[i].group, i + 1, geometry.instances[i].to_world);
   add_group(0, 0, Affine{});
@@ -295,7 +295,7 @@ void TriangleList::add(const Vec3<float> (&corners)[3], uint32_t inst, uint32_t 
   const double n[3] = {e[0][1] * e[1][2] - e[0][2] * e[1][1], e[0][2] * e[1][0] - e[0][0] * e[1][2],
                        e[0][0] * e[1][1] - e[0][1] * e[1][0]};
   const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  if (!(length > 0) || !std::isfinite(length)) return;  // no area: never hit
+  if (!(length > 0) || !std::isfinite(length)) return;  // degenerate triangles are never hit
   Triangle& t = triangles_.emplace_back();
   for (int k = 0; k < 3; ++k) {
     t.n[k] = static_cast<float>(n[k] / length);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays against a few triangles, tried one after the other.
+/// Intersection of rays with a short list of triangles.
 #pragma once
 
 #include <cstdint>
@@ -11,50 +11,50 @@
 
 namespace wavecomb {
 
-/// All that rays of a small still scene can meet, as one list in world space.
+/// Geometry of a small static scene as a flat list in world space.
 ///
-/// Below some hundred triangles a hierarchy costs more than it saves: here each lane has a ray of
-/// its own, and all lanes test the same triangle. A ray is tested in a frame of its own, z along
-/// it, where an edge function is exactly the negative of its neighbour's (Woop, Benthin and Wald,
-/// "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; their shear is a rotation here, so that
-/// no lane chooses an axis of its own), and its distance is that to the triangle's plane. No
-/// operation knows of the other rays, and of equally close hits the first of the list wins, so
-/// hits are canonical without a filter.
+/// Below about a hundred triangles, a BVH costs more than it saves. Here each lane holds one ray,
+/// and all lanes test the same triangle. Triangles are transformed to a frame with z along the ray,
+/// where the edge functions of two adjacent triangles are exact negatives (Woop, Benthin and Wald,
+/// "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; a rotation replaces their shear, so that
+/// no lane has to choose an axis). The hit distance is that to the triangle's plane. No operation
+/// depends on other rays, and the first triangle of the list wins ties, so hits are canonical
+/// without a filter.
 ///
-/// Contract: immutable; reads the scene's materials through the view that it is given.
+/// Contract: immutable; reads the scene's materials through the view passed to each call.
 class TriangleList {
  public:
-  /// Of more triangles than this a hierarchy is quicker (docs/decisions/small-scene-traversal.md).
+  /// With more triangles, a BVH is faster (docs/decisions/small-scene-traversal.md).
   static constexpr uint32_t kMostTriangles = 96;
-  static constexpr uint32_t kMostVertices = 128;  ///< at different places
-  static constexpr uint32_t kMostShapes = 4;      ///< of lights that are not parallelograms
+  static constexpr uint32_t kMostVertices = 128;  ///< distinct positions
+  static constexpr uint32_t kMostShapes = 4;      ///< lights that are not parallelograms
 
-  /// Null where there is more, where something moves, or where there are curves or points.
+  /// Returns null if the scene exceeds these limits or has motion, curves or points.
   static std::unique_ptr<const TriangleList> make(const Scene& scene);
 
-  /// As EmbreeAccelerator's of the same names; `width` is 1, 4, 8 or 16.
+  /// Like the functions of EmbreeAccelerator; `width` is 1, 4, 8 or 16.
   void intersect(const SceneView& scene, const RaySpan& rays, const HitSpan& hits, uint32_t width,
                  const PresenceKeys& keys) const;
   void occluded(const SceneView& scene, const RaySpan& rays, uint32_t* occluded, uint32_t width,
                 const PresenceKeys& keys) const;
 
-  /// One triangle: its plane through `p` with unit normal `n`, and its vertices' numbers.
+  /// Triangle: plane through `p` with unit normal `n`, and vertex indices.
   struct Triangle {
     float n[3], p[3];
     uint16_t vertex[3];
-    bool filtered;       ///< asks whether it is met
-    bool in_same_plane;  ///< as the one before, to the bit
+    bool filtered;       ///< hits must pass is_met()
+    bool in_same_plane;  ///< n and p equal those of the previous triangle
     uint32_t mesh;
   };
   struct Vertex {
     float p[3];
   };
-  /// A light's own shape within a ball.
+  /// Light shape with its bounding sphere.
   struct Shape {
     PlacedShape placed;
     float centre[3], radius;
   };
-  /// What a hit of entry i is, triangles first, then shapes, then "none".
+  /// Ids of hits by entry: triangles, then light shapes, then one entry for a miss.
   struct Ids {
     std::vector<uint32_t> prim, geom, inst;
   };
