@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Segments of curves in the space of a ray, in double precision.
+/// Curve segments in ray space, in double precision.
 #pragma once
 
 #include <cmath>
@@ -26,10 +26,10 @@ inline Vec3<float> narrow(const V& a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }
 
-/// Right-handed axes with z along the ray, and its origin: there the ray is the z axis.
+/// Right-handed orthonormal frame with its origin at the ray origin and z along the ray.
 struct RaySpace {
   V o, x, y, z;
-  double length;  ///< of the direction: t is z / length
+  double length;  ///< length of the ray direction; t = z / length
 
   RaySpace(const float (&origin)[3], const float (&dir)[3]) : o(vec(origin)) {
     const V d = vec(dir);
@@ -40,11 +40,12 @@ struct RaySpace {
     y = {b, sign + z.y * z.y * a, -z.y};
   }
   V vector(const V& v) const { return {dot_d(v, x), dot_d(v, y), dot_d(v, z)}; }
+  /// Converts a vector to world space.
   V point(const V& p) const { return vector(p - o); }
   V back(const V& v) const { return x * v.x + y * v.y + z * v.z; }
 };
 
-/// Control points of a segment, lines as cubics.
+/// Control points and radii of a cubic Bezier segment; lines are converted to cubics.
 struct Bezier {
   V p[4];
   double r[4];
@@ -52,6 +53,7 @@ struct Bezier {
   V at(double u) const { return mix(p, u); }
   double radius(double u) const { return mix(r, u); }
   V along(double u) const { return slope(p, u); }
+  /// Derivative of the radius.
   double widening(double u) const { return slope(r, u); }
 
   template <typename T>
@@ -66,12 +68,13 @@ struct Bezier {
     return (c[1] - c[0]) * (3 * w * w) + (c[2] - c[1]) * (6 * w * u) + (c[3] - c[2]) * (3 * u * u);
   }
   template <typename T>
+  /// Converts a line from c[0] to c[1] to cubic control points.
   static void line(T* c) {
     c[3] = c[1];
     c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
     c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
   }
-  /// De Casteljau's first or second half alone, the same numbers as split gives.
+  /// Replaces c by its first or second half by De Casteljau's algorithm; same results as split().
   template <typename T, typename S = double>
   static void keep_half(T* c, bool second, S half = 0.5) {
     const T a = (c[0] + c[1]) * half, m = (c[1] + c[2]) * half, b = (c[2] + c[3]) * half;
@@ -86,7 +89,7 @@ struct Bezier {
       c[3] = middle;
     }
   }
-  /// De Casteljau's halves.
+  /// Splits c into two halves by De Casteljau's algorithm.
   template <typename T>
   static void split(const T* c, T* a, T* b) {
     const T m = (c[1] + c[2]) * 0.5;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Capsules side by side, and a ray.
+/// Test of a ray against several capsules in SIMD lanes.
 #pragma once
 
 #include "wavecomb/core/lanes.h"
@@ -7,17 +7,18 @@
 
 namespace wavecomb {
 
-/// Where a ray along the z axis certainly passes by the spheres of a radius about the points of the
-/// line from a to b, of which it may meet those with z_near <= z <= z_far. x and y of the ends may
-/// be off by `rounding`; what z is off by, the caller takes from z_near and adds to z_far.
+/// Returns the lanes whose capsules the ray along the z axis certainly misses. A capsule is the
+/// union of spheres of `radius` around the points of the line from a to b; hits matter only within
+/// z_near <= z <= z_far. `rounding` bounds the error of x and y of the ends. The caller must extend
+/// z_near and z_far by the error of z.
 template <typename F>
 inline Mask<F> passes_capsules(const Vec3<F>& a, const Vec3<F>& b, const F& radius,
                                const F& rounding, const F& z_near, const F& z_far) {
-  // Whether both ends lie farther than the radius on one side of a line through the ray, along the
-  // piece or square to it.
+  // Separating axes through the ray, along the capsule axis and perpendicular to it: the capsule is
+  // missed if both ends are farther than the radius on one side.
   const F cx = b.x - a.x, cy = b.y - a.y, length = sqrt(fma(cx, cx, F(cy * cy)));
-  // The piece's direction is rounded as its ends are; where one of these is within the radius, the
-  // other is no farther than the piece is long beyond that.
+  // The direction of the axis has the rounding error of its ends. If one end is within the radius,
+  // the other is at most the axis length farther away, which bounds the error of the products.
   const F reach = fma(radius, length, F(rounding * (length + radius)));
   const F beside = abs(fma(cx, a.y, F(-(cy * a.x))));
   const F along_a = fma(cx, a.x, F(cy * a.y)), along_b = fma(cx, b.x, F(cy * b.y));

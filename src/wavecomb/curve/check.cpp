@@ -32,7 +32,7 @@ void check_curves(const Mesh& mesh, const std::string& name) {
   for (const std::span<const float> values : {mesh.positions, mesh.normals})
     for (float x : values)
       if (!std::isfinite(x))
-        throw Error(name + " has points or normals that are not finite; mend or remove them");
+        throw Error(name + " has points or normals that are not finite; fix or remove them");
   for (float r : mesh.radii)
     if (!(r >= 0) || !std::isfinite(r))
       throw Error(name + " has a radius that is negative or not finite; give one of 0 or more");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Whether a mesh of curves or points holds together.
+/// Validation of meshes of curves or points.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace wavecomb {
 
-/// Throws Error that begins with `name` where array sizes, control points or radii are no good.
+/// Throws Error that begins with `name` if array sizes, control points or radii are invalid.
 void check_curves(const Mesh& mesh, const std::string& name);
 
-/// MeshFlags of a mesh of curves or points, but for its texture coordinates.
+/// Returns the MeshFlags of a mesh of curves or points, except those of texture coordinates.
 uint32_t curve_flags(const Mesh& mesh);
 
 }  // namespace wavecomb

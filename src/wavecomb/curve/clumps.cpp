@@ -18,27 +18,29 @@ namespace {
 using ClumpLanes = FloatP<CurveClumps::kPieces>;
 
 constexpr float kCells = 65535.f;
-constexpr float kLargestCell = 65000.f;  ///< less than that by what rounding adds
-constexpr float kSlender = 32.f;         ///< length over radius above which segments are halved
+constexpr float kLargestCell = 65000.f;  ///< leaves room below kCells for rounding
+constexpr float kSlender = 32.f;         ///< segments with a larger length / radius are split
 constexpr size_t kManySegments = size_t{1} << 20;
-constexpr float kClumpRounding = 4e-6f;  ///< of sums of products in float, over their terms
+constexpr float kClumpRounding = 4e-6f;  ///< relative error of float dot products
 
-/// A part of a segment as a line from a to b with a radius, in which all of the part lies.
+/// Capsule that contains a sub-segment: a line from a to b with a radius.
 struct ClumpPiece {
   Vec3<float> a, b;
   float radius = 0;
 };
 
-/// Pieces are numbered segment by segment.
+/// Number of nodes per segment; a sub-segment's number is kPieceNodes * segment + node.
 constexpr uint32_t kPieceNodes = CurvePiece::kNodes;
 
+/// Returns the distance of a point from the line segment ab.
 float distance_to_line(const Vec3<float>& p, const Vec3<float>& a, const Vec3<float>& b) {
   const Vec3<float> c = b - a, v = p - a;
   const float c2 = dot(c, c), at = c2 > 0 ? std::clamp(dot(v, c) / c2, 0.f, 1.f) : 0.f;
   return length(Vec3<float>(v - c * at));
 }
 
-/// Control points are no farther from the line than all between them: distance to it is convex.
+/// Returns the capsule of a sub-segment. Distance to a line is convex, so the distances of the
+/// control points bound the curve.
 ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
   std::array<Vec3<float>, 4> p;
   std::array<float, 4> r;
@@ -63,8 +65,8 @@ ClumpPiece piece_of(const Mesh& mesh, uint32_t number) {
   return {p[0], p[3], *std::max_element(r.begin(), r.end()) + bend};
 }
 
-/// How often a segment is halved. A clump's box is as large as the pieces in it are long, and a
-/// bent piece is thicker than the curve; but each piece takes memory.
+/// Returns how often to halve a segment. Shorter sub-segments give smaller node bounds and, if
+/// curved, thinner capsules, but each takes memory.
 uint32_t halvings(const Mesh& mesh, uint32_t segment, const ClumpPiece& whole) {
   if (!(length(Vec3<float>(whole.b - whole.a)) > kSlender * whole.radius)) {
     const float r = mesh.radii[mesh.indices[segment] & kCurveFirstPoint];
@@ -73,7 +75,7 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment, const ClumpPiece& whole) {
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-/// A piece's number, or that of a segment's first piece, and the middle of its line, twice.
+/// A sub-segment, or the first one of a segment: twice the midpoint of its axis, and its number.
 struct ClumpEntry {
   std::array<float, 3> middle;
   uint32_t number;
@@ -84,7 +86,7 @@ ClumpEntry entry_of(const ClumpPiece& line, uint32_t number) {
   return {{m.x, m.y, m.z}, number};
 }
 
-/// Calls work(i) for each i below the end, side by side but for so many at a time.
+/// Calls work(i) for first <= i < end, in parallel tasks of at most `grain` calls.
 template <typename Work>
 void over_all(size_t first, size_t end, size_t grain, const CurveClumps::Both& both,
               const Work& work) {
@@ -96,8 +98,8 @@ void over_all(size_t first, size_t end, size_t grain, const CurveClumps::Both& b
   for (size_t i = first; i < end; ++i) work(i);
 }
 
-/// Parts entries by their middles until each part has no more than `full`, and all but the last
-/// have as many.
+/// Partitions entries by their midpoints along the longest axis until each part has at most `full`
+/// entries; all parts but the last have exactly `full`.
 void part_entries(std::span<ClumpEntry> entries, size_t full, const CurveClumps::Both& both) {
   constexpr size_t kMany = 1u << 15;
   if (entries.size() <= full) return;
@@ -124,12 +126,12 @@ void part_entries(std::span<ClumpEntry> entries, size_t full, const CurveClumps:
   second();
 }
 
-/// A segment has as many pieces as its first one's number says.
+/// Returns the number of sub-segments of a segment, which equals the node index of its first one.
 uint32_t pieces_of(const ClumpEntry& segment) {
   return segment.number % kPieceNodes;
 }
 
-/// All segments, those that lie close together side by side.
+/// Returns all segments, ordered so that nearby ones are in the same group of `group` segments.
 std::vector<ClumpEntry> segments_of(const Mesh& mesh, size_t group, const CurveClumps::Both& both) {
   std::vector<ClumpEntry> out(mesh.indices.size());
   over_all(0, out.size(), 1u << 14, both, [&](size_t s) {
@@ -141,6 +143,7 @@ std::vector<ClumpEntry> segments_of(const Mesh& mesh, size_t group, const CurveC
   return out;
 }
 
+/// Returns the L1 norm of a vector.
 float clump_size(const float* v) {
   return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
 }
@@ -148,7 +151,7 @@ float clump_size(const float* v) {
 }  // namespace
 
 CurveClumps::CurveClumps(const Mesh& mesh, const Both& both) : mesh_(mesh) {
-  // Pieces are made group by group, so that few of them are there at a time.
+  // Sub-segments are created group by group to limit memory.
   constexpr size_t kGroup = 1u << 16;
   const std::vector<ClumpEntry> segments = segments_of(mesh, kGroup, both);
   const size_t groups = (segments.size() + kGroup - 1) / kGroup;
@@ -202,7 +205,7 @@ CurveClumps::Clump CurveClumps::make(const uint32_t* first, uint32_t n) const {
     const float b[3] = {piece.b.x, piece.b.y, piece.b.z};
     for (uint32_t axis = 0; axis < 3; ++axis)
       out.cells[axis][k] = cell(a[axis], axis) | cell(b[axis], axis) << 16;
-    // Rounding to cells moves a point by less than one.
+    // Covers the rounding of positions to cells, which moves a point by less than one cell.
     out.radius[k] = static_cast<uint16_t>(std::ceil(cells(1.0001f * piece.radius)) + 1.f);
   }
   return out;
@@ -247,7 +250,7 @@ uint32_t CurveClumps::may_meet(uint32_t clump, const CurveRay& ray, float tfar) 
   decode(0, cell_a.x, cell_b.x);
   decode(1, cell_a.y, cell_b.y);
   decode(2, cell_a.z, cell_b.z);
-  // The ends as the ray sees them, which is the z axis here.
+  // Transforms the ends to ray space, where the ray is the z axis.
   const auto seen = [&](uint32_t n, const Vec3<F>& cell) {
     const auto& e = ray.axis[n];
     const F start(e[0] * from[0] + e[1] * from[1] + e[2] * from[2]);

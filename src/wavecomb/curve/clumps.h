@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Pieces of curves in clumps of eight, and what a ray may meet of a clump.
+/// BVH nodes of up to eight curve sub-segments.
 ///
-/// Boxes of hair are a hundred times longer than a strand is wide: of the segments whose box a ray
-/// meets, it passes by nearly all, and each of them costs memory from another place. So a hierarchy
-/// is made over clumps of pieces that lie close together: segments, or parts of slender ones. A
-/// clump has the lines that these lie about side by side, in 16 bits, and a ray is tested against
-/// the eight at once. Pieces that may be met go to intersect_curve; a clump's own
-/// test says nothing but "perhaps" or "certainly not", so that it changes no picture.
+/// Bounding boxes of hair segments are a hundred times longer than a strand is wide, so a ray
+/// misses nearly all segments whose boxes it hits, and each of these tests costs a cache miss.
+/// Embree therefore builds its BVH over nodes of nearby sub-segments: whole segments, or parts of
+/// slender ones. A node stores their capsules side by side, quantised to 16 bits, and tests a ray
+/// against all eight at once. intersect_curve() then tests those that may be hit. The node test is
+/// conservative, so it never changes the image.
 #pragma once
 
 #include <array>
@@ -18,18 +18,19 @@
 
 namespace wavecomb {
 
-/// Of one mesh of curves that keeps its shape (see serve); the mesh must outlive it.
+/// Nodes of a mesh of curves that does not deform (see serve()); the mesh must outlive them.
 class CurveClumps {
  public:
-  static constexpr uint32_t kPieces = 8;  ///< of a clump, at most
+  static constexpr uint32_t kPieces = 8;  ///< maximum number of sub-segments per node
 
-  /// Whether a mesh is one of those that clumps are for.
+  /// Returns whether nodes can be built for a mesh.
   static bool serve(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
 
-  /// Does two things, one beside the other or one after the other.
+  /// Function that runs two tasks, possibly in parallel.
   using Task = std::function<void()>;
   using Both = std::function<void(const Task&, const Task&)>;
 
+  /// Builds the nodes. `both`: runs parallel tasks; the default runs them one after another.
   explicit CurveClumps(
       const Mesh& mesh, const Both& both = [](const Task& a, const Task& b) {
         a();
@@ -39,13 +40,13 @@ class CurveClumps {
   uint32_t count() const { return static_cast<uint32_t>(clumps_.size()); }
   size_t bytes() const { return clumps_.size() * sizeof(Clump); }
 
-  /// A box around the pieces of a clump, a little larger than they are.
+  /// Returns conservative bounds of a node.
   Bounds bounds(uint32_t clump) const;
 
-  /// A bit for each piece that a ray may meet with 0 < t <= tfar.
+  /// Returns a bit mask of the sub-segments of a node that a ray may hit with 0 < t <= tfar.
   uint32_t may_meet(uint32_t clump, const CurveRay& ray, float tfar) const;
 
-  /// The piece of a bit k of may_meet.
+  /// Returns the sub-segment of bit k of may_meet().
   CurvePiece piece(uint32_t clump, uint32_t k) const {
     const uint32_t number = clumps_[clump].number[k];
     return {number / CurvePiece::kNodes, number % CurvePiece::kNodes};
@@ -54,10 +55,10 @@ class CurveClumps {
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  /// The ends of piece k along an axis are low[axis] + step * cell, with cells of 16 bits: those of
-  /// the first are the lower halves of cells[axis][k], those of the second the upper ones. Its
-  /// radius about the line between them is step * radius[k]. Its number is that of its segment
-  /// times kNodes, and its node.
+  /// Node with quantised capsules. The ends of sub-segment k are at low[axis] + step * cell. The
+  /// lower 16 bits of cells[axis][k] are the cell of the first end, the upper 16 bits that of the
+  /// second. The radius is step * radius[k]. number[k] is segment * CurvePiece::kNodes + node, or
+  /// kNone.
   struct alignas(32) Clump {
     std::array<std::array<uint32_t, kPieces>, 3> cells;
     std::array<uint32_t, kPieces> number;

@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-/// The frame of a fibre where a ray has met it.
+/// Shading frame of a hair fibre at a hit. The frame of a fibre where a ray has met it.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -9,9 +8,10 @@ namespace wavecomb {
 
 namespace detail {
 
-/// The normal of the round fibre that a ribbon stands for. It is met at h = 2 v - 1 of its half
-/// width, whatever way the ribbon faces: with w the way back square to the fibre, and e the
-/// ribbon's way across square to both, n = sqrt(1 - h^2) w + h e.
+/// Returns the normal of the round fibre that a ribbon represents. The offset from the fibre axis
+/// is h = 2 v - 1 in half widths, for any orientation of the ribbon. With w the direction opposite
+/// to the ray, made perpendicular to the fibre, and e the ribbon's width direction, made
+/// perpendicular to fibre and w, n = sqrt(1 - h^2) w + h e.
 template <typename F>
 inline Vec3<F> ribbon_fibre_normal(const Surface<F>& s, const Vec3<F>& dir, const F& v) {
   const F len2 = length_squared(s.dpdu);
@@ -27,8 +27,8 @@ inline Vec3<F> ribbon_fibre_normal(const Surface<F>& s, const Vec3<F>& dir, cons
 
 }  // namespace detail
 
-/// x along the fibre, z its normal: exact on tubes, and on meshes as if they were tubes along their
-/// texture's u. `s` has dpdu.
+/// Returns the frame of a fibre: x along it, z its normal. Exact on tubes; other meshes are treated
+/// as tubes along u of their texture coordinates. `s.dpdu` must be set.
 template <typename F>
 [[gnu::noinline]] Frame<F> fibre_frame(const SceneView& scene, const MeshHit<F>& hit,
                                        const Surface<F>& s, const Vec3<F>& dir,

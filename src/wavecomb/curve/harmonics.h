@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Colour by direction: real spherical harmonics.
+/// Real spherical harmonics for view-dependent colour.
 #pragma once
 
 #include <array>
@@ -8,17 +8,17 @@
 
 namespace wavecomb {
 
-/// Most of a splat: those up to degree 3.
+/// Maximum number of harmonics per Gaussian splat, up to degree 3.
 inline constexpr uint32_t kMostHarmonics = 16;
 
-/// The degree of harmonic k of `harmonics`.
+/// Returns the degree of harmonic k.
 constexpr uint32_t harmonic_degree(uint32_t k) {
   return k < 1 ? 0 : (k < 4 ? 1 : (k < 9 ? 2 : 3));
 }
 
-/// The real spherical harmonics Y_l^m(d) up to degree 3 at a unit vector d, by degree l and then
-/// m = -l to l: orthonormal over the sphere, with the phase (-1)^m of Condon and Shortley, as
-/// Kerbl and others (2023) have them.
+/// Evaluates the real spherical harmonics Y_l^m(d) up to degree 3 at a unit vector d, ordered by
+/// degree l, then m = -l to l. Orthonormal over the sphere, with the Condon-Shortley phase (-1)^m,
+/// as in Kerbl et al. (2023).
 template <typename F>
 inline std::array<F, kMostHarmonics> harmonics(const Vec3<F>& d) {
   const F xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;

@@ -19,7 +19,7 @@ uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
 
-/// The values of a mesh's points at a time, bit for bit those of detail::MovingRows.
+/// Points and normals of a mesh at a given time; bit-identical to detail::MovingRows.
 class PointsAt {
  public:
   PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(time, mesh.steps - 1) {}
@@ -46,7 +46,7 @@ class PointsAt {
   const BetweenSteps<float> place_;
 };
 
-/// One segment and one ray.
+/// Intersection of a ray with one segment.
 class SegmentTest {
  public:
   SegmentTest(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,
@@ -72,12 +72,12 @@ class SegmentTest {
     Bezier::line(normal_);
   }
 
-  /// `outside`: no hits from inside; `node`: the piece.
+  /// Finds hits on the sub-segment of `node`. `outside`: skips hits from inside.
   void run(bool outside, uint32_t node) {
     side_ = -1;
-    // Where a tube is entered matters behind the ray's origin, too: it may start inside.
+    // Entry points of a tube behind the ray origin also matter, since the ray may start inside.
     if (mesh_.is_ribbon() || outside) z_near_ = 0;
-    // From inside, another piece may be where the ray leaves.
+    // From inside, the ray may leave the tube in another sub-segment, so search the whole segment.
     if (mesh_.is_ribbon() || outside) return search_node(node);
     if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
     const int halvings = depth();
@@ -90,7 +90,8 @@ class SegmentTest {
   }
 
  private:
-  /// Halvings until pieces are straight within a part of the radius (as Wang 1984 bounds them).
+  /// Returns the number of halvings after which sub-segments deviate from straight lines by less
+  /// than a fraction of the radius (bound by Wang, 1984), and sets bulge_.
   int depth() {
     double bend = 0;
     for (int i = 0; i < 2; ++i) {
@@ -99,7 +100,7 @@ class SegmentTest {
     }
     const double r = *std::max_element(curve_.r, curve_.r + 4);
     bulge_ = 0.75 * std::sqrt(bend);
-    const double pieces4 = bulge_ / std::max(kStraight * r, 1e-300);  // pieces^2
+    const double pieces4 = bulge_ / std::max(kStraight * r, 1e-300);  // sub-segments^2
     int halvings = mesh_.is_ribbon() ? kRibbonHalvings : 0;
     while (halvings < kMostHalvings && pieces4 > static_cast<double>(1u << (2 * halvings)))
       ++halvings;
@@ -107,7 +108,7 @@ class SegmentTest {
     return halvings;
   }
 
-  /// Whether the ray passes the hull of a piece on either side of its chord.
+  /// Returns whether the ray passes the convex hull of a sub-segment on either side of its chord.
   static bool passes_by(const Bezier& piece, double r) {
     const double x = piece.p[3].x - piece.p[0].x, y = piece.p[3].y - piece.p[0].y;
     const auto beside = [&](int k) { return x * piece.p[k].y - y * piece.p[k].x; };
@@ -117,8 +118,7 @@ class SegmentTest {
     return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
   }
 
-  /// Follows the halves of a node of CurvePiece, or of the piece that it is a part of where that is
-  /// straight.
+  /// Searches the sub-segment of a CurvePiece node, or an ancestor of it that is straight enough.
   void search_node(uint32_t node) {
     int halvings = depth();
     Bezier piece = curve_;
@@ -132,7 +132,7 @@ class SegmentTest {
     search(piece, u0, u1, halvings);
   }
 
-  /// Follows the halves of a piece whose hull the ray may meet.
+  /// Bisects a sub-segment recursively while the ray may hit its hull.
   void search(const Bezier& piece, double u0, double u1, int halvings) {
     const double r = *std::max_element(piece.r, piece.r + 4);
     if (passes_by(piece, r)) return;
@@ -157,7 +157,7 @@ class SegmentTest {
     search(b, middle, u1, halvings - 1);
   }
 
-  /// The same for all leaves of a piece of a tube at once.
+  /// Tests all straight sub-segments below a sub-segment of a tube at once.
   void search_leaves(const Bezier& piece, double r, double u0, double u1, int halvings) {
     uint32_t left = leaves_near(piece, halvings, r, bulge_, z_near_, z_far_);
     const double step = (u1 - u0) / (1 << halvings);
@@ -168,35 +168,36 @@ class SegmentTest {
     }
   }
 
-  /// Of the spheres about the curve, the ray meets that of parameter u at z(u) -+ sqrt(h(u)),
-  /// h = r^2 - x^2 - y^2. The tube is entered where z - sqrt(h) is least (side -1) and left where
-  /// z + sqrt(h) is greatest (side 1). With the curve and radius as lines about u, that is
+  /// Newton step towards the entry or exit of a tube. The ray intersects the sphere of parameter u
+  /// at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. It enters the tube where z - sqrt(h) is minimal
+  /// (side -1) and leaves it where z + sqrt(h) is maximal (side 1). If curve and radius are linear
+  /// around u,
   ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y',
-  /// at u + w: a cone with round ends, and the exact condition once w = 0.
+  /// at u + w. This describes a cone with spherical ends; w = 0 is the exact condition.
   double step(double u, int side) const {
     const V c = curve_.at(u), d = curve_.along(u);
     const double r = curve_.radius(u), dr = curve_.widening(u);
     const double a = dr * dr - d.x * d.x - d.y * d.y, b = r * dr - c.x * d.x - c.y * d.y;
     const double h = r * r - c.x * c.x - c.y * c.y, k = d.z * d.z - a;
-    if (!(k > 0)) return dr > 0 ? kFar : -kFar;  // one sphere holds the next
+    if (!(k > 0)) return dr > 0 ? kFar : -kFar;  // one sphere contains the next
     const double discriminant = b * b - a * h;
     if (discriminant < 0) {
-      if (a < 0) return -b / a;              // a miss so far; go where the ray is nearest
-      return side * d.z > 0 ? kFar : -kFar;  // along the inside of the cone
+      if (a < 0) return -b / a;              // a miss here; step to where the ray is closest
+      return side * d.z > 0 ? kFar : -kFar;  // the ray runs along the inside of the cone
     }
     const double q = -side * d.z * std::sqrt(discriminant / k);
-    // Two forms of one root; the one without cancellation.
+    // Two forms of the same root; choose the one without cancellation.
     double w = 0;
     if (q * b > 0)
       w = (b * b - d.z * d.z * h) / (k * (q + b));
     else if (a != 0)
       w = (q - b) / a;
-    // On the cone's other half, where radii are negative: on this one there is no extreme.
+    // Roots on the other half of the cone, with negative radii, are not extrema.
     return r + dr * w >= 0 ? w : std::copysign(kFar, dr);
   }
 
-  /// The extreme of `side` in piece [u0, u1], if steps from its ends lead into it. Extremes at the
-  /// curve's own ends are such too.
+  /// Adds the extremum of `side` in [u0, u1] if the steps from both ends lead into the interval.
+  /// The curve's own ends may be extrema as well.
   void meet_tube(double u0, double u1, int side) {
     const double s0 = step(u0, side), s1 = step(u1, side);
     if (s0 > 0 && s1 < 0)
@@ -207,8 +208,8 @@ class SegmentTest {
       meet_tube_at(1, side);
   }
 
-  /// The root of step() between u0, where it is s0 > 0, and u1, where it is s1 < 0: by secants that
-  /// stay between.
+  /// Returns the root of step() between u0, where it is s0 > 0, and u1, where it is s1 < 0, by a
+  /// bracketed secant method.
   double extreme_between(double u0, double s0, double u1, double s1, int side) const {
     double before = s0 < -s1 ? u0 : u1, step_before = s0 < -s1 ? s0 : s1;
     double u = u0 + (u1 - u0) * (s0 / (s0 - s1));
@@ -222,7 +223,7 @@ class SegmentTest {
       before = u;
       step_before = s;
       u = next;
-      // The next step would be less than the square of this one, over what is a leaf.
+      // Convergence is superlinear, so the next step would be negligible.
       if (std::abs(u - before) < kNear) break;
     }
     return u;
@@ -243,7 +244,7 @@ class SegmentTest {
       add_tube(z, u, ray_.back(n));
   }
 
-  /// Whether normal n of an end's sphere points into the segment that goes on from there.
+  /// Returns whether normal n of the end sphere points into the adjoining segment.
   bool goes_on_at(const V& n, uint32_t flag, int end, uint32_t next) const {
     if ((mesh_.indices[prim_] & flag) == 0) return false;
     const V d = ray_.point(widen(points_.position(next))) - curve_.p[end];
@@ -251,7 +252,7 @@ class SegmentTest {
     return dot_d(n, d) + dr > kSeam * std::sqrt(dot_d(d, d));
   }
 
-  /// Notes a hit on a tube by its place on it, with the formulas that shading finds it again by.
+  /// Adds a hit on a tube with the surface coordinates from which shading reconstructs the point.
   void add_tube(double z, double u, const V& normal) {
     if (query_ == CurveQuery::kAny) return add(z, 0, 0);
     CurveSegment<float> s;
@@ -272,7 +273,8 @@ class SegmentTest {
     add(z, along, atan2(n.y, n.x) * kInv2Pi);
   }
 
-  /// Across the ribbon, b = c' x n: the ray meets its plane strip at u where x b_y = y b_x.
+  /// Signed offset of the ray across the ribbon. With b = c' x n, the ray hits the strip's plane at
+  /// u where x b_y = y b_x.
   double across(double u) const {
     const V c = curve_.at(u), b = cross_d(curve_.along(u), Bezier::mix(normal_, u));
     return c.x * b.y - c.y * b.x;
@@ -281,8 +283,8 @@ class SegmentTest {
   void meet_ribbon(double u0, double u1) {
     const double f0 = across(u0), f1 = across(u1);
     if ((f0 < 0) != (f1 < 0)) return meet_ribbon_between(u0, f0, u1, f1);
-    // Seen nearly edge-on it may be met twice: is the other side reached at the extreme of the
-    // parabola through the ends and the middle?
+    // A ribbon seen nearly edge-on may be hit twice. Tests whether the sign changes at the extremum
+    // of the parabola through the ends and the midpoint.
     const double slope = f1 - f0, bend = 2 * (f0 + f1) - 4 * across(0.5 * (u0 + u1));
     const double at = bend != 0 ? 0.5 - 0.5 * slope / bend : -1;
     if (!(at > 0 && at < 1)) return;
@@ -292,10 +294,11 @@ class SegmentTest {
     meet_ribbon_between(um, fm, u1, f1);
   }
 
-  /// The hit between parameters at which across() has different signs, by Illinois' regula falsi.
+  /// Finds the hit between parameters where across() has different signs, by the Illinois method
+  /// (regula falsi).
   void meet_ribbon_between(double u0, double f0, double u1, double f1) {
     double u = u0;
-    int kept = 0;  // the end that the last step kept, -1 or 1
+    int kept = 0;  // end that the last step kept: -1 or 1
     for (int i = 0; i < kRibbonSteps && u1 - u0 > 1e-15; ++i) {
       u = std::clamp((f1 * u0 - f0 * u1) / (f1 - f0), u0, u1);
       const double f = across(u);
@@ -319,18 +322,18 @@ class SegmentTest {
 
   void add(double z, float u, float v) {
     const CurveHit hit{static_cast<float>(z / ray_.length), u, v < 0 ? v + 1 : v};
-    // Pieces side by side find the same hit.
+    // Adjacent sub-segments find the same hit.
     for (const CurveHit& known : hits_)
       if (std::abs(known.u - u) < 1e-6f && std::abs(known.t - hit.t) <= 1e-6f * hit.t) return;
     if (hit.t > 0) hits_.add(hit);
   }
 
-  static constexpr double kStraight = 0.025;  ///< of the radius
+  static constexpr double kStraight = 0.025;  ///< fraction of the radius
   static constexpr int kMostHalvings = 9, kRibbonHalvings = 3;
   static constexpr int kSteps = 40, kRibbonSteps = 100;
-  static constexpr double kNear = 1e-9;  ///< steps that are no more leave the extreme as it is
+  static constexpr double kNear = 1e-9;  ///< smaller steps no longer change the extremum
   static constexpr double kFar = 2;      ///< a step beyond either end
-  /// Sine of the angle by which ends reach beyond the seam, so that none shows a gap.
+  /// Sine of the angle by which end caps overlap the joint with the next segment, to prevent gaps.
   static constexpr double kSeam = 1e-3;
 
   const Mesh& mesh_;
@@ -343,10 +346,10 @@ class SegmentTest {
   const PointsAt& points_;
   Bezier curve_;
   V normal_[4];
-  double bulge_ = 0;            ///< how far leaves are from straight
-  double z_near_ = -kInfinity;  ///< where a tube is entered, at the least, that matters
-  int side_ = -1;               ///< which of a tube's extremes are looked for
-  bool may_be_inside_ = false;  ///< entered behind the ray's origin or from the next segment
+  double bulge_ = 0;            ///< deviation of the final sub-segments from straight lines
+  double z_near_ = -kInfinity;  ///< least z of relevant entry points
+  int side_ = -1;               ///< extrema to find: -1 entries, 1 exits
+  bool may_be_inside_ = false;  ///< entered behind the ray origin or from the adjoining segment
 };
 
 void intersect_sphere(const Mesh& mesh, uint32_t prim, const PointsAt& points, const RaySpace& ray,

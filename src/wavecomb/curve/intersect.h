@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays against curves and points.
+/// Intersection of rays with curves and points.
 ///
-/// One ray at a time and in double precision: what a ray hits does not depend on the rays beside it
+/// Tests one ray at a time in double precision, so that hits do not depend on other rays
 /// (docs/decisions/curves.md).
 #pragma once
 
@@ -14,15 +14,15 @@
 
 namespace wavecomb {
 
-/// Where a ray meets a curve or point, u and v as curve/segment.h has them.
+/// Hit on a curve or point; u and v are defined in curve/segment.h.
 struct CurveHit {
   float t, u, v;
 };
 
-/// Hits of a ray on one primitive, nearest first.
+/// Hits of a ray on one primitive, sorted by distance.
 class CurveHits {
  public:
-  static constexpr uint32_t kMost = 8;  ///< of more than these, the farthest are forgotten
+  static constexpr uint32_t kMost = 8;  ///< farther hits than the nearest 8 are dropped
 
   void add(const CurveHit& hit) {
     if (count_ == kMost && !(hit.t < hits_[kMost - 1].t)) return;
@@ -39,27 +39,27 @@ class CurveHits {
   uint32_t count_ = 0;
 };
 
-/// A part of a segment: 1 is all of it, 2 n and 2 n + 1 are the halves of n by parameter.
+/// Sub-segment: node 1 is the whole segment; nodes 2 n and 2 n + 1 are the halves of n in
+/// parameter.
 struct CurvePiece {
-  static constexpr uint32_t kNodes = 8;  ///< nodes are less than this
+  static constexpr uint32_t kNodes = 8;  ///< node indices are less than this
 
   uint32_t prim;
   uint32_t node = 1;
 };
 
-/// What is asked of a curve: its first hit, all of them, or whether there is one (whose u and v are
-/// then not worked out).
+/// Type of query: the first hit, all hits, or whether there is any hit (u and v are then not
+/// computed).
 enum class CurveQuery { kFirst, kAll, kAny };
 
-/// A box around primitive `prim` of a mesh of curves or points, a little larger than it, at one of
-/// the mesh's steps.
+/// Returns conservative bounds of primitive `prim` of a mesh of curves or points at a motion step.
 Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 
-/// Hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of a primitive of a mesh
-/// of curves or points. Where a tube goes on in the next segment, the end that
-/// lies in it is not hit. `time`: in [0, 1] over the mesh's steps. `outside`: what is met from
-/// inside is left out. Of a piece: those on it, and maybe others; they are the same numbers as
-/// those that its primitive gives.
+/// Returns hits with 0 < t <= tfar, t in units of |dir|, on the outside and inside of a primitive
+/// of a mesh of curves or points. End caps of tubes that lie inside the adjoining segment are not
+/// hit. `time`: in [0, 1] over the mesh's motion steps. `outside`: skips hits from inside. Includes
+/// all hits on the given sub-segment and possibly others of its segment; hits are bit-identical to
+/// those of the whole segment.
 CurveHits intersect_curve(const Mesh& mesh, const CurvePiece& piece, const CurveRay& ray,
                           float tfar, CurveQuery query, float time = 0, bool outside = false);
 

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-/// Which leaves of a piece of a tube a ray may meet.
+/// Conservative test of a ray against the straight sub-segments of a tube. Which leaves of a piece
+/// of a tube a ray may meet.
 #pragma once
 
 #include <algorithm>
@@ -11,12 +11,12 @@
 
 namespace wavecomb {
 
-/// A piece is halved so often at the most, so that its leaves are side by side in lanes.
+/// Maximum number of halvings for which all resulting sub-segments fit in the lanes of a vector.
 inline constexpr int kLeafHalvings = 3;
 
 namespace detail {
 
-/// What the control points of a piece weigh at its leaves' ends.
+/// Weights of the control points at the ends of the final sub-segments.
 struct LeafWeights {
   alignas(64) float at[4][16] = {};
 
@@ -37,14 +37,15 @@ inline constexpr std::array<LeafWeights, kLeafHalvings + 1> kLeafWeights = {
 
 }  // namespace detail
 
-/// A bit for each leaf of a piece in the space of a ray, which is halved `halvings` times, that may
-/// be met with z_near <= z <= z_far; `r`: the most radius, `bulge`: how far a leaf is from
-/// straight. In float: what is left out is certain, by a margin for rounding.
+/// Returns a bit mask of the final sub-segments that the ray may hit with z_near <= z <= z_far.
+/// `piece`: sub-segment in ray space, which is halved `halvings` times; `r`: its maximum radius;
+/// `bulge`: deviation of the final sub-segments from straight lines. Computed in float with a
+/// margin for rounding, so that no hit is missed.
 inline uint32_t leaves_near(const curve_math::Bezier& piece, int halvings, double r, double bulge,
                             double z_near, double z_far) {
   using F = FloatP<1 << kLeafHalvings>;
   using curve_math::V;
-  constexpr double kRounding = 4e-6;  // of sums of products in float, over their terms
+  constexpr double kRounding = 4e-6;  // relative error of float dot products
   const detail::LeafWeights& weights = detail::kLeafWeights[static_cast<size_t>(halvings)];
   Vec3<F> a, b;
   const auto ends = [&](double V::* axis, F& at_a, F& at_b) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A ray as curves ask for it.
+/// Ray with its frame, for curve intersection.
 #pragma once
 
 #include <cstring>
@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// A ray and its axes, the last of them along it: in double, and rounded.
+/// Ray and its orthonormal frame with z along the ray, in double and rounded to float.
 struct CurveRay {
   CurveRay(const float (&from)[3], const float (&along)[3]) : space(from, along) {
     std::memcpy(origin, from, sizeof(origin));
@@ -23,7 +23,7 @@ struct CurveRay {
     }
   }
 
-  /// Whether it is that ray, to the bit.
+  /// Returns whether origin and direction are bit-identical to those of this ray.
   bool is(const float (&from)[3], const float (&along)[3]) const {
     return std::memcmp(origin, from, sizeof(origin)) == 0 &&
            std::memcmp(dir, along, sizeof(dir)) == 0;
@@ -32,7 +32,7 @@ struct CurveRay {
   curve_math::RaySpace space;
   float origin[3], dir[3];
   float axis[3][3];
-  float length;  ///< of the direction
+  float length;  ///< length of the direction
 };
 
 }  // namespace wavecomb

@@ -1,17 +1,16 @@
-// SPDX-License-Identifier: Apache-2.0
-/// Curves and points at a hit: the formulas by which traversal notes where it hit, and shading
-/// finds the surface there again.
+/// Parametrisation of curves and points. Traversal computes the surface coordinates (u, v) of a
+/// hit, and shading reconstructs the surface from them.
 ///
-/// A tube is the union of the spheres of radius r(u) about the points c(u) of its curve. A normal n
-/// of its side makes n . c' = -r' (there |p - c|^2 - r^2 does not change along u); its ends are
-/// parts of the first and last sphere. A hit is (u, v): v the angle about the curve in turns, u the
-/// parameter of the sphere that is touched. On the ends u goes on beyond 0 and 1, by the angle in
-/// radians between the normal there and the side's.
+/// A tube is the union of spheres of radius r(u) around the points c(u) of its curve. A normal n of
+/// its side satisfies n . c' = -r' (there |p - c|^2 - r^2 is stationary in u); its ends are parts
+/// of the first and last sphere. In a hit (u, v), v is the angle around the curve in turns, and u
+/// the parameter of the sphere that is touched. On the ends, u continues beyond 0 and 1 by the
+/// angle in radians between the normal and the adjacent normal of the side.
 ///
-/// A ribbon is c(u) + s r(u) b(u), |s| <= 1, b the unit vector along c' x n with n the authored
-/// normal. A hit is u and v = (s + 1) / 2.
+/// A ribbon is c(u) + s r(u) b(u), |s| <= 1, where b is the unit vector along c' x n and n the
+/// authored normal. A hit is u and v = (s + 1) / 2.
 ///
-/// A hit on a sphere is its angles: u = phi / 2 pi about z, v = theta / pi from +z.
+/// A hit on a sphere is given by its angles: u = phi / 2 pi around z, v = theta / pi from +z.
 #pragma once
 
 #include <array>
@@ -22,16 +21,16 @@
 
 namespace wavecomb {
 
-/// A segment of a curve: four Bezier control points, or points 0 and 1 of a line.
+/// Curve segment: four Bezier control points, or points 0 and 1 of a line.
 template <typename F>
 struct CurveSegment {
   std::array<Vec3<F>, 4> p;
   std::array<F, 4> r;        ///< radii
-  std::array<Vec3<F>, 4> n;  ///< normals of ribbons
-  Mask<F> cubic;
+  std::array<Vec3<F>, 4> n;  ///< normals, for ribbons
+  Mask<F> cubic;             ///< lanes with cubic segments; others are lines
 };
 
-/// A curve's point and radius at a parameter, and their derivatives.
+/// Point c and radius r of a curve at a parameter, and their derivatives.
 template <typename F>
 struct CurvePoint {
   Vec3<F> c, dc;
@@ -40,7 +39,7 @@ struct CurvePoint {
 
 namespace detail {
 
-/// Weights of control points, and of the differences between them, at u.
+/// Weights of control points and of their differences at u.
 template <typename F>
 struct CurveWeights {
   std::array<F, 4> value;
@@ -57,7 +56,7 @@ struct CurveWeights {
   T at(const std::array<T, 4>& x) const {
     return x[0] * value[0] + x[1] * value[1] + x[2] * value[2] + x[3] * value[3];
   }
-  /// From differences, so that slopes keep their bits where control points lie close together.
+  /// Uses differences to keep the precision of slopes if control points are close together.
   template <typename T>
   T along(const std::array<T, 4>& x) const {
     return (x[1] - x[0]) * slope[0] + (x[2] - x[1]) * slope[1] + (x[3] - x[2]) * slope[2];
@@ -66,22 +65,22 @@ struct CurveWeights {
 
 }  // namespace detail
 
-/// The curve at u in [0, 1].
+/// Evaluates a curve at u in [0, 1].
 template <typename F>
 inline CurvePoint<F> curve_point(const CurveSegment<F>& s, const F& u) {
   const detail::CurveWeights<F> weights(u, s.cubic);
   return {weights.at(s.p), weights.along(s.p), weights.at(s.r), weights.along(s.r)};
 }
 
-/// The frame of a tube at u: n along the curve, and the angle between it and the side's normals.
+/// Frame of a tube at u with z along the curve, and the angle between z and the side's normals.
 template <typename F>
 struct TubeFrame {
   Frame<F> frame;
   F cos_side, sin_side;
 };
 
-/// Where control points coincide and the derivative at an end is 0, the next ones give the
-/// direction.
+/// Returns the tube frame. If control points coincide and the derivative is zero, the next control
+/// points give the direction.
 template <typename F>
 inline TubeFrame<F> tube_frame(const CurveSegment<F>& s, const CurvePoint<F>& at) {
   Vec3<F> d = at.dc;
@@ -103,7 +102,7 @@ inline TubeFrame<F> tube_frame(const CurveSegment<F>& s, const CurvePoint<F>& at
   return {make_frame<F>(d * inverse), cos_side, safe_sqrt(F((1.f - cos_side) * (1.f + cos_side)))};
 }
 
-/// Outer normal of a tube at a hit.
+/// Returns the outward normal of a tube at a hit.
 template <typename F>
 inline Vec3<F> tube_normal(const TubeFrame<F>& tube, const F& u, const F& v) {
   F c = tube.cos_side, s = tube.sin_side;
@@ -118,16 +117,16 @@ inline Vec3<F> tube_normal(const TubeFrame<F>& tube, const F& u, const F& v) {
   return tube.frame.to_world({s * phi.cos, s * phi.sin, c});
 }
 
-/// Direction from a sphere's middle to a hit on it.
+/// Returns the direction from a sphere's centre to a hit.
 template <typename F>
 inline Vec3<F> sphere_normal(const F& u, const F& v) {
   const SinCos<F> phi = sincos_2pi(u), theta = sincos_2pi(F(0.5f * v));
   return {theta.sin * phi.cos, theta.sin * phi.sin, theta.cos};
 }
 
-/// Words of Mesh::indices of a curve: the segment's first control point, and whether the curve goes
-/// on at its ends. Where it does, the control point before (after) those of the segment gives the
-/// direction in which.
+/// Bits of Mesh::indices of curves: index of a segment's first control point, and whether the curve
+/// continues before or after the segment. If it does, the control point before or after those of
+/// the segment gives the direction in which it continues.
 inline constexpr uint32_t kCurveGoesOnBefore = 0x80000000u, kCurveGoesOnAfter = 0x40000000u;
 inline constexpr uint32_t kCurveFirstPoint = 0x3fffffffu;
 

@@ -12,8 +12,8 @@ namespace {
 using namespace curve_math;
 
 constexpr double kMostDeviations = 3, kLeastAlpha = 1.0 / 255;
-constexpr size_t kMostSplats = 0xffffffffu / 48;  ///< words of harmonics are counted in 32 bits
-/// Smaller and larger scales would leave the range of floats when they are multiplied.
+constexpr size_t kMostSplats = 0xffffffffu / 48;  ///< harmonics use 32-bit offsets
+/// Bounds of scales, whose products must stay within the range of float.
 constexpr float kLeastScale = 1e-9f, kMostScale = 1e9f;
 
 void need(const std::string& name, size_t has, size_t want, const char* what) {
@@ -22,18 +22,19 @@ void need(const std::string& name, size_t has, size_t want, const char* what) {
                 std::to_string(want) + " are needed");
 }
 
-/// Columns of the rotation by a quaternion.
+/// Computes the columns of a quaternion's rotation matrix.
 void axes_of(const float* q, const std::string& name, V (&axis)[3]) {
   double w = q[0], x = q[1], y = q[2], z = q[3];
   const double size = std::sqrt(w * w + x * x + y * y + z * z);
   if (!(size > 1e-12 && size < 1e12))
-    throw Error(name + " has an orientation that is zero or not finite; mend or remove it");
+    throw Error(name + " has an orientation that is zero or not finite; fix or remove it");
   w /= size, x /= size, y /= size, z /= size;
   axis[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)};
   axis[1] = {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)};
   axis[2] = {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)};
 }
 
+/// Transforms a vector to units of standard deviations along the axes of a Gaussian splat.
 V whitened(const SplatRow& row, const V& v) {
   return {dot_d(vec(row.whiten), v), dot_d(vec(row.whiten + 3), v), dot_d(vec(row.whiten + 6), v)};
 }
@@ -51,13 +52,13 @@ std::vector<SplatRow> splat_rows(std::span<const float> scales, std::span<const 
     const float* s = &scales[3 * i];
     for (size_t k = 0; k < 3; ++k)
       if (!(s[k] >= kLeastScale && s[k] <= kMostScale))
-        throw Error(name + " has a scale that is not from 1e-9 to 1e9; mend or remove it");
+        throw Error(name + " has a scale that is not from 1e-9 to 1e9; fix or remove it");
     if (!(opacities[i] >= 0 && opacities[i] <= 1))
-      throw Error(name + " has an opacity that is not from 0 to 1; mend or remove it");
+      throw Error(name + " has an opacity that is not from 0 to 1; fix or remove it");
     V axis[3];
     axes_of(&orientations[4 * i], name, axis);
     row.opacity = opacities[i];
-    // Those that no ray meets keep a place of their own, for the sake of numbers.
+    // Invisible Gaussian splats get a row as well, so that indices stay the same.
     const double visible = 2 * std::log(std::max(opacities[i] / kLeastAlpha, 1.0));
     const double cut = std::min(kMostDeviations * kMostDeviations, visible);
     row.cut = opacities[i] < static_cast<float>(kLeastAlpha) ? -1.f : static_cast<float>(cut);
@@ -90,7 +91,7 @@ void check_splats(const Mesh& mesh, const std::string& name) {
   if (degree > 3) throw Error(name + " has harmonics of a degree above 3; leave those out");
   need(name, mesh.harmonics.size(), 3 * (degree + 1) * (degree + 1) * n, "harmonics");
   if (!std::ranges::all_of(mesh.harmonics, [](float x) { return std::isfinite(x); }))
-    throw Error(name + " has harmonics that are not finite; mend or remove them");
+    throw Error(name + " has harmonics that are not finite; fix or remove them");
 }
 
 Vec3<float> splat_reach(const SplatRow& row) {

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-/// From a hit on a splat to the place and the light there.
+/// Position and emitted radiance of a hit on a Gaussian splat. From a hit on a splat to the place
+/// and the light there.
 #pragma once
 
 #include "wavecomb/curve/harmonics.h"
@@ -8,7 +8,7 @@
 
 namespace wavecomb::detail {
 
-/// Rows 0 to 2 of a splat's map to standard deviations, and whatever else its row says.
+/// Map from offsets to standard deviations of a Gaussian splat, as three matrix rows.
 template <typename F>
 struct SplatMap {
   Vec3<F> row[3];
@@ -20,7 +20,7 @@ struct SplatMap {
   Vec3<F> whiten(const Vec3<F>& v) const {
     return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
   }
-  /// The inverse, by cross products of the rows.
+  /// Applies the inverse, computed from cross products of the rows.
   Vec3<F> unwhiten(const Vec3<F>& w) const {
     const Vec3<F> x = cross(row[1], row[2]), y = cross(row[2], row[0]), z = cross(row[0], row[1]);
     const F det = dot(row[0], x);
@@ -28,7 +28,7 @@ struct SplatMap {
   }
 };
 
-/// A direction of the world in the space of lanes' groups, unit.
+/// Transforms a world direction to the space of each lane's instanced group and normalises it.
 template <typename F>
 inline Vec3<F> local_direction(const InstanceMaps<F>& maps, const Vec3<F>& dir) {
   const Vec3<F> d(dot(maps.inverse_row(0), dir), dot(maps.inverse_row(1), dir),
@@ -36,7 +36,7 @@ inline Vec3<F> local_direction(const InstanceMaps<F>& maps, const Vec3<F>& dir) 
   return d * F(1.f / sqrt(max(length_squared(d), F(1e-30f))));
 }
 
-/// From the middle to the place of hits (u, v) of rays along `dir`.
+/// Returns the offset from the centre to the position of hits (u, v) by rays along `dir`.
 template <typename F>
 inline Vec3<F> splat_offset(const SplatMap<F>& map, const InstanceMaps<F>& maps, const F& u,
                             const F& v, const Vec3<F>& dir) {
@@ -50,9 +50,8 @@ inline Vec3<F> splat_offset(const SplatMap<F>& map, const InstanceMaps<F>& maps,
 
 namespace wavecomb {
 
-/// Radiance along rays of direction `dir` from the splats that they met, by which a material's
-/// emission is multiplied: 0.5 and the sum of the harmonics, 0 at least. 1 on whatever else they
-/// met.
+/// Returns the factor by which a Gaussian splat multiplies its material's emission for rays along
+/// `dir`: 0.5 plus the sum of its harmonics, clamped to at least 0. It is 1 for other hits.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> splat_radiance(const SceneView& scene, const MeshHit<F>& hit,
                                                      const Vec3<F>& dir, const Mask<F>& active) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// From a hit on a curve or point to the surface there; part of surface/surface.h.
+/// Surface at hits on curves and points; part of surface/surface.h.
 #pragma once
 
 #include "wavecomb/curve/segment.h"
@@ -9,11 +9,11 @@
 
 namespace wavecomb::detail {
 
-/// A point of a curve's or point's surface in its group's space, and what goes with it.
+/// Surface point of a curve or point in group space.
 template <typename F>
 struct CurvedPoint {
-  Vec3<F> p, n, dpdu;  ///< n: unit, outside
-  F size;              ///< of the terms that p was made of
+  Vec3<F> p, n, dpdu;  ///< n: unit outward normal
+  F size;              ///< bound of the terms that p was computed from, for rounding error
   F du, dv;            ///< lengths of dp/du and dp/dv
 };
 
@@ -22,7 +22,7 @@ inline F reach(const Vec3<F>& v) {
   return max_component(abs3(v));
 }
 
-/// Sum of sizes of N control points, a bound of what is rounded when they are mixed.
+/// Returns a bound of the coordinates of a segment's control points, for the rounding error.
 template <typename F>
 inline F control_size(const CurveSegment<F>& s) {
   return max(max(F(reach(s.p[0]) + s.r[0]), F(reach(s.p[1]) + s.r[1])),
@@ -36,7 +36,7 @@ inline CurvedPoint<F> tube_point(const CurveSegment<F>& s, const F& u, const F& 
   return {fma(n, at.r, at.c), n, at.dc, control_size(s), F(length(at.dc)), F(2.f * kPi * at.r)};
 }
 
-/// The derivative of b = B / |B|, B = c' x n, is (B' - b (b . B')) / |B|.
+/// The derivative of b = B / |B| with B = c' x n is (B' - b (b . B')) / |B|.
 template <typename F>
 inline CurvedPoint<F> ribbon_point(const CurveSegment<F>& s, const F& u, const F& v) {
   const CurvePoint<F> at = curve_point<F>(s, u);
@@ -81,14 +81,14 @@ inline void merge(Surface<F>& to, const Surface<F>& from, const Mask<F>& m) {
         select<F>(m, from.ns, to.ns)};
 }
 
-/// Texture coordinates, how they change with length, and the tangent along them.
+/// Sets texture coordinates, their change per length, and the tangent.
 template <typename F>
 inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const MeshHit<F>& hit,
                    const CurvedPoint<F>& c, const Mask<F>& active, const Mask<F>& strands,
                    Surface<F>& s) {
   const F scale = length(maps.vector(c.dpdu)) / max(length(c.dpdu), F(1e-30f));
   s.dpdu = maps.vector(c.dpdu);
-  // Without authored coordinates a segment has all of the unit square.
+  // Without authored coordinates, each segment covers the unit square.
   F density2 = 1.f / max(F(c.du * c.dv * scale * scale), F(1e-30f));
   const CurveUv<F> uv = curve_uv<F>(mesh, hit.prim, hit.u, hit.v, active, strands);
   s.uv = uv.uv;
@@ -100,7 +100,7 @@ inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const
   s.uv_per_length = sqrt(density2);
 }
 
-/// Puts control points, normals of ribbons and instances where they are at the hits' time; gives a
+/// Moves control points, ribbon normals and instance transforms to the time of the hits. Returns a
 /// bound of all terms of world positions.
 template <typename F>
 [[gnu::noinline, gnu::cold]] F move_segment(const SceneView& scene, const MeshHit<F>& hit,
@@ -124,8 +124,8 @@ template <typename F>
   return instance.size;
 }
 
-/// The surface at hits on curves and points. Of no use to triangles; never inlined, so that scenes
-/// without curves do not pay for its registers. Splats face `dir`, along which they were met.
+/// Computes the surface at hits on curves and points. Never inlined, so that scenes without curves
+/// do not pay for its registers. The normal of Gaussian splats is -`dir`, opposite to the ray.
 template <typename F>
 __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHit<F>& hit,
                                             const Vec3<F>& dir, bool with_uv, const Mask<F>& active,

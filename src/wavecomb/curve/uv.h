@@ -6,16 +6,16 @@
 
 namespace wavecomb::detail {
 
-/// Texture coordinates on curves and points, and their change from one end of a segment to the
-/// other where they are `authored`.
+/// Texture coordinates on curves and points, and the difference `d` between both ends of a segment
+/// if they are `authored`.
 template <typename F>
 struct CurveUv {
   Vec2<F> uv, d;
   Mask<F> authored;
 };
 
-/// Authored coordinates go from one end of a segment to the other, and points have one pair each;
-/// else they are the hit's own. `strands`: lanes that are no points.
+/// Returns texture coordinates at hits. Authored coordinates are interpolated between the ends of a
+/// segment, and constant on points; otherwise they are the hit's own. `strands`: lanes with curves.
 template <typename F>
 inline CurveUv<F> curve_uv(const MeshReader<F>& mesh, const UInt<F>& prim, const F& u, const F& v,
                            const Mask<F>& active, const Mask<F>& strands) {
