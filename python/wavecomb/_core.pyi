@@ -595,85 +595,86 @@ class Settings:
 
     # ---- setting_table(): tools/update_stub ----
     width: int
-    """Pixels of a row of the picture. Default: 600."""
+    """Width of the image in pixels. Default: 600."""
     height: int
-    """Rows of pixels. Default: 600."""
+    """Height of the image in pixels. Default: 600."""
     max_depth: int
-    """Longest path, in scatterings. Default: 8."""
+    """Maximum number of scattering events of a path. Default: 8."""
     seed: int
-    """Of all random numbers. Default: 0."""
+    """Seed of all random numbers. Default: 0."""
     sampler: Literal["sobol", "independent"]
-    """Where samples lie. Default: sobol."""
+    """Pattern of the sample positions. Default: sobol."""
     filter: Literal["box", "gaussian", "blackman-harris"]
-    """How samples count for the pixels around them. Default: blackman-harris."""
+    """Pixel filter: weights of samples around a pixel. Default: blackman-harris."""
     @property
     def filter_width(self) -> float:
-        """Full width of the filter in pixels; its own: box 1, the others 3. Default: its own."""
+        """Full width of the pixel filter in pixels; its own is 1 for the box and 3 for others. Default:
+        its own."""
 
     @filter_width.setter
     def filter_width(self, value: float | None) -> None: ...
     clamp_indirect: float
-    """Limit of a sample's indirect light; biased. Default: off. 0: off."""
+    """Maximum luminance of an indirect contribution. Reduces fireflies but darkens the image.
+    Default: off. 0: off."""
     fresnel: Literal["exact", "schlick"]
-    """Reflectance of dielectrics. Default: exact."""
+    """Formula for the reflectance of dielectrics. Default: exact."""
     texture_filter: Literal["auto", "whole"]
     """How textures are filtered. Default: auto."""
     cosine_sampling: bool
-    """Samples every bounce that is not a mirror's by cosine. Default: False."""
+    """Samples every non-specular bounce by cosine, for comparisons. Default: False."""
     alpha: bool
-    """Where the camera sees a dome or a distant light the picture is clear, with an alpha channel.
-    Default: False."""
+    """Makes domes and distant lights transparent to the camera, with an alpha channel. Default:
+    False."""
     error: bool
-    """Keeps errors and variances where nothing else asks. Default: False."""
+    """Stores error and variance estimates of each pixel. Default: False."""
     overscan: int
-    """Pixels that are rendered beyond each edge of the picture. Default: 0."""
+    """Extra pixels to render beyond each edge of the image. Default: 0."""
     deep_samples: int
-    """The most samples that a deep picture has in a pixel. Default: 16."""
+    """Maximum number of samples per pixel of a deep image. Default: 16."""
     deep_tolerance: float
-    """Samples of a deep picture whose depths differ by no more than this share of the depth are
-    one. Default: 0.01."""
+    """Merges samples of a deep image whose depths differ by at most this fraction of the depth.
+    Default: 0.01."""
     crop: bool
-    """The picture is its region alone, in memory and in files. Default: False."""
+    """Limits the image, in memory and in files, to the region. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
-    """How paths end early. Each is unbiased, but another estimate. Default: auto."""
+    """Russian roulette: how paths are terminated early, without bias. Default: auto."""
     transport: Literal["path", "light", "auto", "bdpt"]
-    """Where paths begin. Default: path."""
+    """Where paths start. Default: path."""
     light_aim: Literal["off", "on"]
-    """Where paths from lights are aimed. Default: on."""
+    """Where light paths are aimed. Default: on."""
     merge_radius: float
-    """Pixels, by which caustics that are seen in mirrors or through glass may be blurred so that
-    light paths find them. Default: never. 0: never."""
+    """Radius in pixels within which caustics seen in mirrors or through glass are blurred to find
+    them. Default: never. 0: never."""
     firefly: Literal["keep", "reweight"]
-    """What becomes of samples much brighter than others. Default: keep."""
+    """Treatment of samples much brighter than others. Default: keep."""
     roulette_depth: int
-    """The first vertex at which a path may end early. Default: 2."""
+    """First vertex at which roulette may terminate a path. Default: 2."""
     light_selection: Literal["auto", "tree", "power"]
-    """How a light is chosen to sample: for the place that it lights, or by power. Default: auto."""
+    """How shading chooses the light to sample. Default: auto."""
     light_weights: Literal["calibrated", "power"]
     """How often each light is chosen. Default: calibrated."""
     equiangular: Literal["off", "on"]
-    """How distances in even volumes are chosen. Default: off."""
+    """How scattering distances in homogeneous volumes are sampled. Default: off."""
     guiding: Literal["auto", "on", "off"]
-    """How bounces choose directions: by materials, or also by where light comes from. Default:
-    off."""
+    """Path guiding: bounces also follow the learned incident light. Default: off."""
     learn_memory: int
-    """Memory that what is learned may take, in MB. Default: 64."""
+    """Memory limit of learned data in MB. Default: 64."""
     adaptive: float
-    """Error that a pixel may have, as a share of its brightness. Default: off. 0: off."""
+    """Samples each pixel until its relative error is below this value. Default: off. 0: off."""
     noise: float
-    """Mean relative error that the picture may have. Default: off. 0: off."""
+    """Renders until the image's mean relative error is below this value. Default: off. 0: off."""
     min_spp: int
-    """Samples of each pixel before the first look at errors. Default: 16."""
+    """Samples per pixel before the first error estimate. Default: 16."""
     spp: int
-    """Samples of each pixel; with adaptive sampling, the most. Default: 64."""
+    """Samples per pixel; the maximum with adaptive sampling. Default: 64."""
     allocate: Literal["even", "error", "efficiency"]
-    """How the samples of a render are allotted to its pixels. Default: even."""
+    """How samples are distributed over pixels. Default: even."""
     time_limit: float
-    """Seconds of rendering. Default: none. 0: none."""
+    """Stops rendering after this many seconds. Default: none. 0: none."""
     integrator: Literal["wavefront", "reference"]
-    """How paths are followed. Default: wavefront."""
+    """How paths are traced. Default: wavefront."""
     costs: Literal["auto", "measured", "model"]
-    """Where the estimated costs of materials come from. Default: auto."""
+    """Source of the estimated costs of materials. Default: auto."""
     policy: str
     """The order in which hits are shaded. Default: code."""
     ray_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
@@ -681,19 +682,20 @@ class Settings:
     shadow_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
     """The order in which shadow rays are traced. Default: auto."""
     lanes: int
-    """How many records are shaded at once. Default: auto. 0: auto."""
+    """Number of records that are shaded at once. Default: auto. 0: auto."""
     wave_size: int
-    """Paths that are followed together by one thread. Default: automatic. 0: automatic."""
+    """Number of paths that a thread processes together. Default: automatic. 0: automatic."""
     materialize: Literal["auto", "on", "off"]
     """Whether records are moved into their order. Default: auto."""
     traversal: Literal["packets", "single"]
-    """How rays are handed to Embree; the picture is the same. Default: packets."""
+    """How rays are passed to Embree; the image is the same. Default: packets."""
     threads: int
-    """Threads that render. Default: all. 0: all."""
+    """Number of render threads. Default: all. 0: all."""
     cost_weight: float
     """Weight of a pass in the moving average of costs. Default: 0.3."""
     progressive: bool
-    """Passes of 1, 1, 2, 4 ... samples: the whole picture is there soon. Default: False."""
+    """Renders passes of 1, 1, 2, 4, ... samples, so that the whole image appears soon. Default:
+    False."""
     # ---- to here ----
     region: tuple[int, int, int, int] | None  # x0, y0, x1, y1: the pixels rendered, end excluded
     # Names of aov_table(); "light_NAME" for one light group, "lpe:NAME=EXPRESSION".

@@ -233,7 +233,7 @@ def test_in_a_file(stage: Path, tmp_path: Path) -> None:
         ("lpe:a=C<RX>L", "light path expression a=C<RX>L: at character 4 ('X')"),
         ("lpe:a", "AOV 'lpe:a' has no expression; write lpe:NAME=EXPRESSION"),
         ("lpe:a=C.*<L.'rim'>", "the scene has no light group 'rim'; it has "),
-        ("lpe:a=RDL", "it begins with no camera; write C first"),
+        ("lpe:a=RDL", "it does not begin with a camera; write C first"),
     ],
 )
 def test_refused_in_one_line(stage: Path, tmp_path: Path, aov: str, message: str) -> None:

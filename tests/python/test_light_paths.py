@@ -108,7 +108,7 @@ def test_a_resumed_picture_is_that_which_nothing_stopped(stages: Any, tmp_path: 
         ({"guiding": "auto"}, "guiding"),
         ({"clamp_indirect": 1.0}, "clamp_indirect"),
         ({"cosine_sampling": True}, "cosine_sampling"),
-        ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "too much to tell apart"),
+        ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "too many states"),
         ({"transport": "both"}, "must be one of path, light, auto, bdpt"),
     ],
     ids=lambda x: str(x)[:30],

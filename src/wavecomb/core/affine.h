@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Affine maps.
+/// Affine transforms.
 #pragma once
 
 #include "wavecomb/core/vec3.h"
 
 namespace wavecomb {
 
-/// An affine map x -> A x + t, rows of A then t; column-vector convention.
+/// Affine transform x -> A x + t for column vectors: rows of A, then t.
 struct Affine {
   Vec3<float> row[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   Vec3<float> t{0, 0, 0};
@@ -20,7 +20,7 @@ struct Affine {
             row[1].x * v.x + row[1].y * v.y + row[1].z * v.z,
             row[2].x * v.x + row[2].y * v.y + row[2].z * v.z};
   }
-  /// Column j of A: the image of axis j.
+  /// Returns column j of A, the image of axis j.
   Vec3<float> axis(int j) const {
     const auto pick = [j](const Vec3<float>& r) { return j == 0 ? r.x : (j == 1 ? r.y : r.z); };
     return {pick(row[0]), pick(row[1]), pick(row[2])};
@@ -36,7 +36,7 @@ struct Affine {
            row[1].z == 0 && row[2].x == 0 && row[2].y == 0 && row[2].z == 1 && t.x == 0 &&
            t.y == 0 && t.z == 0;
   }
-  /// The map that first applies `b`, then `a`.
+  /// Returns the transform that applies `b` first, then `a`.
   friend Affine operator*(const Affine& a, const Affine& b) {
     const Vec3<float> x = a.vector(b.axis(0)), y = a.vector(b.axis(1)), z = a.vector(b.axis(2));
     return {{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}, a.point(b.t)};

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render can keep beside the beauty, as a table: arbitrary output variables (docs/aovs.md).
+/// Arbitrary output variables (AOVs): layers that a render can store beside the beauty, as a table
+/// (docs/aovs.md).
 ///
-/// A new one is a row at the end of WAVECOMB_AOVS, and a line where paths find its value
-/// (integrate/path_aovs.h). Its place in the film, its layer, its block in checkpoints, its name in
-/// Python, on the command line and in the window follow from the row.
+/// To add one, add a row at the end of WAVECOMB_AOVS and a line that provides its value
+/// (integrate/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
+/// command line and in the window follow from the row.
 #pragma once
 
 #include <bit>
@@ -14,33 +15,33 @@
 
 namespace wavecomb {
 
-/// How the samples of a pixel become its value.
+/// Reduction of a pixel's samples to its value.
 enum class AovKind : uint8_t {
-  kMean,         ///< the mean over its samples
-  kMeanOfHits,   ///< the mean over those that hit something, infinite where none did
-  kNearest,      ///< that of the sample nearest its centre: a mean of these means nothing
-  kCoverage,     ///< ids, and how much of the pixel each covers (Cryptomatte)
-  kGroups,       ///< a layer of means for each light group
-  kExpressions,  ///< a layer of means for each light path expression
-  kSum,          ///< the sum over its samples
-  kDeep,         ///< samples by depth, which go to a file of their own (film/deep_film.h)
-  kMedian,       ///< about the median of its samples (film/median.h), which may be infinite
+  kMean,         ///< mean over all samples
+  kMeanOfHits,   ///< mean over samples that hit something; infinite if none did
+  kNearest,      ///< value of the sample nearest to the pixel centre, for values without a mean
+  kCoverage,     ///< ids and the fraction of the pixel that each covers (Cryptomatte)
+  kGroups,       ///< one layer of means per light group
+  kExpressions,  ///< one layer of means per light path expression
+  kSum,          ///< sum over all samples
+  kDeep,         ///< samples by depth, written to a separate file (film/deep_film.h)
+  kMedian,       ///< estimated median of the samples (film/median.h); may be infinite
 };
 
-/// Who finds the value of a path.
+/// Point in a path's evaluation at which an AOV's value is known.
 enum class AovSource : uint8_t {
-  kHit,     ///< what the camera's ray met, before it is shaded
-  kVertex,  ///< the first vertex, once it was shaded
-  kGuide,   ///< the last vertex that guides a denoiser
-  kLight,   ///< the light that reaches the path
-  kWay,     ///< the same by the techniques that found it
-  kTime,    ///< the clock
-  kBounce,  ///< all bounces of the path
+  kHit,     ///< at the hit of the camera ray, before shading
+  kVertex,  ///< after shading the first vertex
+  kGuide,   ///< after the last vertex that provides denoiser features
+  kLight,   ///< when light contributes to the path
+  kWay,     ///< as kLight, separated by sampling technique
+  kTime,    ///< from the clock
+  kBounce,  ///< over all bounces of the path
 };
 
-/// X(enumerator, name, channels, kind, source, title): a bit each, in this order. Channels are 0
-/// where the layer is none of numbers, or there are several; the title is the window's, "" where it
-/// does not offer the layer.
+/// X(enumerator, name, channels, kind, source, title): one bit each, in this order. `channels` is 0
+/// for layers that are not numeric or are several. `title` is the label in the window; "" hides the
+/// layer there.
 // clang-format off
 #define WAVECOMB_AOVS(X)                                                                      \
   X(Albedo, "albedo", 3, kMean, kVertex, "Albedo")                                            \
@@ -84,7 +85,7 @@ enum class AovPlace : uint32_t { WAVECOMB_AOVS(WAVECOMB_AOV) kCount };
 inline constexpr auto kAovCount = static_cast<uint32_t>(detail::AovPlace::kCount);
 static_assert(kAovCount <= 32);
 
-/// One bit each.
+/// AOV flags, one bit each.
 enum class Aov : uint32_t {
 #define WAVECOMB_AOV(id, name, channels, kind, source, title) \
   k##id = 1u << static_cast<uint32_t>(detail::AovPlace::k##id),
@@ -92,6 +93,7 @@ enum class Aov : uint32_t {
 #undef WAVECOMB_AOV
 };
 
+/// Row of the AOV table.
 struct AovRow {
   Aov aov;
   const char* name;
@@ -106,7 +108,7 @@ inline constexpr AovRow kAovs[] = {
     WAVECOMB_AOVS(WAVECOMB_AOV)
 #undef WAVECOMB_AOV
 };
-/// The place of its row.
+/// Returns the row index of an AOV.
 constexpr uint32_t place_of(Aov aov) {
   return static_cast<uint32_t>(std::countr_zero(static_cast<uint32_t>(aov)));
 }
@@ -123,7 +125,7 @@ constexpr uint32_t operator|(Aov a, Aov b) {
 constexpr uint32_t operator|(uint32_t a, Aov b) {
   return a | static_cast<uint32_t>(b);
 }
-/// Bits of the rows for which `is_wanted`.
+/// Returns the bits of the rows for which `is_wanted` holds.
 template <typename IsWanted>
 constexpr uint32_t aov_bits(const IsWanted& is_wanted) {
   uint32_t bits = 0;
@@ -140,11 +142,11 @@ constexpr uint32_t aov_bits(AovSource source) {
 
 /// A set of AOVs.
 struct AovSet {
-  /// Those that are kept where nothing is asked for. A picture has fields for them.
+  /// AOVs stored by default, which have members in Film::Layers and in images.
   static constexpr uint32_t kUsual = Aov::kAlbedo | Aov::kNormal | Aov::kDepth;
-  /// Parts of the beauty: emission + direct + indirect.
+  /// Components of the beauty: emission + direct + indirect.
   static constexpr uint32_t kParts = Aov::kEmission | Aov::kDirect | Aov::kIndirect;
-  /// All that have names of their own and are layers of a picture.
+  /// All AOVs that are requested by name and written as layers of an image.
   static constexpr uint32_t kAll = aov_bits([](const AovRow& row) {
     return row.kind != AovKind::kExpressions && row.kind != AovKind::kDeep;
   });
@@ -157,27 +159,27 @@ struct AovSet {
   bool has(AovSource source) const { return any(aov_bits(source)); }
   bool any(uint32_t mask) const { return (bits & mask) != 0; }
 
-  /// Light path expressions have names of their own.
+  /// Returns the names of the AOVs in the set, without light path expressions.
   std::vector<std::string> names() const;
-  /// Throws Error that lists what there is.
+  /// Returns the AOV of a name. Throws Error that lists the known names.
   static Aov parse(std::string_view name);
 };
 
-/// Samples that a pixel of a deep picture may have.
+/// Upper limit of deep samples per pixel.
 inline constexpr uint32_t kMostDeepSamples = 64;
 
-/// How finely a pixel's samples are told apart by depth.
+/// Resolution of deep images in depth.
 struct DeepLimits {
-  uint32_t most = 16;       ///< deep samples of a pixel
-  float tolerance = 0.01f;  ///< samples whose depths differ by no more than this share are one
+  uint32_t most = 16;       ///< maximum number of deep samples per pixel
+  float tolerance = 0.01f;  ///< samples closer than this fraction of their depth are merged
 };
 
-/// What a film and the waves that fill it make room for.
+/// AOVs that a film stores, with their sizes.
 struct AovLayout {
   AovSet set;
-  uint32_t light_groups = 0;  ///< how many are kept
-  uint32_t expressions = 0;   ///< light path expressions
-  DeepLimits deep{};          ///< of Aov::kDeep
+  uint32_t light_groups = 0;  ///< number of stored light groups
+  uint32_t expressions = 0;   ///< number of light path expressions
+  DeepLimits deep{};          ///< for Aov::kDeep
 };
 
 }  // namespace wavecomb

@@ -9,7 +9,7 @@
 namespace wavecomb {
 namespace {
 
-/// By state of the forward automaton, a bit for each expression.
+/// Bits of the matched expressions, by state of the forward automaton.
 using MatchedFrom = std::vector<uint32_t>;
 
 }  // namespace
@@ -23,8 +23,8 @@ BackwardAutomaton::BackwardAutomaton(const PathAutomaton& forward)
     if (is_new) functions.push_back(std::move(f));
     if (functions.size() > kMostStates)
       throw Error(
-          "light path expressions: paths from the lights would have too much to tell apart at "
-          "once; ask for fewer, for less repetition, or for transport path");
+          "light path expressions: light paths would need too many states; use fewer "
+          "expressions or less repetition, or transport path");
     return at->second;
   };
   for (uint32_t end = 0; end < forward.ends; ++end) {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light path expressions as paths from the lights read them: from their end.
+/// Automaton that evaluates light path expressions for light paths, in reverse order.
 ///
-/// What the scatterings between a vertex and the light mean to a PathAutomaton is a function: from
-/// the state that a path from the camera would have before them to the expressions that it would
-/// match. A path from a light carries the number of that function f, and a scattering x that comes
-/// before makes of it
+/// The events between a vertex and the light act on a PathAutomaton as a function f: it maps the
+/// state of a camera path before these events to the set of matched expressions. A light path
+/// carries the index of f. An event x that precedes the others on the camera side changes f to
 ///   f'(q) = f(next(q, x)).
-/// The functions that there are, from those of all ends on, are the least automaton of the
-/// expressions read backwards (J. Brzozowski, "Canonical regular expressions and minimal state
-/// graphs for definite events", 1962).
+/// The reachable functions, starting from those of all ends, form the minimal automaton of the
+/// reversed expressions (J. Brzozowski, "Canonical regular expressions and minimal state graphs for
+/// definite events", 1962).
 #pragma once
 
 #include <cstdint>
@@ -18,18 +17,20 @@
 
 namespace wavecomb {
 
+/// Automaton of the reversed expressions.
+///
 /// Contract: immutable.
 struct BackwardAutomaton {
   static constexpr uint32_t kMostStates = PathAutomaton::kMostStates;
 
   BackwardAutomaton() = default;
-  /// Throws Error where there are more than kMostStates functions.
+  /// Throws Error if there would be more than kMostStates states.
   explicit BackwardAutomaton(const PathAutomaton& forward);
 
   uint32_t forward_states = 0;
-  std::vector<uint32_t> begin;    ///< [end]: state of a path that has left it
-  std::vector<uint32_t> next;     ///< [state][event], PathAutomaton::kNextWords a state
-  std::vector<uint32_t> matched;  ///< [state][state of the forward one]: a bit for each expression
+  std::vector<uint32_t> begin;    ///< [end]: initial state of a light path that starts there
+  std::vector<uint32_t> next;     ///< [state][event], PathAutomaton::kNextWords per state
+  std::vector<uint32_t> matched;  ///< [state][forward state]: one bit per expression
   uint32_t states() const { return static_cast<uint32_t>(next.size() / PathAutomaton::kNextWords); }
 };
 

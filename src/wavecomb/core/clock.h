@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The clock that all times are taken by.
+/// Clock for all time measurements.
 #pragma once
 
 #include <chrono>
@@ -8,7 +8,7 @@ namespace wavecomb {
 
 using Clock = std::chrono::steady_clock;
 
-/// Seconds from `start` to now.
+/// Returns the seconds from `start` to now.
 inline double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }

@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Flushes denormal floats to zero on this thread for as long as it lives: they are slow and mean
-/// nothing here, and every worker must treat them alike for pictures to be equal.
+/// Scope guard that flushes denormal floats to zero on this thread. Denormals are slow and
+/// irrelevant here, and all workers must treat them the same to produce the same image.
 class DenormalsOff {
  public:
   DenormalsOff() : saved_(control()) { set_control(saved_ | kFlush); }
@@ -19,13 +19,13 @@ class DenormalsOff {
   DenormalsOff& operator=(const DenormalsOff&) = delete;
 
  private:
-  // The control word of the thread's floating point, and the bits that flush results and operands.
+  // Floating-point control word of the thread, and its bits that flush results and operands.
 #if defined(__SSE__)
   static constexpr uint64_t kFlush = 0x8040;
   static uint64_t control() { return _mm_getcsr(); }
   static void set_control(uint64_t word) { _mm_setcsr(static_cast<unsigned>(word)); }
 #elif defined(__aarch64__)
-  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ: both
+  static constexpr uint64_t kFlush = uint64_t{1} << 24;  // FPCR.FZ flushes both
   static uint64_t control() {
     uint64_t word;
     asm volatile("mrs %0, fpcr" : "=r"(word));
@@ -33,7 +33,7 @@ class DenormalsOff {
   }
   static void set_control(uint64_t word) { asm volatile("msr fpcr, %0" : : "r"(word) : "memory"); }
 #else
-#error "DenormalsOff: how this CPU flushes denormals is not known here."
+#error "DenormalsOff: not implemented for this CPU."
 #endif
 
   uint64_t saved_;

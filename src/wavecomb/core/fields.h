@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rows with named fields. A row is a struct template on the float type: Row<float> is what lies in
-/// memory, Row<packet> what lanes hold of as many rows. Its fields are listed once; loads, stores
-/// and the places of fields follow from the list.
+/// Rows with named fields. A row is a struct template on the float type: Row<float> is the memory
+/// layout, and Row<packet> holds one row per lane. Its fields are listed once; loads, stores and
+/// field offsets follow from the list.
 ///
 ///   template <typename F>
 ///   struct Ray {
@@ -11,8 +11,8 @@
 ///   };
 ///   Ray<F> ray = load_row<Ray, F>(rows, index, active);
 ///
-/// A field is F, UInt<F>, Vec2<F>, Vec3<F>, or a struct with fields of its own. Rows lie
-/// kRowWords<Row> words apart, a power of two, so that none is cut by a cache line.
+/// A field is F, UInt<F>, Vec2<F>, Vec3<F>, or a struct with fields. Rows are kRowWords<Row> words
+/// apart, a power of two, so that no row crosses a cache line boundary.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@
 #include "wavecomb/core/rows.h"
 #include "wavecomb/core/vec3.h"
 
-/// Lists all fields of a row, in their order.
+/// Lists all fields of a row in order.
 #define WAVECOMB_FIELDS(...)                      \
   WAVECOMB_INLINE constexpr auto fields() {       \
     return std::tie(__VA_ARGS__);                 \
@@ -67,7 +67,7 @@ struct WordsOf<Vec3<F>> {
   static constexpr size_t value = 3;
 };
 
-/// A field's word as what lanes load and store, and back.
+/// Converts a field to the word type of loads and stores, and back.
 template <typename F, typename T>
 WAVECOMB_INLINE F to_word(const T& field) {
   if constexpr (std::is_same_v<T, F>)
@@ -83,8 +83,8 @@ WAVECOMB_INLINE void from_word(const F& word, T& field) {
     field = float_bits<F>(word);
 }
 
-/// Runs one(word, value) for each word of `value`, whose first is word `At`; `one` takes and gives
-/// values of type F.
+/// Calls one(word, value) for each word of `value`, whose first word has index `At`. `value` has
+/// type F or UInt<F>.
 template <size_t At, typename F, typename T, typename One>
 WAVECOMB_INLINE void for_each_word(T& value, const One& one);
 
@@ -111,21 +111,21 @@ WAVECOMB_INLINE void for_each_word(T& value, const One& one) {
 
 }  // namespace detail
 
-/// Words that the fields of a row take.
+/// Number of words in the fields of a row.
 template <template <typename> class Row>
 inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
-/// Words from one row to the next.
+/// Distance between rows in words.
 template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
-/// The word of a row, or of any record, at which a member lies: word_of(&Row<float>::slot).
+/// Returns the word index of a member in a row or record: word_of(&Row<float>::slot).
 template <typename Record, typename Member>
 inline uint32_t word_of(Member Record::* member) {
-  static_assert(sizeof(member) == sizeof(ptrdiff_t));  // a byte offset, as the Itanium ABI has it
+  static_assert(sizeof(member) == sizeof(ptrdiff_t));  // a byte offset in the Itanium ABI
   return static_cast<uint32_t>(std::bit_cast<ptrdiff_t>(member) / 4);
 }
 
-/// A row as the words of its lanes: what store_rows takes. Words beyond the fields are 0.
+/// Returns the words of a row, by lane, for store_rows. Words beyond the fields are 0.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE std::array<F, kRowWords<Row>> words_of_row(const Row<F>& row) {
   static_assert(sizeof(Row<float>) == 4 * kFieldWords<Row>, "WAVECOMB_FIELDS lists all fields");
@@ -155,15 +155,14 @@ struct IsHead<std::tuple<H&...>, std::tuple<R&...>> {
 
 }  // namespace detail
 
-/// Whether the first fields of Row are those of Head.
+/// True if the first fields of Row are those of Head.
 template <template <typename> class Head, template <typename> class Row>
 inline constexpr bool kIsHead =
     detail::IsHead<decltype(std::declval<Head<float>&>().fields()),
                    decltype(std::declval<Row<float>&>().fields())>::value;
 
-/// The first fields, those of Head, of row `index` of the rows of type Row at `base`, for each
-/// active lane; 0 in the others. Nothing else of the row is read, but up to a power of two of
-/// words.
+/// Loads the leading fields Head of row `index` in an array of rows at `base`, for each active
+/// lane; other lanes get 0. Reads only these fields, rounded up to a power of two words.
 template <template <typename> class Head, template <typename> class Row, typename F>
 WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const Mask<F>& active) {
   static_assert(sizeof(Head<float>) == 4 * kFieldWords<Head>, "WAVECOMB_FIELDS lists all fields");
@@ -177,13 +176,13 @@ WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const 
   return head;
 }
 
-/// Row `index` of the rows at `base`, for each active lane; 0 in the others.
+/// Loads row `index` of the array at `base` for each active lane; other lanes get 0.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE Row<F> load_row(const void* base, const UInt<F>& index, const Mask<F>& active) {
   return load_head<Row, Row, F>(base, index, active);
 }
 
-/// Writes the rows `index` of the active lanes, which are distinct.
+/// Stores rows at the indices of the active lanes, which must be distinct.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE void store_row(void* base, const UInt<F>& index, const Row<F>& row,
                                const Mask<F>& active) {
@@ -191,14 +190,14 @@ WAVECOMB_INLINE void store_row(void* base, const UInt<F>& index, const Row<F>& r
   store_rows<kWords, F>(base, index * kWords, words_of_row<Row, F>(row), active);
 }
 
-/// Writes the rows of the active lanes one behind the other at `to`; returns how many.
+/// Stores the rows of the active lanes contiguously at `to`; returns their number.
 template <template <typename> class Row, typename F>
 WAVECOMB_INLINE uint32_t compress_row(float* to, const Row<F>& row, const Mask<F>& active) {
   return compress_rows<kRowWords<Row>, F>(to, words_of_row<Row, F>(row), active);
 }
 
-/// One field of row `index` of the rows at `base`, for each active lane; 0 in the others. For
-/// fields that few read: whole rows are quicker.
+/// Loads one field of row `index` at `base` for each active lane; other lanes get 0. Use load_row()
+/// if most fields are needed, since whole rows are faster.
 template <typename F, template <typename> class Row>
 WAVECOMB_INLINE F gather_field(const void* base, float Row<float>::* field, const UInt<F>& index,
                                const Mask<F>& active) {
@@ -222,7 +221,7 @@ WAVECOMB_INLINE void scatter_field(void* base, uint32_t Row<float>::* field, con
                    Mask<UInt<F>>(active));
 }
 
-/// A member of record `index` of the records at `base`, for each active lane; 0 in the others.
+/// Loads a member of record `index` at `base` for each active lane; other lanes get 0.
 template <typename F, typename Record>
 WAVECOMB_INLINE UInt<F> gather_member(const Record* base, uint32_t Record::* member,
                                       const UInt<F>& index, const Mask<F>& active) {
@@ -245,7 +244,7 @@ WAVECOMB_INLINE Vec3<F> gather_member(const Record* base, float (Record::*member
           gather<F>(base, first + 2u, active)};
 }
 
-/// Stores the words of the lanes' heads side by side: word k of all lanes from columns[k] on.
+/// Stores a head in SoA layout: word k of all lanes goes to columns[k] + at.
 template <template <typename> class Head, typename F, size_t C>
 WAVECOMB_INLINE void store_columns(const Head<F>& head, float* const (&columns)[C], size_t at) {
   static_assert(C == kFieldWords<Head>);

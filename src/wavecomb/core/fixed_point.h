@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sums whose order does not matter: integers in units of a power of two.
+/// Fixed-point numbers, whose sums do not depend on order.
 #pragma once
 
 #include <cmath>
@@ -7,15 +7,15 @@
 
 namespace wavecomb {
 
-/// Real numbers as multiples of 2^exponent.
+/// Fixed-point format: real numbers as integer multiples of 2^exponent.
 struct FixedPoint {
   int exponent = -24;
 
-  /// No summand is larger than this many units, so that a sum of 2^21 cannot overflow.
+  /// Largest magnitude of a value, in units, so that a sum of 2^21 values cannot overflow.
   static constexpr int64_t kMost = int64_t{1} << 41;
 
-  /// The nearest multiple, of ties the even one. What is larger than kMost is cut there; NaN
-  /// counts 0.
+  /// Converts to the nearest multiple, ties to even. Magnitudes above kMost are clamped; NaN
+  /// becomes 0.
   int64_t from(float x) const {
     const double units = std::ldexp(double{x}, -exponent);
     constexpr auto most = static_cast<double>(kMost);

@@ -6,7 +6,7 @@
 
 namespace wavecomb {
 
-/// Orthonormal basis (s, t, n), right-handed unless it was made otherwise. Local directions have z
+/// Orthonormal basis (s, t, n), right-handed unless constructed otherwise. Local directions have z
 /// along n.
 template <typename F>
 struct Frame {
@@ -20,8 +20,8 @@ struct Frame {
   }
 };
 
-/// A frame around the unit vector `n`, without a branch (Duff et al., "Building an Orthonormal
-/// Basis, Revisited", JCGT 6(1) 2017).
+/// Returns a frame around the unit vector `n`, without branches (Duff et al., "Building an
+/// Orthonormal Basis, Revisited", JCGT 6(1) 2017).
 template <typename F>
 WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
   const F sign = copysign(F(1.f), n.z);
@@ -32,10 +32,10 @@ WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
           n};
 }
 
-/// A frame around the unit vector `n` whose s is `tangent` made orthogonal to n and whose t is
-/// n x s times `handedness`, 1 or -1; falls back to make_frame where the tangent is parallel to n
-/// (within 1e-3), zero or not finite. The bound is far above rounding, which would else decide on
-/// s.
+/// Returns a frame around the unit vector `n` where s is `tangent` made orthogonal to n, and t is n
+/// x s times `handedness` (1 or -1). Falls back to make_frame(n) if the tangent is parallel to n
+/// (within 1e-3), zero or not finite. The threshold is far above rounding errors, which would
+/// otherwise determine s.
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& handedness = F(1.f)) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);

@@ -6,7 +6,7 @@
 
 namespace wavecomb {
 
-/// A bijective 32-bit mix ("lowbias32" by C. Wellons, found by hash-prospector, 2018).
+/// Bijective 32-bit integer hash ("lowbias32" by C. Wellons, found by hash-prospector, 2018).
 template <typename U>
 inline U hash_u32(U x) {
   x ^= x >> 16;
@@ -17,14 +17,14 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hash of two words (the second may be uniform). A bijection of either one while the other stays,
-/// so that no two pixels share a seed's numbers.
+/// Hashes two words; the second may be uniform. Bijective in either argument for a fixed other one,
+/// so that no two pixels share random numbers for a given seed.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
   return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);
 }
 
-/// The top 24 bits as a float in [0, 1).
+/// Converts the top 24 bits to a float in [0, 1).
 template <typename F>
 inline F unit_float(const UInt<F>& x) {
   return F(Int<F>(x >> 8)) * 0x1p-24f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arithmetic and masks of lanes; part of core/lanes.h.
+/// Arithmetic and masks for lane types; part of core/lanes.h.
 #pragma once
 
 #include <bit>
@@ -11,8 +11,8 @@
 
 namespace wavecomb {
 
-/// Logical not that is right for `bool` too (`~true` is not `false`), and for `bool & bool`, which
-/// is an int.
+/// Logical not that also works for `bool` (`~true` is not `false`) and for `bool & bool`, which is
+/// an int.
 template <typename M>
 inline auto not_(const M& m) {
   if constexpr (std::is_same_v<M, bool> || std::is_same_v<M, int>)
@@ -21,7 +21,7 @@ inline auto not_(const M& m) {
     return ~m;
 }
 
-/// a < b ? a : b in every lane (b when either is NaN).
+/// Returns a < b ? a : b in every lane; b if either is NaN.
 template <LaneValue F>
 inline F min(const F& a, const std::type_identity_t<F>& b) {
   if constexpr (kIsScalar<F>) {
@@ -39,7 +39,7 @@ inline F min(const F& a, const std::type_identity_t<F>& b) {
   }
 }
 
-/// a > b ? a : b in every lane (b when either is NaN).
+/// Returns a > b ? a : b in every lane; b if either is NaN.
 template <LaneValue F>
 inline F max(const F& a, const std::type_identity_t<F>& b) {
   if constexpr (kIsScalar<F>) {
@@ -62,8 +62,8 @@ inline F clamp(const F& x, const F& lo, const F& hi) {
   return min(max(x, lo), hi);
 }
 
-/// a b + c, rounded once where the target has FMA, twice where it has not; alike for scalar and
-/// packet.
+/// Returns a b + c, rounded once if the target has FMA and twice otherwise; the same for scalars
+/// and packets.
 template <LaneValue F>
 inline F fma(const F& a, const std::type_identity_t<F>& b, const std::type_identity_t<F>& c) {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
@@ -76,13 +76,13 @@ inline F fma(const F& a, const std::type_identity_t<F>& b, const std::type_ident
 #endif
 }
 
-/// -(a b) + c.
+/// Returns -(a b) + c.
 template <LaneValue F>
 inline F fnma(const F& a, const std::type_identity_t<F>& b, const std::type_identity_t<F>& c) {
   return fma(F(-a), b, c);
 }
 
-/// Correctly rounded square root.
+/// Returns the correctly rounded square root.
 template <LaneValue F>
 inline F sqrt(const F& x) {
   if constexpr (kIsScalar<F>)
@@ -91,7 +91,7 @@ inline F sqrt(const F& x) {
     return drjit::sqrt(x);
 }
 
-/// sqrt(max(x, 0)).
+/// Returns sqrt(max(x, 0)).
 template <LaneValue F>
 inline F safe_sqrt(const F& x) {
   return sqrt(max(x, F(0.f)));
@@ -110,7 +110,7 @@ inline F sqr(const F& x) {
   return x * x;
 }
 
-/// Bits of a float, and back.
+/// Reinterprets a float as its bits, and back.
 template <typename F>
 inline UInt<F> float_bits(const F& x) {
   if constexpr (kIsScalar<F>)
@@ -126,19 +126,19 @@ inline F bits_float(const UInt<F>& x) {
     return drjit::reinterpret_array<F>(x);
 }
 
-/// |x| with the sign of `sign` (signed zero counts as its sign).
+/// Returns |x| with the sign bit of `sign`.
 template <LaneValue F>
 WAVECOMB_INLINE F copysign(const F& x, const F& sign) {
   return bits_float<F>((float_bits<F>(x) & 0x7fffffffu) | (float_bits<F>(sign) & 0x80000000u));
 }
 
-/// Truncation to integer; the argument must lie within the range of int32.
+/// Truncates to integer; x must be within the range of int32.
 template <typename F>
 inline Int<F> to_int(const F& x) {
   return Int<F>(x);
 }
 
-/// True where x is neither infinite nor NaN.
+/// Returns whether x is neither infinite nor NaN.
 template <typename F>
 inline Mask<F> is_finite(const F& x) {
   return Mask<F>((float_bits<F>(x) & 0x7f800000u) != UInt<F>(0x7f800000u));
@@ -168,11 +168,11 @@ template <typename M>
 inline uint32_t mask_bits(const M& m) {
   if constexpr (requires { m.k; }) {
     return static_cast<uint32_t>(m.k) & ((1u << M::Size) - 1u);
-  } else if constexpr (requires { m.a1; }) {  // made of two halves
+  } else if constexpr (requires { m.a1; }) {  // consists of two halves
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
 #if defined(__aarch64__)
-    // Dr.Jit has no bitmask_() here. A lane of a mask is all ones or all zeros.
+    // Dr.Jit has no bitmask_() on this target. Each lane of a mask is all ones or all zeros.
     static_assert(M::Size == 4 && sizeof(m.m) == 16);
     constexpr uint32_t kBits[4] = {1, 2, 4, 8};
     return vaddvq_u32(vandq_u32(std::bit_cast<uint32x4_t>(m.m), vld1q_u32(kBits)));
@@ -183,7 +183,7 @@ inline uint32_t mask_bits(const M& m) {
 }
 }  // namespace detail
 
-/// One bit per lane, lane 0 lowest.
+/// Returns one bit per lane, with lane 0 as the lowest.
 template <typename F>
 inline uint32_t lane_bits(const Mask<F>& m) {
   if constexpr (kIsScalar<F>)
@@ -192,13 +192,13 @@ inline uint32_t lane_bits(const Mask<F>& m) {
     return detail::mask_bits(m);
 }
 
-/// Number of lanes set.
+/// Returns the number of lanes that are set.
 template <typename F>
 inline uint32_t count(const Mask<F>& m) {
   return static_cast<uint32_t>(std::popcount(lane_bits<F>(m)));
 }
 
-/// 0, 1, 2, ... in the lanes.
+/// Returns 0, 1, 2, ... in the lanes.
 template <typename F>
 inline UInt<F> lane_index() {
   if constexpr (kIsScalar<F>)
@@ -207,7 +207,7 @@ inline UInt<F> lane_index() {
     return drjit::arange<UInt<F>>();
 }
 
-/// Lanes whose index is below `n`.
+/// Returns a mask of the lanes with an index below `n`.
 template <typename F>
 inline Mask<F> first_lanes(size_t n) {
   if constexpr (kIsScalar<F>)

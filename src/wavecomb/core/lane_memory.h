@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lanes to and from memory, and one lane of many; part of core/lanes.h.
+/// Loads and stores of lanes, and access to single lanes; part of core/lanes.h.
 #pragma once
 
 #include <bit>
@@ -12,7 +12,7 @@
 
 namespace wavecomb {
 
-/// W consecutive values at `p` (any alignment).
+/// Loads W consecutive values at `p`, which needs no alignment.
 template <typename T>
 inline T load(const void* p) {
   if constexpr (kIsScalar<T>) {
@@ -32,8 +32,8 @@ inline void store(void* p, const T& value) {
 }
 
 namespace detail {
-/// A packet's lanes in memory. Dr.Jit's entry() is not used: it reads integer registers through a
-/// pointer that may not alias them, which GCC 12 miscompiles.
+/// Copy of a packet's lanes in memory. Replaces Dr.Jit's entry(), which reads integer registers
+/// through a pointer that may not alias them; GCC 12 miscompiles this.
 template <typename T>
 struct InMemory {
   using Value = std::conditional_t<
@@ -46,11 +46,11 @@ struct InMemory {
   explicit InMemory(const T& lanes) { store(value, lanes); }
 };
 
-/// Words at base + 4 * index, where the index may have 64 bits.
+/// Loads words at base + 4 * index, where the index may have 64 bits.
 template <typename T, typename Index, typename M>
 inline T gather_words(const void* base, const Index& index, const M& active) {
 #if defined(__AVX2__)
-  if constexpr (requires { active.a1; })  // made of two halves
+  if constexpr (requires { active.a1; })  // consists of two halves
     return T(gather_words<typename T::Array1>(base, drjit::low(index), active.a1),
              gather_words<typename T::Array2>(base, drjit::high(index), active.a2));
   else
@@ -69,8 +69,8 @@ inline T gather_words(const void* base, const Index& index, const M& active) {
 }
 }  // namespace detail
 
-/// base[index] in each active lane, 0 elsewhere. `T` is a float or uint lane type; indices of
-/// active lanes are below 2^31.
+/// Loads base[index] in each active lane; other lanes get 0. `T` is a float or uint lane type.
+/// Indices of active lanes must be below 2^31.
 template <typename T>
 inline T gather(const void* base, const UInt<T>& index, const Mask<T>& active) {
   if constexpr (kIsScalar<T>)
@@ -79,7 +79,8 @@ inline T gather(const void* base, const UInt<T>& index, const Mask<T>& active) {
     return detail::gather_words<T>(base, index, active);
 }
 
-/// The 32-bit value at each lane's own address plus 4 * index bytes, in active lanes; 0 elsewhere.
+/// Loads the 32-bit value at each active lane's address plus 4 * index bytes; other lanes get 0.
+///
 /// Contract: addresses are multiples of 4.
 template <typename T>
 inline T gather_at(const UInt64<T>& address, const UInt<T>& index, const Mask<T>& active) {
@@ -89,7 +90,8 @@ inline T gather_at(const UInt64<T>& address, const UInt<T>& index, const Mask<T>
     return detail::gather_words<T>(nullptr, UInt64<T>((address >> 2) + UInt64<T>(index)), active);
 }
 
-/// base[index] = value in each active lane; indices of active lanes are distinct and below 2^31.
+/// Stores base[index] = value in each active lane. Indices of active lanes must be distinct and
+/// below 2^31.
 template <typename T>
 inline void scatter(void* base, const T& value, const UInt<T>& index, const Mask<T>& active) {
   if constexpr (kIsScalar<T>) {
@@ -108,8 +110,9 @@ inline void scatter(void* base, const T& value, const UInt<T>& index, const Mask
   }
 }
 
-/// Writes the active lanes of `value` side by side at `p`, in lane order; returns how many.
-/// Contract: `p` has room for a whole packet, since the tail of the store is unspecified.
+/// Stores the active lanes of `value` contiguously at `p`, in lane order; returns their number.
+///
+/// Contract: `p` has room for a whole packet, since values past the active ones are unspecified.
 template <typename T>
 inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
   const uint32_t bits = lane_bits<T>(active);
@@ -117,8 +120,8 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
     if (bits) std::memcpy(p, &value, sizeof(T));
 #if defined(__AVX512F__)
   } else if constexpr (kWidth<T> == 16) {
-    // Compress in the register, then store whole: a compressing store to memory is far slower on
-    // Zen 4.
+    // Compresses in the register and stores the whole register: a compressing store to memory is
+    // far slower on Zen 4.
     const __m512i v = std::bit_cast<__m512i>(value.m);
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), v));
 #endif
@@ -137,7 +140,7 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
   return static_cast<uint32_t>(std::popcount(bits));
 }
 
-/// table[index] of 16 words in each lane; index < 16.
+/// Returns table[index] of 16 words in each lane; index < 16.
 template <typename U>
 inline U lookup16(const uint32_t* table, const U& index) {
   if constexpr (kIsScalar<U>) {
@@ -161,13 +164,14 @@ inline U lookup16(const uint32_t* table, const U& index) {
   }
 }
 
-/// table[index] of 256 floats in each lane; index < 256. Out of registers where they are wide
-/// enough: a third of what a gather takes (Zen 4).
+/// Returns table[index] of 256 floats in each lane; index < 256. Uses permutations of registers
+/// with AVX-512, which take a third of the time of a gather (Zen 4).
 template <typename F>
 inline F lookup256(const float* table, const UInt<F>& index) {
 #if defined(__AVX512F__)
   if constexpr (!kIsScalar<F> && kWidth<F> == 16) {
-    // Each permutation looks in 32 entries by the low five bits; the others say which one counts.
+    // Each permutation selects among 32 entries by the low five bits; the upper bits select the
+    // table.
     const __m512i part = _mm512_srli_epi32(index.m, 5);
     __m512 value =
         _mm512_permutex2var_ps(_mm512_loadu_ps(table), index.m, _mm512_loadu_ps(table + 16));
@@ -185,12 +189,12 @@ inline F lookup256(const float* table, const UInt<F>& index) {
   }
 }
 
-/// Bits in reverse order, lane by lane.
+/// Reverses the bits of each lane.
 template <typename U>
 inline U reverse_bits(U x) {
 #if defined(__AVX512BW__) && defined(__GFNI__)
   if constexpr (kWidth<U> == 16) {
-    // A byte's bits by a matrix product over GF(2), then the bytes.
+    // Reverses the bits of each byte by a matrix product over GF(2), then the order of bytes.
     const __m512i matrix = _mm512_set1_epi64(static_cast<long long>(0x8040201008040201ull));
     const __m512i order =
         _mm512_broadcast_i32x4(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
@@ -198,7 +202,7 @@ inline U reverse_bits(U x) {
   } else
 #elif defined(__AVX2__)
   if constexpr (kWidth<U> == 8) {
-    // The bytes, then the bits of their halves out of a table.
+    // Reverses the order of bytes, then the bits of both nibbles with a table.
     const __m256i order = _mm256_broadcastsi128_si256(
         _mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
     const __m256i reversed = _mm256_broadcastsi128_si256(
@@ -220,7 +224,7 @@ inline U reverse_bits(U x) {
   }
 }
 
-/// Value of lane `i`.
+/// Returns the value of lane `i`.
 template <typename T>
 inline auto lane(const T& value, size_t i) {
   if constexpr (kIsScalar<T>) {
@@ -231,13 +235,15 @@ inline auto lane(const T& value, size_t i) {
   }
 }
 
-/// Value of the first active lane. Contract: at least one lane is active.
+/// Returns the value of the first active lane.
+///
+/// Contract: at least one lane is active.
 template <typename T>
 inline auto first_active(const T& value, const Mask<T>& active) {
   return lane(value, static_cast<size_t>(std::countr_zero(lane_bits<T>(active))));
 }
 
-/// True when every active lane holds the same value (true when none is active).
+/// Returns whether all active lanes hold the same value; true if no lane is active.
 template <typename F>
 inline bool is_uniform(const UInt<F>& value, const Mask<F>& active) {
   if constexpr (kIsScalar<F>) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The types of lanes; part of core/lanes.h. This is the only file that includes Dr.Jit.
+/// Lane types; part of core/lanes.h. This is the only file that includes Dr.Jit.
 #pragma once
 
 #include <drjit/packet.h>
@@ -11,20 +11,19 @@
 #include <cstring>
 #include <type_traits>
 
-/// For kernels that are called once or twice a packet: what they return then stays in registers,
-/// and what the caller does not use is not worked out. Compilers alone stop at the size of the
-/// caller.
+/// For kernels that are called once or twice per packet. Inlining keeps their results in registers
+/// and removes unused ones; compilers alone would refuse because the caller is large.
 #define WAVECOMB_INLINE inline __attribute__((always_inline))
-/// For lambdas that are to be inlined, too.
+/// For lambdas that must be inlined.
 #define WAVECOMB_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace wavecomb {
 
-/// A packet of `W` floats.
+/// Packet of `W` floats.
 template <size_t W>
 using FloatP = drjit::Packet<float, W>;
 
-/// The lane type of width `W`: a plain float for one lane, a packet otherwise.
+/// Lane type of width `W`: a plain float for one lane, a packet otherwise.
 template <size_t W>
 struct LaneType {
   using type = FloatP<W>;
@@ -36,7 +35,7 @@ struct LaneType<1> {
 template <size_t W>
 using Lanes = typename LaneType<W>::type;
 
-/// Unsigned, signed, 64-bit and mask companions of a lane type, and its width.
+/// Unsigned, signed, mask and 64-bit types that match a lane type, and its width.
 template <typename F>
 using UInt = drjit::uint32_array_t<F>;
 template <typename F>
@@ -55,7 +54,7 @@ struct Width<drjit::Packet<T, W>> {
   static constexpr size_t value = W;
   using U64 = drjit::Packet<uint64_t, W>;
 };
-// The halves of a packet that is wider than a register.
+// Half of a packet that is wider than a register.
 template <typename T, size_t W>
 struct Width<drjit::Array<T, W>> : Width<drjit::Packet<T, W>> {};
 }  // namespace detail
@@ -67,15 +66,15 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// What lanes are made of. Argument-dependent lookup finds Dr.Jit's functions of the same name
-/// beside ours; theirs are not constrained, so that this constraint makes ours the better match.
+/// Types of lane values. Argument-dependent lookup also finds Dr.Jit's functions of the same name.
+/// Those are unconstrained, so this constraint makes the functions here the better match.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
 using drjit::select;
 
-/// Dr.Jit multiplies a packet that is divided by a number by the reciprocal of the number, which
-/// differs in the last bit from what one lane computes. Divide by a packet: `x / F(number)`.
+/// Dr.Jit divides a packet by a number by multiplying with its reciprocal, which differs in the
+/// last bit from scalar division. Divide by a packet instead: `x / F(number)`.
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
   requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/(const P<T, W>&, const Number&) = delete;
@@ -84,7 +83,8 @@ template <template <typename, size_t> typename P, typename T, size_t W, typename
 void operator/=(P<T, W>&, const Number&) = delete;
 
 #if defined(__AVX512F__)
-// Dr.Jit 1.x compares unsigned lanes as signed ones at width 16 alone; these are a better match.
+// Dr.Jit 1.x compares unsigned lanes as signed at width 16 only; these overloads are better
+// matches.
 namespace detail {
 using U16 = UInt<FloatP<16>>;
 using U16Mask = drjit::mask_t<U16>;

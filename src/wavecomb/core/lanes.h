@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lanes: the float types that every kernel is a template on, and the few operations they share.
+/// Lane types that all kernels are templates on, and their common operations.
 ///
-/// A kernel takes `F`, which is `float` in the reference integrator and `FloatP<W>` in the wave.
-/// Each operation rounds in the same way for both, so a kernel gives the same bits at any width.
-/// That is why minimum, maximum and fma are ours: Dr.Jit's differ between scalar and packet for NaN
-/// and contraction.
+/// A kernel takes `F`, which is `float` in the reference integrator and `FloatP<W>` in the
+/// wavefront integrator. Each operation rounds the same way for both, so that a kernel gives the
+/// same bits at any width. min, max and fma are therefore defined here: Dr.Jit's differ between
+/// scalars and packets for NaN and contraction.
 #pragma once
 
 #include "wavecomb/core/lane_arithmetic.h"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Elementary functions that give the same bits for a float and for a packet of floats.
+/// Elementary functions that give the same bits for floats and packets of floats.
 ///
 /// Range reductions and minimax polynomials follow S. Moshier, Cephes Mathematical Library (single
-/// precision); errors are a few ulp over the ranges stated, tested against double precision.
+/// precision). Errors are a few ulp over the stated ranges, tested against double precision.
 ///
-/// Where Dr.Jit has a function of the same name, the template parameters here are its own with a
-/// constraint (hence `bool = true`), which makes ours the better match.
+/// Functions that also exist in Dr.Jit repeat its template parameters plus a constraint (hence
+/// `bool = true`), which makes them the better match.
 #pragma once
 
 #include "wavecomb/core/lanes.h"
@@ -19,7 +19,7 @@ inline constexpr float kInv4Pi = 0.07957747154594766788f;
 inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 inline constexpr float kInfinity = __builtin_inff();
 
-/// Sine and cosine of 2 pi x; |x| < 2^20.
+/// Sine and cosine of 2 pi x, for |x| < 2^20.
 template <typename F>
 struct SinCos {
   F sin, cos;
@@ -40,20 +40,20 @@ inline SinCos<F> sincos_2pi(const F& x) {
   const Mask<F> swap = Mask<F>((q & 1u) == UInt<F>(1u));
   const F sin_abs = select(swap, c, s);
   const F cos_abs = select(swap, s, c);
-  // The sign bits of the quadrant: sin flips in 2 and 3, cos in 1 and 2.
+  // Sign bits by quadrant: sin is negative in 2 and 3, cos in 1 and 2.
   const UInt<F> sin_sign = (q & 2u) << 30;
   const UInt<F> cos_sign = ((q + 1u) & 2u) << 30;
   return {bits_float<F>(float_bits<F>(sin_abs) ^ sin_sign),
           bits_float<F>(float_bits<F>(cos_abs) ^ cos_sign)};
 }
 
-/// Arc tangent of y / x over the whole circle, in [-pi, pi]; 0 when both are 0. |x| + |y| is
-/// finite.
+/// Returns the arc tangent of y / x over the whole circle, in [-pi, pi]; 0 if both are 0. |x| + |y|
+/// must be finite.
 template <LaneValue F>
 inline F atan2(const F& y, const F& x) {
   const F ax = abs(x), ay = abs(y);
   const F hi = max(ax, ay), lo = min(ax, ay);
-  // t = lo / hi, or (t - 1) / (t + 1) where t is above tan(pi / 8).
+  // t = lo / hi, or (t - 1) / (t + 1) if t is above tan(pi / 8).
   const Mask<F> reduce = lo > F(hi * 0.4142135623730950f);
   const F over = select(reduce, F(lo - hi), lo), under = select(reduce, F(lo + hi), hi);
   const F r = over / select(hi > 0.f, under, F(1.f));
@@ -67,14 +67,14 @@ inline F atan2(const F& y, const F& x) {
   return copysign(a, y);
 }
 
-/// Arc cosine of x clamped to [-1, 1].
+/// Returns the arc cosine of x clamped to [-1, 1].
 template <LaneValue F, bool = true>
 inline F acos(const F& x) {
   const F c = clamp(x, F(-1.f), F(1.f));
   return atan2(safe_sqrt(F((1.f - c) * (1.f + c))), c);
 }
 
-/// e^x; 0 below -87.3, clamped above 88.
+/// Returns e^x; 0 below -87.3, clamped above 88.
 template <LaneValue F, bool = true>
 inline F exp(const F& x) {
   const F c = clamp(x, F(-88.f), F(88.f));
@@ -91,7 +91,7 @@ inline F exp(const F& x) {
   return select(x < -87.3f, F(0.f), F(y * bits_float<F>(exponent)));
 }
 
-/// Natural logarithm of x; x must be positive and normal.
+/// Returns the natural logarithm of x, which must be positive and normal.
 template <LaneValue F, bool = true>
 inline F log(const F& x) {
   const UInt<F> bits = float_bits<F>(x);
@@ -115,13 +115,13 @@ inline F log(const F& x) {
   return fma(e, F(0.693359375f), F(m + y));
 }
 
-/// Base-2 logarithm; x must be positive and normal.
+/// Returns the base-2 logarithm of x, which must be positive and normal.
 template <LaneValue F, bool = true>
 inline F log2(const F& x) {
   return log(x) * 1.44269504088896341f;
 }
 
-/// x^y for x >= 0; 0 where x is 0 or denormal and y > 0.
+/// Returns x^y for x >= 0; 0 if x is 0 or denormal and y > 0.
 template <LaneValue F>
 inline F pow(const F& x, const F& y) {
   return select(x < 1.17549435e-38f, F(0.f), exp(F(y * log(max(x, F(1.17549435e-38f))))));

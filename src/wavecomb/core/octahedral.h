@@ -1,7 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
-/// Directions in 32 bits: a point of the octahedron |x| + |y| + |z| = 1, unfolded to a square, 16
-/// bits an axis (Z. Cigolle et al., "A Survey of Efficient Representations for Independent Unit
-/// Vectors", JCGT 3(2), 2014). Off by 6e-5 at most.
+/// Unit vectors in 32 bits by octahedral mapping: a point of the octahedron |x| + |y| + |z| = 1 is
+/// unfolded to a square with 16 bits per axis (Z. Cigolle et al., "A Survey of Efficient
+/// Representations for Independent Unit Vectors", JCGT 3(2), 2014). The maximum error is 6e-5.
 #pragma once
 
 #include <cmath>
@@ -11,10 +10,10 @@
 
 namespace wavecomb {
 
-/// The code that stands for no direction.
+/// Code that means "no direction".
 inline constexpr uint32_t kNoDirection = 0x80008000u;
 
-/// The code of the direction of `v`, kNoDirection where it has none.
+/// Encodes the direction of `v`, or returns kNoDirection if it is zero or not finite.
 inline uint32_t encode_direction(const Vec3<float>& v) {
   const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
   if (!(size > 0) || !std::isfinite(size)) return kNoDirection;
@@ -31,10 +30,10 @@ inline uint32_t encode_direction(const Vec3<float>& v) {
   return code(x) | code(y) << 16;
 }
 
-/// The unit direction of a code; zero for kNoDirection.
+/// Returns the unit direction of a code, or the zero vector for kNoDirection.
 template <typename F>
 inline Vec3<F> decode_direction(const UInt<F>& code) {
-  // The lower 16 bits as a number with a sign.
+  // Reads the lower 16 bits as a signed number.
   const auto number = [](const UInt<F>& bits) {
     return F(F(Int<F>((bits & 0xffffu) ^ 0x8000u)) - 32768.f) * (1.f / 32767.f);
   };

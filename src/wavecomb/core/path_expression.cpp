@@ -12,11 +12,11 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kMostNfaStates = 2000;
-/// And of states of the automaton before it is the least one.
+/// Maximum number of states of the deterministic automaton before minimisation.
 constexpr size_t kMostSets = 4096;
 using StateSet = std::vector<uint32_t>;  ///< ascending
 
-/// An automaton of all expressions that may be in several states at once (Thompson 1968).
+/// Nondeterministic automaton of all expressions (Thompson 1968).
 class PathNfa {
  public:
   explicit PathNfa(std::string names) : names_(std::move(names)) {}
@@ -34,7 +34,7 @@ class PathNfa {
         if (edge.symbols.test(symbol)) to.push_back(edge.to);
     return closed(std::move(to));
   }
-  /// A bit for each expression that ends in one of the states.
+  /// Returns one bit per expression that ends in one of the states.
   uint32_t matched(const StateSet& states) const {
     uint32_t bits = 0;
     for (size_t e = 0; e < finals_.size(); ++e)
@@ -51,12 +51,13 @@ class PathNfa {
   uint32_t add_state() {
     if (edges_.size() == kMostNfaStates)
       throw Error("light path expressions " + names_ +
-                  ": they are too long; ask for fewer, or for less repetition, at once");
+                  ": they are too long; use fewer expressions or less repetition");
     edges_.emplace_back();
     free_.emplace_back();
     return static_cast<uint32_t>(edges_.size() - 1);
   }
-  /// Adds a pattern that begins at `from`, to which nothing leads back. Gives its end.
+  /// Adds a pattern that starts at `from`, which must have no incoming edges from the pattern.
+  /// Returns its end state.
   uint32_t add(const PathPattern& p, uint32_t from) {
     using Kind = PathPattern::Kind;
     if (p.kind == Kind::kSequence) {
@@ -86,7 +87,7 @@ class PathNfa {
     }
     return to;
   }
-  /// With all that is reached without a symbol.
+  /// Returns the epsilon closure: adds all states reachable without a symbol.
   StateSet closed(StateSet states) const {
     std::vector<uint8_t> seen(edges_.size(), 0);
     for (const uint32_t s : states) seen[s] = 1;
@@ -105,13 +106,13 @@ class PathNfa {
   std::vector<uint32_t> finals_;
 };
 
-/// A row of the automaton before it is the least one.
+/// Row of the automaton before minimisation.
 struct PathStateRow {
   std::vector<uint32_t> next, matched;
   auto operator<=>(const PathStateRow&) const = default;
 };
 
-/// States by the set of states of `nfa` that each stands for; the first is after the camera.
+/// Subset construction: returns the reachable deterministic states; the first is after the camera.
 std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
   std::map<StateSet, uint32_t> numbers;
   std::vector<StateSet> sets;
@@ -134,7 +135,7 @@ std::vector<PathStateRow> reached_rows(const PathNfa& nfa, uint32_t ends) {
   return rows;
 }
 
-/// One state for all that nothing tells apart (Moore 1956); the first stays the first.
+/// Minimises the automaton by merging equivalent states (Moore 1956); the first state stays first.
 std::vector<PathStateRow> least_rows(const std::vector<PathStateRow>& rows) {
   std::vector<uint32_t> classes(rows.size(), 0);
   std::vector<PathStateRow> least;
@@ -174,7 +175,7 @@ PathAutomaton::PathAutomaton(std::span<const NamedExpression> all,
   if (rows.size() <= kMostSets) rows = least_rows(rows);
   if (rows.size() > kMostStates)
     throw Error("light path expressions " + names_of(all) +
-                ": there is too much to tell apart at once; ask for fewer, or for less repetition");
+                ": they need too many states; use fewer expressions or less repetition");
   for (const PathStateRow& row : rows) {
     next.insert(next.end(), row.next.begin(), row.next.end());
     next.resize((next.size() + kNextWords - 1) / kNextWords * kNextWords);
@@ -185,7 +186,7 @@ PathAutomaton::PathAutomaton(std::span<const NamedExpression> all,
 void check_expressions(std::span<const NamedExpression> expressions) {
   if (expressions.size() > PathAutomaton::kMostExpressions)
     throw Error("there are " + std::to_string(expressions.size()) +
-                " light path expressions; there may be " +
+                " light path expressions; the limit is " +
                 std::to_string(PathAutomaton::kMostExpressions));
   for (size_t i = 0; i < expressions.size(); ++i) {
     const NamedExpression& one = expressions[i];
@@ -194,15 +195,15 @@ void check_expressions(std::span<const NamedExpression> expressions) {
     };
     if (one.name.empty() || !std::all_of(one.name.begin(), one.name.end(), is_good))
       throw Error("light path expression '" + one.name +
-                  "': a name is of letters, digits and underscores");
+                  "': the name may contain only letters, digits and underscores");
     for (size_t j = 0; j < i; ++j)
       if (expressions[j].name == one.name)
-        throw Error("light path expression " + one.name + ": the name is there twice");
+        throw Error("light path expression " + one.name + ": the name is used twice");
     PathNfa nfa(one.name);
     nfa.add_expression(parse_expression(one, nullptr));
     if (nfa.step(nfa.start(), kCameraSymbol).empty())
       throw Error("light path expression " + one.name + "=" + one.text +
-                  ": it begins with no camera; write C first");
+                  ": it does not begin with a camera; write C first");
   }
 }
 

@@ -12,7 +12,7 @@ namespace {
 constexpr uint32_t kMostRepeats = 64;
 constexpr uint32_t kMostNesting = 64;
 
-/// Which symbols a letter stands for, by itself or at its place in <>.
+/// Returns the symbols that a letter matches, alone or at its position in <>.
 PathSymbols symbols_of_letter(char letter) {
   PathSymbols s;
   const auto events = [&](std::initializer_list<uint32_t> numbers) {
@@ -69,7 +69,7 @@ PathSymbols all_symbols() {
   return PathSymbols().set();
 }
 
-/// A reader of one text, from left to right.
+/// Recursive-descent parser of one expression.
 class ExpressionParser {
  public:
   ExpressionParser(const NamedExpression& expression, const std::span<const std::string>* keys)
@@ -91,7 +91,7 @@ class ExpressionParser {
                 ": " + what);
   }
 
-  /// The next character that is no space, or 0.
+  /// Returns the next character that is not a space, or 0 at the end.
   char peek() {
     while (at_ < text_.size() && text_[at_] == ' ') ++at_;
     return at_ < text_.size() ? text_[at_] : '\0';
@@ -167,7 +167,7 @@ class ExpressionParser {
     return {.kind = PathPattern::Kind::kSymbols, .symbols = symbol()};
   }
 
-  /// A letter, '.', <...> or [...].
+  /// Parses a letter, '.', <...> or [...].
   PathSymbols symbol() {
     if (take('<')) return event();
     if (!take('[')) return letter(".CLOBERTVWDGS");
@@ -183,7 +183,7 @@ class ExpressionParser {
   PathSymbols letter(std::string_view known) {
     const char c = peek();
     if (c == 0 || known.find(c) == std::string_view::npos) {
-      if (c == 's') fail("straight passes of light are no events: what is cut out is not there");
+      if (c == 's') fail("there are no events for cut-outs; remove s");
       std::string list;
       for (const char k : known) list.append({' ', k});
       fail("there is no such letter here; there are" + list);
@@ -191,7 +191,7 @@ class ExpressionParser {
     ++at_;
     return c == '.' ? all_symbols() : symbols_of_letter(c);
   }
-  /// A letter of `known`, or [...] of them: a place in <>.
+  /// Parses one position in <>: a letter of `known`, or [...] of such letters.
   PathSymbols place(std::string_view known) {
     if (!take('[')) return letter(known);
     const bool is_negated = take('^');
@@ -203,10 +203,10 @@ class ExpressionParser {
     return is_negated ? ~s : s;
   }
 
-  /// What follows '<': what it is, how it scatters, and the group of a light.
+  /// Parses the part after '<': type of event, type of scattering, and light group.
   PathSymbols event() {
     PathSymbols s = place(".CLOBERTVW");
-    // What ends a path scatters not: <L.> is L.
+    // Ends of paths have no scattering type, so <L.> is L.
     if (peek() != '>' && peek() != '\'') {
       const PathSymbols scattered = place(".DGS");
       PathSymbols scattering;
@@ -219,7 +219,7 @@ class ExpressionParser {
     return s;
   }
 
-  /// What follows a quote: the name of a light group.
+  /// Parses the name of a light group after an opening quote.
   PathSymbols key() {
     const size_t begin = at_;
     const size_t end = text_.find('\'', begin);

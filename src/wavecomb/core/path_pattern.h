@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A light path expression as a tree: what is between its text and the automaton.
+/// Syntax trees of light path expressions.
 #pragma once
 
 #include <bitset>
@@ -10,12 +10,13 @@
 
 namespace wavecomb {
 
-/// Symbols of a path: the camera, then events, then ends.
+/// Indices of path symbols: the camera, then events, then ends.
 inline constexpr size_t kCameraSymbol = 0, kFirstEvent = 1, kFirstEnd = kFirstEvent + kPathEvents;
 inline constexpr size_t kMostKeys = 64;
 using PathSymbols = std::bitset<kFirstEnd + kPathEnds * kMostKeys>;
 
-/// One of some symbols; parts one after the other; one of some parts; or a part several times.
+/// Node of a syntax tree: one of a set of symbols, a sequence of parts, an alternative of parts, or
+/// a repeated part.
 struct PathPattern {
   enum class Kind : uint8_t { kSymbols, kSequence, kChoice, kRepeat };
   static constexpr uint32_t kUnlimited = 0xffffffffu;
@@ -23,11 +24,11 @@ struct PathPattern {
   Kind kind = Kind::kSequence;
   PathSymbols symbols{};
   std::vector<PathPattern> parts{};
-  uint32_t least = 1, most = 1;  ///< of kRepeat
+  uint32_t least = 1, most = 1;  ///< repetition counts, for kRepeat
 };
 
-/// Reads an expression. `keys`: the light groups by number; null: any will do. Throws Error that
-/// names the place.
+/// Parses an expression. `keys`: names of the light groups by index; null accepts any name. Throws
+/// Error that gives the position.
 PathPattern parse_expression(const NamedExpression& expression,
                              const std::span<const std::string>* keys);
 

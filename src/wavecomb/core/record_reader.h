@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads records of 32-bit words by lane: one scalar load when all active lanes share the record,
-/// else gathers.
+/// Reader of records of 32-bit words in lanes: uses one scalar load if all active lanes share the
+/// record, and gathers otherwise.
 #pragma once
 
 #include <bit>
@@ -14,16 +14,16 @@
 
 namespace wavecomb::detail {
 
-/// Words of a record, by lane. Lanes that are not active hold anything that their neighbours hold,
-/// or 0.
+/// Accessor for the members of a record in each lane. Inactive lanes get 0 or the values of other
+/// lanes.
 template <typename F>
 struct RecordReader {
   const void* base;
   UInt<F> first_word;
-  const std::byte* shared;  ///< the record of all active lanes, or null
+  const std::byte* shared;  ///< record of all active lanes, or null if they differ
   Mask<F> active;
 
-  /// A member of the record: reader[&MaterialRecord::roughness].
+  /// Reads a member of the record: reader[&MaterialRecord::roughness].
   template <typename Record>
   F operator[](float Record::* member) const {
     return word<F, float>(word_of(member));
@@ -37,12 +37,12 @@ struct RecordReader {
     const uint32_t first = word_of(member);
     return {word<F, float>(first), word<F, float>(first + 1), word<F, float>(first + 2)};
   }
-  /// One of an array's.
+  /// Reads element `i` of an array member.
   template <typename Record, size_t N>
   F at(float (Record::*member)[N], size_t i) const {
     return word<F, float>(word_of(member) + static_cast<uint32_t>(i));
   }
-  /// The fields of a row that the record begins with.
+  /// Reads the fields of a row with which the record begins.
   template <template <typename> class Row>
   Row<F> row() const {
     Row<F> row;
@@ -63,14 +63,14 @@ struct RecordReader {
       return T(value);
     }
     if constexpr (kIsScalar<F>)
-      return T(0);  // not active: a lane alone shares its record with itself
+      return T(0);  // inactive, since an active scalar always has a shared record
     else
       return gather<T>(base, first_word + at, Mask<T>(active));
   }
 };
 
-/// Reader of record `index` of the array at `base`, for lanes whose indices are all `uniform` or
-/// not.
+/// Returns a reader of record `index` in the array at `base`. `uniform`: the indices of all active
+/// lanes are known to be equal.
 template <typename Record, typename F>
 inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index, bool uniform,
                                    const Mask<F>& active) {
@@ -80,14 +80,14 @@ inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index, boo
   return {base, index * kWords, shared, active};
 }
 
-/// Likewise, where the reader has to find out.
+/// Returns a reader that checks whether the indices of the active lanes are equal.
 template <typename Record, typename F>
 inline RecordReader<F> make_reader(const Record* base, const UInt<F>& index,
                                    const Mask<F>& active) {
   return make_reader<Record, F>(base, index, any(active) && is_uniform<F>(index, active), active);
 }
 
-/// Reader of the same record in all lanes.
+/// Returns a reader of the same record in all lanes.
 template <typename Record, typename F>
 inline RecordReader<F> make_reader(const Record& record, const Mask<F>& active) {
   return {&record, UInt<F>(0u), reinterpret_cast<const std::byte*>(&record), active};

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rows in memory to and from lanes: each lane has a row of N consecutive words, and lane i of
-/// value k is word k of lane i's row.
+/// Loads and stores of rows: each lane has a row of N consecutive words, and lane i of value k is
+/// word k of lane i's row.
 ///
-/// A gather or scatter touches memory once a lane and a word. A row is loaded whole and the rows
-/// are transposed in registers: 16 rows of 16 words take a fifth of the time of 16 gathers
+/// A gather or scatter accesses memory once per lane and word. These functions access whole rows
+/// and transpose them in registers: 16 rows of 16 words take a fifth of the time of 16 gathers
 /// (docs/decisions/path-rows.md).
 #pragma once
 
@@ -21,12 +21,12 @@ template <size_t W>
 struct VectorOf {
   typedef float type __attribute__((vector_size(4 * W)));
 };
-/// A register of W words, whatever they mean.
+/// Register of W untyped 32-bit words.
 template <size_t W>
 using Vector = typename VectorOf<W>::type;
 
-/// Runs f(i) for i below N, where i is known to the compiler: arrays that are read and written by
-/// such numbers alone become registers at once, and nobody stores what is in them.
+/// Calls f(i) for i < N with i as a compile-time constant. Arrays that are indexed only by such
+/// constants become registers and are never stored.
 template <size_t N, typename Function>
 WAVECOMB_INLINE void unrolled(const Function& f) {
   [&]<size_t... I>(std::index_sequence<I...>) WAVECOMB_INLINE_LAMBDA {
@@ -34,7 +34,7 @@ WAVECOMB_INLINE void unrolled(const Function& f) {
   }(std::make_index_sequence<N>());
 }
 
-/// Block S of `a` and `b` changes places with its neighbour: one step of a transposition.
+/// One step of a transposition: swaps blocks of S words between `a` and `b`.
 template <size_t W, size_t S, size_t... I>
 WAVECOMB_INLINE void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence<I...>) {
   const Vector<W> low = __builtin_shufflevector(a, b, ((I & S) == 0 ? I : W + I - S)...);
@@ -43,8 +43,8 @@ WAVECOMB_INLINE void swap_blocks(Vector<W>& a, Vector<W>& b, std::index_sequence
   b = high;
 }
 
-/// Transposes the N x N blocks that stand side by side in N registers of W words (Eklundh 1972);
-/// its own inverse.
+/// Transposes adjacent N x N blocks in N registers of W words (Eklundh 1972); it is its own
+/// inverse.
 template <size_t N, size_t W, size_t S = N / 2>
 WAVECOMB_INLINE void transpose_blocks(std::array<Vector<W>, N>& r) {
   unrolled<N>([&](auto i) WAVECOMB_INLINE_LAMBDA {
@@ -53,11 +53,12 @@ WAVECOMB_INLINE void transpose_blocks(std::array<Vector<W>, N>& r) {
   if constexpr (S > 1) transpose_blocks<N, W, S / 2>(r);
 }
 
-/// Power of two that holds rows of N words.
+/// Smallest power of two that is at least N.
 template <size_t N>
 inline constexpr size_t kRowBlock = std::bit_ceil(N);
 
-/// N <= B words at p in a register of B words, 0 beyond them. Reads nothing beyond.
+/// Loads N <= B words at p into a register of B words and zeroes the rest. Reads only these N
+/// words.
 template <size_t N, size_t B>
 WAVECOMB_INLINE Vector<B> load_words(const float* p) {
   if constexpr (N == B) {
@@ -84,12 +85,12 @@ WAVECOMB_INLINE Vector<2 * B> join_two(const Vector<B>& a, const Vector<B>& b,
                                        std::index_sequence<I...>) {
   return __builtin_shufflevector(a, b, I...);
 }
-/// Small vectors side by side in a wide one.
+/// Concatenates small vectors to a wide one.
 template <size_t B, size_t W>
 WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
   if constexpr (B == W) return parts[0];
 #if defined(__AVX__)
-  else if constexpr (B == 4 && W == 8)  // compilers alone move both parts about
+  else if constexpr (B == 4 && W == 8)  // without this, compilers move both parts needlessly
     return std::bit_cast<Vector<8>>(
         _mm256_set_m128(std::bit_cast<__m128>(parts[1]), std::bit_cast<__m128>(parts[0])));
 #endif
@@ -97,12 +98,12 @@ WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
     return join_two<W / 2>(join<B, W / 2>(parts), join<B, W / 2>(parts + W / B / 2),
                            std::make_index_sequence<W>());
 }
-/// Words Start .. Start + sizeof...(I) - 1 of a vector.
+/// Returns words Start .. Start + sizeof...(I) - 1 of a vector.
 template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
 }
-/// Stores the N-word parts of `v` from part J on; part j goes to at[j * N].
+/// Stores the N-word parts of `v` from part J on; part j is stored to at[j * N].
 template <size_t N, size_t W, size_t J = 0>
 WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
   const Vector<N> one = part<J * N, W>(v, std::make_index_sequence<N>());
@@ -113,14 +114,14 @@ WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
 template <typename F>
 concept InOneRegister = !kIsScalar<F> && !requires(const F& f) { f.a1; };
 
-/// Rows at the lanes' own addresses.
+/// Loads N words at each lane's address.
 template <size_t N, typename F>
 WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
   constexpr size_t W = kWidth<F>, B = kRowBlock<N>;
   std::array<F, N> out;
   if constexpr (kIsScalar<F>) {
     std::memcpy(out.data(), at[0], 4 * N);
-  } else if constexpr (!InOneRegister<F>) {  // made of two halves
+  } else if constexpr (!InOneRegister<F>) {  // consists of two halves
     const auto low = rows_at<N, typename F::Array1>(at);
     const auto high = rows_at<N, typename F::Array2>(at + F::Size1);
     unrolled<N>([&](auto k) WAVECOMB_INLINE_LAMBDA { out[k] = F(low[k], high[k]); });
@@ -135,7 +136,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
     transpose_blocks<B, W>(r);
     unrolled<N>([&](auto k)
                     WAVECOMB_INLINE_LAMBDA { out[k].m = std::bit_cast<decltype(F::m)>(r[k]); });
-  } else {  // rows longer than a register: W columns at a time
+  } else {  // rows longer than a register are loaded W columns at a time
     static_assert(N % W == 0);
     unrolled<N / W>([&](auto block) WAVECOMB_INLINE_LAMBDA {
       constexpr size_t c = block * W;
@@ -148,6 +149,7 @@ WAVECOMB_INLINE std::array<F, N> rows_at(const float* const* at) {
   return out;
 }
 
+/// Stores N words at each lane's address.
 template <size_t N, typename F>
 WAVECOMB_INLINE void rows_to(float* const* at, const std::array<F, N>& values) {
   constexpr size_t W = kWidth<F>;
@@ -181,13 +183,13 @@ WAVECOMB_INLINE void rows_to(float* const* at, const std::array<F, N>& values) {
   }
 }
 
-/// What inactive lanes read.
+/// Zeros that inactive lanes read.
 alignas(64) inline constexpr float kNoRow[16] = {};
 
 }  // namespace detail
 
-/// Words [word, word + N) of the array at `base`, for each active lane; 0 in the others.
-/// N is 2 to 16; nothing else is read.
+/// Loads words [word, word + N) of the array at `base` for each active lane; other lanes get 0. N
+/// is 2 to 16. Reads only these words.
 template <size_t N, typename F>
 WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word,
                                            const Mask<F>& active) {
@@ -206,7 +208,8 @@ WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word
   return detail::rows_at<N, F>(at);
 }
 
-/// The same from an array of each lane's own: `array(i)` is lane i's, asked for active lanes only.
+/// Loads rows from a different array in each lane: `array(i)` returns the array of lane i and is
+/// called for active lanes only.
 template <size_t N, typename F, typename Array>
 WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>& word,
                                               const Mask<F>& active) {
@@ -221,7 +224,7 @@ WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>&
   return detail::rows_at<N, F>(at);
 }
 
-/// The same where all lanes are active: without a branch for each.
+/// Variant of load_rows_of() for all lanes active, without branches.
 template <size_t N, typename F, typename Array>
 WAVECOMB_INLINE std::array<F, N> load_all_rows_of(const Array& array, const UInt<F>& word) {
   constexpr size_t W = kWidth<F>;
@@ -233,7 +236,7 @@ WAVECOMB_INLINE std::array<F, N> load_all_rows_of(const Array& array, const UInt
   return detail::rows_at<N, F>(at);
 }
 
-/// Writes the rows of the active lanes; rows of active lanes are distinct. N is a power of two.
+/// Stores the rows of the active lanes, which must be distinct. N is a power of two.
 template <size_t N, typename F>
 WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::array<F, N>& values,
                                 const Mask<F>& active) {
@@ -249,7 +252,7 @@ WAVECOMB_INLINE void store_rows(void* base, const UInt<F>& word, const std::arra
   detail::rows_to<N, F>(at, values);
 }
 
-/// Writes the rows of the active lanes one behind the other at `to`; returns how many.
+/// Stores the rows of the active lanes contiguously at `to`; returns their number.
 template <size_t N, typename F>
 WAVECOMB_INLINE uint32_t compress_rows(float* to, const std::array<F, N>& values,
                                        const Mask<F>& active) {

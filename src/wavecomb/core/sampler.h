@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Counter-based sample values: every number is a function of (pixel, sample, set, seed) and of
-/// nothing else, so no schedule can change it.
+/// Counter-based random numbers: each sample value is a function of (pixel, sample, set, seed)
+/// only, so that it does not depend on scheduling.
 ///
-/// Owen-scrambled Sobol by hashing, four dimensions at a time, sets padded by independent shuffles
-/// (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020). Direction numbers: Joe and Kuo
-/// 2008.
+/// Uses hash-based Owen-scrambled Sobol points, four dimensions at a time; sets are padded by
+/// independent shuffles (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4) 2020). Direction
+/// numbers are from Joe and Kuo, 2008.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -13,7 +13,7 @@
 
 namespace wavecomb {
 
-/// What the values of one path are keyed by: a hash of (pixel, seed) and the sample's number.
+/// Key of a path's sample values: a hash of (pixel, seed), and the sample index.
 template <typename F>
 struct SampleKey {
   UInt<F> pixel_hash;
@@ -26,30 +26,30 @@ inline SampleKey<F> make_sample_key(const UInt<F>& pixel, const UInt<F>& sample,
   return {hash_u32<UInt<F>>(pixel, UInt<F>(seed)), sample};
 }
 
-/// Four numbers in [0, 1).
+/// Four random numbers in [0, 1).
 template <typename F>
 struct Sample4 {
   F x, y, z, w;
 };
 
-/// Sets of four dimensions that a path draws from once: its place on the film and the lens, and its
-/// time in the shutter.
+/// Sets of four dimensions that a path uses once: film position and lens, and shutter time.
 inline constexpr uint32_t kCameraSet = 0;
 inline constexpr uint32_t kTimeSet = 0xffffffffu;
 
-/// Sets that it draws from at each vertex. A step asks for its own by name, so that a step that
-/// comes or goes changes no other step's numbers.
+/// Sets used at each vertex. Each step has a named set, so that adding or removing a step does not
+/// change the random numbers of others.
 enum class VertexSet : uint32_t {
-  kLight,     ///< the light sample: choice, u, v; and roulette
-  kBsdf,      ///< the bounce: lobe, u, v
-  kFlight,    ///< the way to the vertex, where something lies on it (integrate/media.h)
-  kShadow,    ///< the way of its shadow ray
-  kEmission,  ///< of a path from a light, at depth 0: the choice of the light, and the time
+  kLight,     ///< light sampling (choice, u, v) and Russian roulette
+  kBsdf,      ///< BSDF sampling: lobe, u, v
+  kFlight,    ///< the ray segment to the vertex, if it passes media or presence (integrate/media.h)
+  kShadow,    ///< transmittance along the vertex's shadow ray
+  kEmission,  ///< start of a light path, at depth 0: choice of the light, and time
 };
-/// Depths below this have sets of their own.
+/// Upper limit of depths with distinct sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// The number of a set: of the first two, in turn from 1 on; of each other, in a block of its own.
+/// Returns the index of a set. The first two sets alternate from 1 on; each other has a separate
+/// block.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;
@@ -57,8 +57,8 @@ inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
 
 namespace detail {
 
-/// Laine and Karras' permutation: bit k of the result depends on bits 0..k only, so that on
-/// reversed bits it is an Owen scramble (constants: Burley 2020, section 4).
+/// Laine-Karras permutation: bit k of the result depends only on bits 0..k, so that on reversed
+/// bits it is an Owen scramble (constants from Burley 2020, section 4).
 template <typename U>
 WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   x += seed;
@@ -69,10 +69,11 @@ WAVECOMB_INLINE U laine_karras(U x, const U& seed) {
   return x;
 }
 
-/// Bits of the sample number that are used: sequences of up to 2^20 samples a pixel.
+/// Number of bits of the sample index in use: sequences of up to 2^20 samples per pixel.
 inline constexpr int kIndexBits = 20;
 
-/// Sobol dimensions 2 and 3, columns bit-reversed. Primitive polynomials: x^2 + x + 1, x^3 + x + 1.
+/// Generator matrices of Sobol dimensions 2 and 3, with bit-reversed columns. Primitive
+/// polynomials: x^2 + x + 1, x^3 + x + 1.
 inline constexpr uint32_t kSobol2[kIndexBits] = {
     0x1,   0x3,   0x6,    0x9,    0x17,   0x3a,   0x71,    0xa3,    0x116,   0x339,
     0x677, 0x9aa, 0x1601, 0x3903, 0x7706, 0xaa09, 0x10117, 0x3033a, 0x60671, 0x909a3};
@@ -80,7 +81,7 @@ inline constexpr uint32_t kSobol3[kIndexBits] = {
     0x1,   0x3,   0x4,    0xa,    0x1f,   0x2e,   0x45,    0xc9,    0x11b,   0x2a4,
     0x79a, 0xb67, 0x101e, 0x302d, 0x4041, 0xa0c3, 0x1f104, 0x2e28a, 0x457df, 0xc9bae};
 
-/// A product with the matrix of such columns, four bits of the index at a time.
+/// Multiplication with a generator matrix over GF(2), four bits of the index at a time.
 class NibbleTables {
  public:
   static constexpr int kNibbles = kIndexBits / 4;
@@ -103,7 +104,7 @@ class NibbleTables {
 };
 inline constexpr NibbleTables kSobolTables2(kSobol2), kSobolTables3(kSobol3);
 
-/// Owen-scrambled point from a bit-reversed Sobol value.
+/// Returns the Owen-scrambled value in [0, 1) of a bit-reversed Sobol value.
 template <typename F>
 WAVECOMB_INLINE F scrambled(const UInt<F>& reversed, const UInt<F>& seed) {
   return unit_float<F>(reverse_bits<UInt<F>>(laine_karras<UInt<F>>(reversed, seed)));
@@ -113,10 +114,11 @@ template <typename F>
 WAVECOMB_INLINE Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
   using U = UInt<F>;
   const U seed = hash_u32<U>(key.pixel_hash, U(set));
-  // Shuffle the order of the points, so that sets are independent of one another.
+  // Shuffles the order of points, so that sets are mutually independent.
   const U index = reverse_bits<U>(laine_karras<U>(reverse_bits<U>(key.sample), seed)) &
                   ((1u << kIndexBits) - 1u);
-  // Dimension 0 reversed is the index; dimension 1 reversed is Pascal's matrix modulo 2.
+  // Dimension 0 reversed is the index; dimension 1 reversed is a product with Pascal's matrix mod
+  // 2.
   U d1 = index;
   d1 ^= d1 >> 16;
   d1 ^= (d1 & 0xff00ff00u) >> 8;
@@ -138,7 +140,7 @@ inline Sample4<F> independent_4d(const SampleKey<F>& key, uint32_t set) {
 
 }  // namespace detail
 
-/// The values of one set of dimensions for each path.
+/// Returns the sample values of one set for each path.
 template <typename F>
 WAVECOMB_INLINE Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, uint32_t set) {
   return kind == SamplerKind::kSobol ? detail::sobol_4d<F>(key, set)

@@ -10,12 +10,12 @@ LightPathRefusal light_path_refusal(const Settings& s) {
   if (s.guiding != Guiding::kOff) return {"guiding", "guiding off"};
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
-  if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which knows no light of such paths", "none"};
+  if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which lacks light path contributions", "none"};
   if (s.merge_radius <= 0) return {};
   if (s.connects()) return {"merge_radius", "merge_radius 0"};
   if (s.keeps_error()) return {"merge_radius and errors of pixels", "merge_radius 0"};
   for (const Aov aov : {Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})
-    if (s.aovs.has(aov)) return {"merge_radius and parts of the light as AOVs", "merge_radius 0"};
+    if (s.aovs.has(aov)) return {"merge_radius and AOVs that split the beauty", "merge_radius 0"};
   return {};
 }
 
@@ -28,7 +28,7 @@ void Settings::check() const {
   for (const SettingInfo& setting : setting_table()) setting.check(*this);
   if (aovs.has(Aov::kDeep) && firefly != Firefly::kKeep)
     throw Error(
-        "firefly reweight does not go with deep pictures, whose samples would not add up to the "
+        "firefly reweight does not go with deep images, whose samples would not add up to the "
         "beauty; give firefly keep");
   if (joins_light())
     if (const LightPathRefusal refusal = light_path_refusal(*this); !refusal.what.empty())
@@ -39,7 +39,7 @@ void Settings::check() const {
                 "; it must be from 1 to " + std::to_string(kMaxPixels));
   if (width <= 2 * uint64_t{overscan} || height <= 2 * uint64_t{overscan})
     throw Error("overscan is " + std::to_string(overscan) +
-                ", which leaves nothing of the picture; width and height are with the overscan");
+                ", which covers the whole image; width and height include the overscan");
   if (region) {
     const auto text = [](uint32_t v) { return std::to_string(v); };
     const Region& r = *region;
@@ -52,15 +52,15 @@ void Settings::check() const {
                   " and Y1 at most " + text(height));
   }
   if (adaptive > 0 && noise > 0)
-    throw Error("adaptive and noise are both given; choose one to end the render by");
+    throw Error("adaptive and noise are both set; set only one of them");
   if (allots() && is_adaptive())
     throw Error(
-        "allocate is for renders of a given number of samples or seconds; adaptive and "
-        "noise allot samples by themselves: give one");
+        "allocate is for renders with a given number of samples or seconds; adaptive and noise "
+        "distribute samples themselves: set only one of them");
   if (allots() && region)
     throw Error(
-        "allocate error and efficiency look at the whole picture, and a region then would "
-        "not be its part; give allocate even, or no region");
+        "allocate error and efficiency depend on the whole image, so a region would differ from "
+        "the same part of a full render; give allocate even, or no region");
   if (is_adaptive() && min_spp > spp)
     throw Error("min_spp is " + std::to_string(min_spp) + "; it must not be above spp, which is " +
                 std::to_string(spp));

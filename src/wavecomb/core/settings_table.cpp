@@ -46,7 +46,7 @@ void write(Settings& settings, const SettingValue& value) {
     settings.*kMember = static_cast<T>(std::get<int64_t>(value));
 }
 
-/// A row without limits.
+/// Returns a row without limits.
 template <auto kMember>
 SettingInfo row(const char* name, const char* label, const char* help) {
   SettingInfo info;
@@ -66,7 +66,8 @@ SettingInfo number(const char* name, const char* label, double least, double mos
   info.zero = zero;
   return info;
 }
-/// A number that others decide where it is not given: `used` says by what.
+/// Returns a row of a number whose default depends on other settings; `used` returns the value in
+/// use.
 template <auto kMember>
 SettingInfo number_or_own(const char* name, const char* label, double least, double most,
                           const char* help, SettingValue (*used)(const Settings&)) {
@@ -90,14 +91,14 @@ SettingInfo choice(const char* name, const char* label, std::vector<SettingChoic
 }
 
 std::vector<SettingChoice> ray_orders() {
-  return {{"slot", "As generated: survivors keep their places."},
-          {"morton", "By place of the origin."},
-          {"morton-octant", "By octant of the direction, then by place of the origin."},
-          {"direction", "By octant and long axes of the direction."},
-          {"auto", "The quickest of the four, learned for each depth."}};
+  return {{"slot", "Not sorted: in the order of the paths."},
+          {"morton", "Sorted by position of the origin (Morton code)."},
+          {"morton-octant", "Sorted by octant of the direction, then by position of the origin."},
+          {"direction", "Sorted by octant and major axes of the direction."},
+          {"auto", "The fastest of the four, learned for each depth."}};
 }
 
-// Limits: a path has as many vertices at most, a pixel as many samples.
+// Upper limits of path depth and of samples per pixel.
 constexpr double kMostDepth = 4096, kMostSamples = 1 << 20;
 
 SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* zero) {
@@ -106,194 +107,192 @@ SettingInfo with_steps(SettingInfo info, std::vector<double> steps, const char* 
   return info;
 }
 
-/// The same setting, as one that changes the expectation.
+/// Marks a setting as one that changes the expectation of the image.
 SettingInfo in_expectation(SettingInfo info) {
   info.changes_expectation = true;
   return info;
 }
 
-/// What the picture is.
+/// Returns the settings that define the image.
 std::vector<SettingInfo> picture_settings() {
   using S = Settings;
   return {
       in_expectation(
-          number<&S::width>("width", "Width", 1, kMaxSize, "Pixels of a row of the picture.")),
-      in_expectation(number<&S::height>("height", "Height", 1, kMaxSize, "Rows of pixels.")),
+          number<&S::width>("width", "Width", 1, kMaxSize, "Width of the image in pixels.")),
+      in_expectation(
+          number<&S::height>("height", "Height", 1, kMaxSize, "Height of the image in pixels.")),
       in_expectation(number<&S::max_depth>("max_depth", "Max depth", 0, kMostDepth,
-                                           "Longest path, in scatterings.")),
-      number<&S::seed>("seed", "Seed", 0, 0xffffffffu, "Of all random numbers."),
+                                           "Maximum number of scattering events of a path.")),
+      number<&S::seed>("seed", "Seed", 0, 0xffffffffu, "Seed of all random numbers."),
       choice<&S::sampler>("sampler", "Sampler",
                           {{"sobol", "Owen-scrambled Sobol points."},
                            {"independent", "Independent random numbers."}},
-                          "Where samples lie."),
+                          "Pattern of the sample positions."),
       in_expectation(choice<&S::filter>("filter", "Filter",
-                                        {{"box", "Even over its width."},
-                                         {"gaussian", "A bell."},
-                                         {"blackman-harris", "A bell that ends smoothly."}},
-                                        "How samples count for the pixels around them.")),
+                                        {{"box", "Constant weight over its width."},
+                                         {"gaussian", "Gaussian with sigma of 1/6 of its width."},
+                                         {"blackman-harris", "Blackman-Harris window."}},
+                                        "Pixel filter: weights of samples around a pixel.")),
       in_expectation(number_or_own<&S::filter_width>(
           "filter_width", "Filter width", 0.01f, 32,
-          "Full width of the filter in pixels; its own: box 1, the others 3.",
+          "Full width of the pixel filter in pixels; its own is 1 for the box and 3 for others.",
           [](const S& s) -> SettingValue { return double{s.used_filter_width()}; })),
       in_expectation(number<&S::clamp_indirect>("clamp_indirect", "Clamp indirect", 0, 1e30f,
-                                                "Limit of a sample's indirect light; biased.",
+                                                "Maximum luminance of an indirect contribution. "
+                                                "Reduces fireflies but darkens the image.",
                                                 "off")),
       in_expectation(choice<&S::schlick_fresnel>(
           "fresnel", "Fresnel",
           {{"exact", "Fresnel's equations."}, {"schlick", "Schlick's approximation."}},
-          "Reflectance of dielectrics.")),
+          "Formula for the reflectance of dielectrics.")),
       in_expectation(choice<&S::texture_filter>(
           "texture_filter", "Texture filter",
-          {{"auto",
-            "Whole where the camera looks, by one texel, chosen by its weight, after a bounce."},
-           {"whole", "Whole everywhere."}},
+          {{"auto", "Full filtering where the camera looks, one random texel after a bounce."},
+           {"whole", "Full filtering everywhere."}},
           "How textures are filtered.")),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
-                               "Samples every bounce that is not a mirror's by cosine."),
+                               "Samples every non-specular bounce by cosine, for comparisons."),
       in_expectation(row<&S::alpha>(
           "alpha", "Alpha",
-          "Where the camera sees a dome or a distant light the picture is clear, with "
-          "an alpha channel.")),
-      row<&S::error>("error", "Errors", "Keeps errors and variances where nothing else asks."),
-      in_expectation(
-          number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
-                               "Pixels that are rendered beyond each edge of the picture.")),
+          "Makes domes and distant lights transparent to the camera, with an alpha channel.")),
+      row<&S::error>("error", "Errors", "Stores error and variance estimates of each pixel."),
+      in_expectation(number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
+                                          "Extra pixels to render beyond each edge of the image.")),
       number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMostDeepSamples,
-                               "The most samples that a deep picture has in a pixel."),
+                               "Maximum number of samples per pixel of a deep image."),
       number<&S::deep_tolerance>("deep_tolerance", "Deep tolerance", 0, 1,
-                                 "Samples of a deep picture whose depths differ by no more than "
-                                 "this share of the depth are one."),
+                                 "Merges samples of a deep image whose depths differ by at most "
+                                 "this fraction of the depth."),
       in_expectation(row<&S::crop>("crop", "Crop",
-                                   "The picture is its region alone, in memory and in files.")),
+                                   "Limits the image, in memory and in files, to the region.")),
   };
 }
 
-/// How much is done for it.
+/// Returns the settings that control the amount of work.
 std::vector<SettingInfo> work_settings() {
   using S = Settings;
   return {
       choice<&S::roulette>(
           "roulette", "Roulette",
-          {{"auto", "By what is expected of it where bounces are guided, else by throughput."},
-           {"off", "Paths end at the greatest depth only."},
-           {"throughput", "By the light that the path still carries."},
-           {"cost-aware", "By the light that it carries, over the root of what shading costs."},
-           {"efficient",
-            "By the light that it is expected to bring, as paths before the first pass find out."}},
-          "How paths end early. Each is unbiased, but another estimate."),
+          {{"auto", "Efficient where bounces are guided, otherwise throughput."},
+           {"off", "Paths end at the maximum depth only."},
+           {"throughput", "By the path's throughput."},
+           {"cost-aware", "By throughput over the square root of the shading cost."},
+           {"efficient", "By expected contribution and cost, learned before the first pass."}},
+          "Russian roulette: how paths are terminated early, without bias."),
       choice<&S::transport>("transport", "Transport",
-                            {{"path", "From the camera alone."},
+                            {{"path", "At the camera only."},
                              {"light",
-                              "And as many from the lights, joined by their densities: for "
+                              "Also at the lights, combined by multiple importance sampling: for "
                               "caustics of small lights."},
                              {"auto",
-                              "From the lights, too, where it pays, as some pixels before the "
-                              "first pass find out."},
+                              "Also at the lights if a short pilot render predicts that it reduces "
+                              "noise."},
                              {"bdpt",
-                              "From both, and their vertices are connected: another estimate, "
-                              "not yet found to pay."}},
-                            "Where paths begin."),
-      choice<&S::light_aim>(
-          "light_aim", "Light paths go",
-          {{"off", "As lights shine, wherever that is."},
-           {"on", "Mostly where some before the first pass brought light to the picture."}},
-          "Where paths from lights are aimed."),
+                              "At both, with connections between their vertices. No measured "
+                              "benefit over light so far."}},
+                            "Where paths start."),
+      choice<&S::light_aim>("light_aim", "Light path aiming",
+                            {{"off", "By the emission of the lights alone."},
+                             {"on", "Mostly where pilot paths contributed to the image."}},
+                            "Where light paths are aimed."),
       in_expectation(
-          number<&S::merge_radius>("merge_radius", "Merge within", 0, 64,
-                                   "Pixels, by which caustics that are seen in mirrors or through "
-                                   "glass may be blurred so that light paths find them.",
+          number<&S::merge_radius>("merge_radius", "Merge radius", 0, 64,
+                                   "Radius in pixels within which caustics seen in mirrors or "
+                                   "through glass are blurred to find them.",
                                    "never")),
       in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
-          {{"keep", "They stay: nothing is biased."},
+          {{"keep", "Unchanged, without bias."},
            {"reweight",
-            "Samples count as far as others are as bright: darker where they are few. The "
-            "layer unbiased has them all."}},
-          "What becomes of samples much brighter than others.")),
+            "Reduces the weight of rare bright samples, which darkens the image slightly. The "
+            "layer unbiased keeps them."}},
+          "Treatment of samples much brighter than others.")),
       number<&S::roulette_depth>("roulette_depth", "From depth", 0, kMostDepth,
-                                 "The first vertex at which a path may end early."),
+                                 "First vertex at which roulette may terminate a path."),
       choice<&S::light_selection>(
           "light_selection", "Lights",
-          {{"auto", "By tree where there are several to choose among, else by power."},
-           {"tree", "For the place that it lights, by a tree of lights."},
-           {"power", "By its power, wherever it is."}},
-          "How a light is chosen to sample: for the place that it lights, or by power."),
+          {{"auto", "By tree if there are several lights, otherwise by power."},
+           {"tree", "By expected contribution at the shaded point, with a light tree."},
+           {"power", "By power, independent of position."}},
+          "How shading chooses the light to sample."),
       choice<&S::light_weights>(
-          "light_weights", "Light shares",
-          {{"calibrated",
-            "By what it brings to the picture, as some paths before the first pass find out."},
-           {"power", "By its power, wherever it is."}},
+          "light_weights", "Light weights",
+          {{"calibrated", "By contribution to the image, measured with a pilot render."},
+           {"power", "By power, independent of position."}},
           "How often each light is chosen."),
       choice<&S::equiangular>(
-          "equiangular", "Lamps in fog",
-          {{"off", "Light is scattered where it is by density alone."},
-           {"on",
-            "And where lamps are near, in volumes that are even, as often as they are near."}},
-          "How distances in even volumes are chosen."),
+          "equiangular", "Equiangular",
+          {{"off", "By density only."},
+           {"on", "Also by distance to lights, in homogeneous volumes (equiangular sampling)."}},
+          "How scattering distances in homogeneous volumes are sampled."),
       choice<&S::guiding>(
           "guiding", "Guiding",
-          {{"auto", "By the field where it pays, as some paths before the first pass find out."},
-           {"on", "By the field wherever it knows something."},
-           {"off", "By the materials alone."}},
-          "How bounces choose directions: by materials, or also by where light comes from."),
+          {{"auto", "Use guiding if a short pilot render predicts that it reduces noise."},
+           {"on", "Use the guiding field wherever it has data."},
+           {"off", "Sample by material only."}},
+          "Path guiding: bounces also follow the learned incident light."),
       number<&S::learn_memory_mb>("learn_memory", "Learning (MB)", 1, 1u << 16,
-                                  "Memory that what is learned may take, in MB."),
+                                  "Memory limit of learned data in MB."),
       number<&S::adaptive>("adaptive", "Pixel error", 0, 1e6f,
-                           "Error that a pixel may have, as a share of its brightness.", "off"),
-      number<&S::noise>("noise", "Noise", 0, 1, "Mean relative error that the picture may have.",
+                           "Samples each pixel until its relative error is below this value.",
+                           "off"),
+      number<&S::noise>("noise", "Noise", 0, 1,
+                        "Renders until the image's mean relative error is below this value.",
                         "off"),
       number<&S::min_spp>("min_spp", "Min samples", 1, kMostSamples,
-                          "Samples of each pixel before the first look at errors."),
+                          "Samples per pixel before the first error estimate."),
       number<&S::spp>("spp", "Samples", 1, kMostSamples,
-                      "Samples of each pixel; with adaptive sampling, the most."),
-      choice<&S::allocate>("allocate", "Samples go",
-                           {{"even", "To all pixels alike."},
-                            {"error", "Where the relative error is: by deviation over brightness."},
-                            {"efficiency", "Likewise, and to cheap pixels rather than dear ones."}},
-                           "How the samples of a render are allotted to its pixels."),
-      number<&S::time_limit>("time_limit", "Time limit", 0, 1e9f, "Seconds of rendering.", "none"),
+                      "Samples per pixel; the maximum with adaptive sampling."),
+      choice<&S::allocate>("allocate", "Sample allocation",
+                           {{"even", "The same number for all pixels."},
+                            {"error", "By relative error: standard deviation over brightness."},
+                            {"efficiency", "By relative error and cost of the pixel."}},
+                           "How samples are distributed over pixels."),
+      number<&S::time_limit>("time_limit", "Time limit", 0, 1e9f,
+                             "Stops rendering after this many seconds.", "none"),
   };
 }
 
-/// What computes it, and in which order.
+/// Returns the settings that control how the image is computed, and in which order.
 std::vector<SettingInfo> order_settings() {
   using S = Settings;
   std::vector<SettingInfo> settings = {
       choice<&S::integrator>(
           "integrator", "Integrator",
-          {{"wavefront", "Waves of paths, stage by stage."},
-           {"reference", "One path at a time, depth first: the oracle. Slow; has no queues."}},
-          "How paths are followed."),
+          {{"wavefront", "Processes waves of paths stage by stage."},
+           {"reference", "Traces one path at a time. Slow; for checking the wavefront."}},
+          "How paths are traced."),
       choice<&S::costs>("costs", "Costs",
                         {{"auto", "Calibrated, then measured; roulette uses the model."},
                          {"measured",
-                          "Calibrated, then measured, for roulette too: with cost-aware roulette "
-                          "the picture then varies within its noise."},
-                         {"model", "Fixed numbers by program and texture reads: reproducible."}},
-                        "Where the estimated costs of materials come from."),
+                          "Calibrated, then measured, also for roulette: the image then varies "
+                          "within its noise if roulette is cost-aware."},
+                         {"model", "Fixed costs by program and texture reads; reproducible."}},
+                        "Source of the estimated costs of materials."),
       row<&S::policy>("policy", "Policy", "The order in which hits are shaded."),
       choice<&S::ray_order>("ray_order", "Ray order", ray_orders(),
                             "The order in which bounce rays are traced."),
       choice<&S::shadow_order>("shadow_order", "Shadow order", ray_orders(),
                                "The order in which shadow rays are traced."),
-      with_steps(row<&S::lanes>("lanes", "Lanes", "How many records are shaded at once."),
+      with_steps(row<&S::lanes>("lanes", "Lanes", "Number of records that are shaded at once."),
                  {1, 4, 8, 16}, "auto"),
       number<&S::wave_size>("wave_size", "Wave size", 64, 1 << 20,
-                            "Paths that are followed together by one thread.", "automatic"),
+                            "Number of paths that a thread processes together.", "automatic"),
       choice<&S::materialize>("materialize", "Materialize",
-                              {{"auto", "Off, since that measures faster."},
-                               {"on", "Records are moved into their order before they are shaded."},
-                               {"off", "Shading gathers its inputs through indices."}},
+                              {{"auto", "Off, since that is faster."},
+                               {"on", "Move records into their order before shading."},
+                               {"off", "Gather the inputs of shading through indices."}},
                               "Whether records are moved into their order."),
       choice<&S::traversal>("traversal", "Traversal",
                             {{"packets", "In packets."}, {"single", "One by one."}},
-                            "How rays are handed to Embree; the picture is the same."),
-      number<&S::threads>("threads", "Threads", 0, 1024, "Threads that render.", "all"),
+                            "How rays are passed to Embree; the image is the same."),
+      number<&S::threads>("threads", "Threads", 0, 1024, "Number of render threads.", "all"),
       number<&S::cost_weight>("cost_weight", "Cost weight", 0, 1,
                               "Weight of a pass in the moving average of costs."),
       row<&S::progressive>("progressive", "Progressive",
-                           "Passes of 1, 1, 2, 4 ... samples: the whole picture is "
-                           "there soon."),
+                           "Renders passes of 1, 1, 2, 4, ... samples, so that the whole image "
+                           "appears soon."),
   };
   for (SettingInfo& setting : settings)
     setting.changes_picture =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render can be told, as a table: a row for each member of Settings. Checks, Python's
-/// attributes and keywords, options of the command line, fields of forms and the headers of
-/// checkpoints follow from it. A new setting is a member of Settings, a row here, and its use.
+/// Table of settings with one row per member of Settings. Checks, Python attributes and keywords,
+/// command line options, form fields and checkpoint headers follow from it. To add a setting, add a
+/// member to Settings, a row here, and its use.
 #pragma once
 
 #include <cstdint>
@@ -15,49 +15,53 @@
 
 namespace wavecomb {
 
-/// A value as callers see it; of a setting with choices, the name of one. None (monostate): the
-/// default of a setting whose default follows from others.
+/// Value as callers see it; for settings with choices, the name of one. None (monostate) selects a
+/// default that depends on other settings.
 using SettingValue = std::variant<std::monostate, bool, int64_t, double, std::string>;
 
+/// Value of a setting with choices.
 struct SettingChoice {
   std::string name;
-  const char* help;  ///< what it does, a sentence
+  const char* help;  ///< one sentence
 };
 
-/// What a setting is about: what the picture is, how much is done for it, or in which order.
+/// Subject of a setting: definition of the image, amount of work, or order of computation.
 enum class SettingGroup : uint8_t { kPicture, kWork, kOrder };
 
+/// Row of the settings table.
+///
 /// Contract: lives as long as the program.
 struct SettingInfo {
-  const char* name = "";   ///< of the attribute; options have - for _
-  const char* label = "";  ///< in a form
-  const char* help = "";   ///< a sentence
-  /// Whether the picture depends on it; if not, it says how the picture is computed.
+  const char* name = "";   ///< attribute name; options use - for _
+  const char* label = "";  ///< label in a form
+  const char* help = "";   ///< one sentence
+  /// Whether the image depends on the setting; otherwise it affects only how it is computed.
   bool changes_picture = true;
-  /// Whether the picture that more and more samples tend to depends on it. Others change noise,
-  /// work, or layers that say something about these.
+  /// Whether the expectation of the image depends on the setting, that is, the limit for many
+  /// samples. Other settings change noise, work, or layers that describe them.
   bool changes_expectation = false;
   SettingGroup group = SettingGroup::kPicture;
-  double least = 0, most = -1;         ///< of numbers; least > most: any
-  const char* zero = "";               ///< what 0 stands for, where it stands for something
-  std::vector<double> steps;           ///< the values that there are, beside 0; empty: all
-  std::vector<SettingChoice> choices;  ///< in the order of the enum's values
+  double least = 0, most = -1;         ///< range of numbers; no limits if least > most
+  const char* zero = "";               ///< meaning of 0, if it has a special one
+  std::vector<double> steps;           ///< allowed values besides 0; empty means all
+  std::vector<SettingChoice> choices;  ///< in the order of the enum
 
-  bool may_be_none = false;  ///< then its default follows from others
+  bool may_be_none = false;  ///< None is allowed; the default then depends on other settings
 
   SettingValue (*read)(const Settings&) = nullptr;
   void (*write)(Settings&, const SettingValue&) = nullptr;
 
   SettingValue get(const Settings& settings) const;
-  /// Throws Error where the value is of another kind, or none of the choices.
+  /// Throws Error if the value has a wrong type or is not one of the choices.
   void set(Settings& settings, const SettingValue& value) const;
-  /// Throws Error, which names the setting, unless its value is in range.
+  /// Throws Error that names the setting if its value is out of range.
   void check(const Settings& settings) const;
 };
 
-/// All settings but aovs and region, which are no single values, in the order of Settings.
+/// Returns all settings except aovs and region, which are not single values, in the order of
+/// Settings.
 std::span<const SettingInfo> setting_table();
-/// Null where there is none.
+/// Returns the row of a setting, or null if the name is unknown.
 const SettingInfo* find_setting(std::string_view name);
 
 }  // namespace wavecomb

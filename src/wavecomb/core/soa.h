@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A block of equally long columns of 32-bit values.
+/// Structure-of-arrays storage of 32-bit values.
 #pragma once
 
 #include <cstddef>
@@ -10,16 +10,16 @@
 
 namespace wavecomb {
 
-/// Columns of floats or uint32 in one allocation, each aligned to 64 bytes and padded so that a
-/// packet may be read or written at any index below the capacity.
+/// Columns of floats or uint32 of equal length in one allocation. Each column is aligned to 64
+/// bytes and padded, so that a packet may be read or written at any index below the capacity.
 class SoaBlock {
  public:
-  static constexpr size_t kPad = 16;  ///< values past the capacity
+  static constexpr size_t kPad = 16;  ///< padding past the capacity, in values
 
   SoaBlock() = default;
   SoaBlock(size_t columns, size_t capacity)
-      : stride_(((capacity + kPad) + 15) / 16 * 16 +
-                16),  // 16 more: columns do not share cache sets
+      // The extra 16 values keep columns from sharing cache sets.
+      : stride_(((capacity + kPad) + 15) / 16 * 16 + 16),
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {
     if (!data_) throw std::bad_alloc();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What comes before what among tasks, for ThreadSanitizer, which does not see into oneTBB.
+/// Happens-before annotations of tasks for ThreadSanitizer, which cannot see into oneTBB.
 #pragma once
 
 #if defined(__SANITIZE_THREAD__)
@@ -11,8 +11,8 @@
 
 namespace wavecomb {
 
-/// One parallel loop: what is before it is known to its tasks, and what they did to whoever is
-/// behind it. Of two tasks neither knows of the other. Nothing in other builds.
+/// Annotations of one parallel loop: code before the loop happens before its tasks, and they happen
+/// before join(). Tasks are not ordered among each other. Does nothing in other builds.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));
@@ -23,15 +23,18 @@ class TaskOrder {
   TaskOrder(const TaskOrder&) = delete;
   TaskOrder& operator=(const TaskOrder&) = delete;
 
-  /// `body` as a task of the loop. Contract: both outlive it.
+  /// Wraps `body` as a task of the loop.
+  ///
+  /// Contract: this object and `body` outlive the task.
   template <typename Body>
   auto around(const Body& body) const {
-    // What is captured is read before it is known that it was written: unseen.
+    // Not sanitised, since the captures are read before the annotation takes effect.
     return [this, &body](const auto&... arguments) WAVECOMB_UNSEEN {
       const Task task(*this);
       body(arguments...);
     };
   }
+  /// Call after the loop.
   void join() const { acquire(ended_); }
 
  private:
@@ -54,7 +57,7 @@ class TaskOrder {
   char begun_ = 0, ended_ = 0;
 };
 
-/// Tasks of one worker come one behind the other; `worker` is what they share.
+/// Annotation for tasks of one worker, which run one after another; `worker` identifies it.
 class WorkerOrder {
  public:
 #if defined(__SANITIZE_THREAD__)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arithmetic of vectors and colours over a lane type.
+/// Arithmetic of vectors and colours over lane types.
 #pragma once
 
 #include "wavecomb/core/affine.h"
@@ -25,12 +25,12 @@ WAVECOMB_INLINE Vec3<F> cross(const Vec3<F>& a, const Vec3<F>& b) {
   return {fma(a.y, b.z, F(-(a.z * b.y))), fma(a.z, b.x, F(-(a.x * b.z))),
           fma(a.x, b.y, F(-(a.y * b.x)))};
 }
-/// a / |a|; undefined (NaN) for the zero vector.
+/// Returns a / |a|; NaN for the zero vector.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> normalize(const Vec3<F>& a) {
   return a * F(1.f / length(a));
 }
-/// a + s b.
+/// Returns a + s b.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> fma(const Vec3<F>& b, const F& s, const Vec3<F>& a) {
   return {fma(b.x, s, a.x), fma(b.y, s, a.y), fma(b.z, s, a.z)};
@@ -55,7 +55,7 @@ template <typename F>
 WAVECOMB_INLINE F max_component(const Vec3<F>& a) {
   return max(max(a.x, a.y), a.z);
 }
-/// Rec.709 luminance of a linear colour.
+/// Returns the Rec.709 luminance of a linear colour.
 template <typename F>
 WAVECOMB_INLINE F luminance(const Vec3<F>& c) {
   return fma(c.z, F(0.072186f), fma(c.y, F(0.715158f), F(c.x * 0.212656f)));
@@ -65,7 +65,7 @@ WAVECOMB_INLINE Mask<F> is_black(const Vec3<F>& c) {
   return (c.x == 0.f) & (c.y == 0.f) & (c.z == 0.f);
 }
 
-/// Three floats at consecutive places of three arrays or of one interleaved array.
+/// Gathers three consecutive floats at 3 * index.
 template <typename F>
 inline Vec3<F> gather_vec3(const float* base, const UInt<F>& index, const Mask<F>& active) {
   const UInt<F> i = index * 3u;

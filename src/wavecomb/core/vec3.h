@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Two- and three-component vectors, without a need for Dr.Jit: what public headers may include.
+/// Two- and three-component vectors that do not depend on Dr.Jit, for public headers.
 #pragma once
 
 #include <type_traits>
@@ -11,7 +11,7 @@ struct Vec2 {
   F x, y;
 };
 
-/// A vector, point, normal or linear Rec.709 colour (r, g, b = x, y, z); the name says which.
+/// Vector, point, normal or linear Rec.709 colour (r, g, b = x, y, z), depending on use.
 template <typename F>
 struct Vec3 {
   F x{0.f}, y{0.f}, z{0.f};
@@ -19,7 +19,7 @@ struct Vec3 {
   Vec3() = default;
   explicit Vec3(const F& s) : x(s), y(s), z(s) {}
   Vec3(const F& x_, const F& y_, const F& z_) : x(x_), y(y_), z(z_) {}
-  /// Broadcast of a scalar vector.
+  /// Broadcasts a scalar vector to all lanes.
   template <typename G = F, typename = std::enable_if_t<!std::is_same_v<G, float>>>
   explicit Vec3(const Vec3<float>& v) : x(v.x), y(v.y), z(v.z) {}
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Maps from the unit square to directions and shapes, with their densities.
+/// Warps from the unit square to directions and shapes, with their densities.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -7,21 +7,21 @@
 
 namespace wavecomb {
 
-/// Uniform unit disk, concentric map (Shirley and Chiu, "A Low Distortion Map Between Disk and
-/// Square", JGT 2(3) 1997).
+/// Samples the uniform unit disk with the concentric map (Shirley and Chiu, "A Low Distortion Map
+/// Between Disk and Square", JGT 2(3) 1997).
 template <typename F>
 inline Vec2<F> square_to_disk(const F& u, const F& v) {
   const F a = fma(u, F(2.f), F(-1.f)), b = fma(v, F(2.f), F(-1.f));
   const Mask<F> wide = abs(a) > abs(b);
   const F r = select(wide, a, b);
   const F ratio = select(wide, b, a) / select(r == 0.f, F(1.f), r);
-  // phi / 2 pi is ratio / 8 on the a side, 1/4 - ratio / 8 on the b side.
+  // phi / 2 pi is ratio / 8 in the a sectors and 1/4 - ratio / 8 in the b sectors.
   const F turn = select(wide, F(ratio * 0.125f), fma(ratio, F(-0.125f), F(0.25f)));
   const auto [s, c] = sincos_2pi(turn);
   return {r * c, r * s};
 }
 
-/// Cosine-weighted hemisphere around +z; pdf = cos_theta / pi.
+/// Samples the cosine-weighted hemisphere around +z; pdf = cos_theta / pi.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> square_to_cosine_hemisphere(const F& u, const F& v) {
   const Vec2<F> d = square_to_disk(u, v);
@@ -33,7 +33,7 @@ inline F cosine_hemisphere_pdf(const F& cos_theta) {
   return max(cos_theta, F(0.f)) * kInvPi;
 }
 
-/// Uniform sphere; pdf = 1 / (4 pi).
+/// Samples the uniform sphere; pdf = 1 / (4 pi).
 template <typename F>
 inline Vec3<F> square_to_sphere(const F& u, const F& v) {
   const F z = fma(u, F(-2.f), F(1.f));
@@ -42,18 +42,18 @@ inline Vec3<F> square_to_sphere(const F& u, const F& v) {
   return {r * c, r * s, z};
 }
 
-/// Uniform cone of directions around +z with 1 - cos(half angle) = `one_minus_cos`;
-/// pdf = 1 / (2 pi one_minus_cos).
+/// Samples a uniform cone of directions around +z with 1 - cos(half angle) = `one_minus_cos`; pdf =
+/// 1 / (2 pi one_minus_cos).
 template <typename F>
 inline Vec3<F> square_to_cone(const F& u, const F& v, const F& one_minus_cos) {
-  const F h = u * one_minus_cos;  // 1 - cos theta, kept so that small angles stay exact
+  const F h = u * one_minus_cos;  // 1 - cos theta, which stays accurate for small angles
   const F r = safe_sqrt(F(h * (2.f - h)));
   const auto [s, c] = sincos_2pi(v);
   return {r * c, r * s, 1.f - h};
 }
 
-/// Uniform barycentric coordinates (b1, b2) of a triangle (Heitz, "A Low-Distortion Map Between
-/// Triangle and Square", 2019); pdf = 1 / area.
+/// Samples uniform barycentric coordinates (b1, b2) of a triangle (Heitz, "A Low-Distortion Map
+/// Between Triangle and Square", 2019); pdf = 1 / area.
 template <typename F>
 inline Vec2<F> square_to_triangle(const F& u, const F& v) {
   const Mask<F> upper = v > u;
