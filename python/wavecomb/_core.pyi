@@ -608,8 +608,7 @@ class Settings:
     """Pixel filter: weights of samples around a pixel. Default: blackman-harris."""
     @property
     def filter_width(self) -> float:
-        """Full width of the pixel filter in pixels; its own is 1 for the box and 3 for others. Default:
-        its own."""
+        """Full filter width in pixels; its own is 1 for the box, else 3. Default: its own."""
 
     @filter_width.setter
     def filter_width(self, value: float | None) -> None: ...

@@ -32,9 +32,9 @@ WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
           n};
 }
 
-/// Returns a frame around the unit vector `n` where s is `tangent` made orthogonal to n, and t is n
-/// x s times `handedness` (1 or -1). Falls back to make_frame(n) if the tangent is parallel to n
-/// (within 1e-3), zero or not finite. The threshold is far above rounding errors, which would
+/// Returns a frame around the unit vector `n` where s is `tangent` made orthogonal to n and t is
+/// cross(n, s) times `handedness` (1 or -1). Falls back to make_frame(n) if the tangent is parallel
+/// to n (within 1e-3), zero or not finite. The threshold is far above rounding errors, which would
 /// otherwise determine s.
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& handedness = F(1.f)) {

@@ -41,7 +41,7 @@ inline constexpr uint32_t kTimeSet = 0xffffffffu;
 enum class VertexSet : uint32_t {
   kLight,     ///< light sampling (choice, u, v) and Russian roulette
   kBsdf,      ///< BSDF sampling: lobe, u, v
-  kFlight,    ///< the ray segment to the vertex, if it passes media or presence (integrate/media.h)
+  kFlight,    ///< sampling along the ray segment to the vertex (integrate/media.h)
   kShadow,    ///< transmittance along the vertex's shadow ray
   kEmission,  ///< start of a light path, at depth 0: choice of the light, and time
 };

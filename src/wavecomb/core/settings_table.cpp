@@ -135,7 +135,7 @@ std::vector<SettingInfo> picture_settings() {
                                         "Pixel filter: weights of samples around a pixel.")),
       in_expectation(number_or_own<&S::filter_width>(
           "filter_width", "Filter width", 0.01f, 32,
-          "Full width of the pixel filter in pixels; its own is 1 for the box and 3 for others.",
+          "Full filter width in pixels; its own is 1 for the box, else 3.",
           [](const S& s) -> SettingValue { return double{s.used_filter_width()}; })),
       in_expectation(number<&S::clamp_indirect>("clamp_indirect", "Clamp indirect", 0, 1e30f,
                                                 "Maximum luminance of an indirect contribution. "
