@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arguments of functions that Python calls, as the core takes them.
+/// Conversion of arguments from Python to types of the core.
 #pragma once
 
 #include <nanobind/ndarray.h>
@@ -20,7 +20,7 @@ inline wavecomb::Vec3<float> vec3(const Color3& c) {
   return {std::get<0>(c), std::get<1>(c), std::get<2>(c)};
 }
 
-/// The value of a name; throws Error, which says what `what` is of, for others.
+/// Returns the enum value of a name. Throws Error that begins with `what` for unknown names.
 template <typename Enum>
 Enum choose(const std::string& what, const std::string& value,
             std::initializer_list<std::pair<const char*, Enum>> choices) {

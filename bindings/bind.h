@@ -20,22 +20,23 @@ void bind_settings(nanobind::module_& m);
 void bind_render(nanobind::module_& m);
 void bind_renderer(nanobind::module_& m);
 
-/// The parts of class SceneBuilder that add textures and materials; meshes, curves, points and
+/// Define parts of class SceneBuilder: textures and materials; meshes, curves, points and
 /// instances; volumes.
 void def_materials(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_meshes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 void def_volumes(nanobind::class_<wavecomb::SceneBuilder>& builder);
 
-/// A texture use as SceneBuilder.add_material takes it.
+/// Converts a texture use from the dict format of SceneBuilder.add_material.
 wavecomb::TextureUse texture_use(const nanobind::dict& d);
 
-/// A value graph as SceneBuilder.add_graph takes it.
+/// Adds a value graph from the arguments of SceneBuilder.add_graph.
 uint32_t add_graph(wavecomb::SceneBuilder& builder, const nanobind::bytes& ops,
                    const std::vector<float>& constants,
                    const std::vector<std::pair<uint32_t, float>>& images,
                    const std::vector<std::pair<uint32_t, uint32_t>>& outputs,
                    const std::vector<std::string>& attributes);
 
-/// Each description's mesh, or the line that says why there is none.
+/// Builds the mesh of each description. Returns a list of dicts, or of error messages (str) for
+/// descriptions that fail.
 nanobind::list make_surfaces(const wavecomb::SceneBuilder& builder,
                              const nanobind::list& descriptions, uint32_t threads);

@@ -20,7 +20,7 @@ using namespace wavecomb;
 
 namespace {
 
-/// By CameraValueKind.
+/// Names indexed by CameraValueKind.
 constexpr const char* kKinds[] = {"number", "choice", "four", "planes"};
 
 [[noreturn]] void fail(const std::string& name, const std::string& wanted) {
@@ -63,7 +63,7 @@ nb::object to_python(const CameraParameter& p, const CameraValue& value) {
   return nb::cast(std::get<std::vector<FourNumbers>>(value));
 }
 
-/// Places (k, 4, 4) over the shutter, or None.
+/// Converts an array (k, 4, 4) of transforms over the shutter; None gives no motion.
 std::vector<Affine> motion_of(nb::handle value) {
   std::vector<Affine> steps;
   if (value.is_none()) return steps;
@@ -80,7 +80,7 @@ std::vector<Affine> motion_of(nb::handle value) {
   return steps;
 }
 
-/// Values by name into a camera; `transform` and `to_world` say where it stands still.
+/// Sets camera values by name; `transform` and `to_world` set the transform and remove motion.
 void take(Camera& camera, const nb::dict& values) {
   for (const char* name : {"transform", "to_world"})
     if (values.contains(name)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cameras in Python: the values of camera_table() as keywords, as dicts, and as they are edited.
+/// Cameras in Python: values of camera_table() as keyword arguments and dicts.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -7,15 +7,15 @@
 
 #include "wavecomb/scene/scene.h"
 
-/// SceneBuilder.set_camera. Throws Error for keywords that are no parameters, for values of another
-/// type, and where one that is needed is missing.
+/// Implements SceneBuilder.set_camera. Throws Error for unknown keywords, values of a wrong type,
+/// and missing required values.
 void set_camera(
     wavecomb::SceneBuilder& builder,
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& transform,
     const nanobind::kwargs& values);
 
-/// Parameters by name, and to_world.
+/// Returns all camera parameters by name, and to_world.
 nanobind::dict camera_dict(const wavecomb::Scene& scene);
 
-/// The scene's camera with other values. Throws Error that names the value.
+/// Returns a copy of the scene's camera with changed values. Throws Error that names the value.
 wavecomb::Camera edited_camera(const wavecomb::Scene& scene, const nanobind::dict& values);

@@ -25,7 +25,7 @@ namespace {
 template <typename T>
 using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 
-/// The entry of a description, kept alive by the description; empty where it is not there.
+/// Returns an array of a description, which keeps it alive, or an empty span if the key is missing.
 template <typename T>
 std::span<const T> span_of(const nb::dict& d, const char* key) {
   if (!d.contains(key) || d[key].is_none()) return {};
@@ -41,7 +41,7 @@ Enum rule_of(const nb::dict& d, const char* key, std::initializer_list<const cha
     if (value == name) return static_cast<Enum>(i);
     ++i;
   }
-  throw Error(std::string(key) + " is '" + value + "', which is no such rule");
+  throw Error(std::string(key) + " is '" + value + "', which is not a known rule");
 }
 
 SurfacePrimvar primvar_of(const nb::dict& d, uint32_t width, Cage& cage) {
@@ -110,7 +110,8 @@ SurfaceDesc describe(const SceneBuilder& builder, const nb::dict& d) {
   return desc;
 }
 
-/// A vector as an array (-1, columns), or a list where `columns` is 0; moved, not copied.
+/// Converts a vector to an array of shape (-1, columns), or to one axis if `columns` is 0. Moves
+/// the data without copying.
 template <typename T>
 nb::object array_of(std::vector<T>&& values, size_t columns) {
   auto* held = new std::vector<T>(std::move(values));
@@ -210,18 +211,18 @@ nb::object quads(const Array<float>& points, const Array<int32_t>& indices,
       split_quads({points.data(), points.size()}, {indices.data(), indices.size()}, first), 3);
 }
 
-/// Values from which it pays to let other threads of Python's go on.
+/// Number of values from which it is worthwhile to release the GIL.
 constexpr size_t kMuch = 1 << 15;
 
-/// Rows of bounds, (2, 3).
+/// Returns bounds as an array of shape (2, 3).
 nb::object box_of(const PointBounds& bounds) {
   std::vector<float> box;
   for (const auto& row : bounds) box.insert(box.end(), row.begin(), row.end());
   return array_of(std::move(box), 3);
 }
 
-/// Corners of each face, baked points, bounds, and of quads what `split_quads` says of them; None:
-/// not plain.
+/// Returns the corners per face, baked points, bounds, and for quads the result of `split_quads`;
+/// or None if the mesh is not plain.
 nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
                       const Array<int32_t>& indices, const std::optional<Array<double>>& matrix,
                       double limit) {
@@ -258,7 +259,8 @@ nb::object plain_mesh(const Array<float>& points, const Array<int32_t>& counts,
   return nb::make_tuple(size, positions, box_of(*bounds), quads, faces);
 }
 
-/// Points, normals and bounds of a shape under a transform; None: a point is nowhere.
+/// Returns transformed points, normals and bounds of a shape, or None if a point is not finite or
+/// too far away.
 nb::object place_shape(const Array<float>& points, const Array<float>& normals,
                        const Array<double>& matrix, const Array<double>& inverse, double limit) {
   if (points.ndim() != 2 || points.shape(1) != 3 || normals.size() != points.size())
@@ -276,7 +278,7 @@ nb::object place_shape(const Array<float>& points, const Array<float>& normals,
                         box_of(*bounds));
 }
 
-/// Whether triangles have each point; None where they have all.
+/// Returns which points are used by triangles, or None if all are.
 nb::object used_points(const Array<uint32_t>& triangles, size_t point_count) {
   std::vector<uint8_t> used(point_count, 0);
   size_t found = 0;

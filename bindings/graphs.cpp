@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Value graphs: the words that their compiler writes, and their programs.
+/// Bindings of value graphs: names of operations, inputs and parameters, and running a program.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -39,7 +39,7 @@ Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, cons
                  const Pairs& outputs, const Names& attributes) {
   Graph graph;
   graph.attributes = attributes;
-  if (ops.size() % sizeof(GraphOp) != 0) throw Error("a graph has a part of an operation");
+  if (ops.size() % sizeof(GraphOp) != 0) throw Error("a graph has an incomplete operation");
   graph.ops.resize(ops.size() / sizeof(GraphOp));
   if (ops.size() > 0) std::memcpy(graph.ops.data(), ops.c_str(), ops.size());
   graph.constants = constants;
@@ -51,7 +51,7 @@ Graph make_graph(const nb::bytes& ops, const std::vector<float>& constants, cons
 
 using Points = nb::ndarray<const float, nb::shape<-1, 30>, nb::c_contig, nb::device::cpu>;
 
-/// Runs a program at points, `F` wide; the last ones are repeated to fill lanes.
+/// Runs a program at points in packets of type `F`. The last point is repeated to fill lanes.
 template <typename F>
 void run(const GraphSet& set, const TextureView* textures, const Points& points, float* out) {
   const GraphView view = set.view();
@@ -95,7 +95,7 @@ nb::ndarray<nb::numpy, float, nb::ndim<2>> run_points(const nb::bytes& ops,
                                                       const Names& attributes, const Points& points,
                                                       uint32_t lanes) {
   Graph graph = make_graph(ops, constants, images, outputs, attributes);
-  // A texture of one white texel stands for all.
+  // All images are replaced by a texture of one white texel.
   for (GraphImage& image : graph.images) image.texture = 0;
   check_graph(graph, "a graph to run", 1, ~uint32_t{0});
   GraphSet set;
@@ -116,7 +116,7 @@ nb::ndarray<nb::numpy, float, nb::ndim<2>> run_points(const nb::bytes& ops,
   else if (lanes == 16)
     run<FloatP<16>>(set, &texture.view(), points, out);
   else
-    throw Error("a graph runs 1 or 16 lanes wide");
+    throw Error("lanes of a graph must be 1 or 16");
   return {out, {points.shape(0), columns}, owner};
 }
 

@@ -21,7 +21,7 @@ using namespace wavecomb;
 
 namespace {
 
-// By LightValueKind and LightGroup.
+// Names indexed by LightValueKind and LightGroup.
 constexpr const char* kValueKinds[] = {"number", "colour", "flag", "choice", "id", "transforms"};
 constexpr const char* kGroups[] = {"emission", "shape", "shaping", "response"};
 
@@ -59,7 +59,7 @@ LightValue id_of(const Light& light, const LightParameter& p, nb::handle value,
   return id;
 }
 
-/// `builder`: knows light groups by name; null where there is none.
+/// Converts a value from Python. `builder`: maps names of light groups to ids; may be null.
 LightValue from_python(const Light& light, const LightParameter& p, nb::handle value,
                        SceneBuilder* builder) {
   float number = 0;
@@ -102,7 +102,7 @@ nb::object to_python(const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// Names of the rows that `is_known` takes, for an error.
+/// Returns the names of the rows for which `is_known` holds, for error messages.
 template <typename Known>
 std::string names(const Known& is_known) {
   std::string list;
@@ -111,11 +111,11 @@ std::string names(const Known& is_known) {
   return list;
 }
 
-/// Keywords into a light that has its kind.
+/// Sets the parameters of a light, whose kind must be set, from keyword arguments.
 void take(Light& light, SceneBuilder& builder, const nb::kwargs& values) {
   const bool of_mesh = light.kind == kMeshLight;
-  // Placed lights may be told what other kinds have, too, for callers who give all of them alike;
-  // but not what a kind has to itself.
+  // Lights with a transform accept the shared parameters of all kinds, for callers that pass the
+  // same set to each, but not the parameters specific to another kind.
   const auto is_known = [&](const LightParameter& p) {
     return p.kind != LightValueKind::kChoice && ((!of_mesh && !p.is_own) || p.is_of(light.kind));
   };

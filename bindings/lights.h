@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights in Python: the values of light_table() as keywords, as dicts, and as they are edited.
+/// Lights in Python: values of light_table() as keyword arguments and dicts.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -11,17 +11,18 @@
 
 #include "wavecomb/scene/scene.h"
 
-/// A 4 x 4 array, or nested lists.
+/// Array of shape (4, 4), or nested lists.
 using Transform = nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>;
 
-/// SceneBuilder.add_light and add_mesh_light. Throw Error for keywords that are no parameters, and
-/// for values of another type.
+/// Implement SceneBuilder.add_light and add_mesh_light. Throw Error for unknown keywords and for
+/// values of a wrong type.
 uint32_t add_light(wavecomb::SceneBuilder& builder, const std::string& kind,
                    const Transform& transform, const nanobind::kwargs& values);
 uint32_t add_mesh_light(wavecomb::SceneBuilder& builder, const Transform& transform,
                         const std::string& material_sync, const nanobind::kwargs& values);
 
-/// SceneBuilder.add_light_filter: `sides` (4, 3), `decay` near_start, near_end, far_start, far_end.
+/// Implements SceneBuilder.add_light_filter. `sides`: (4, 3) numbers; `decay`: near_start,
+/// near_end, far_start, far_end.
 uint32_t add_light_filter(wavecomb::SceneBuilder& builder, const Transform& transform,
                           float distance, const std::array<std::array<float, 3>, 4>& sides,
                           const std::array<float, 3>& picture_u,
@@ -29,10 +30,10 @@ uint32_t add_light_filter(wavecomb::SceneBuilder& builder, const Transform& tran
                           const std::array<float, 4>& decay, float density,
                           std::optional<uint32_t> next);
 
-/// Parameters by name, what refers to sets and places apart. Throws Error for an index that is not
-/// there.
+/// Returns the parameters of a light by name, without references to sets and transforms. Throws
+/// Error if the index is out of range.
 nanobind::dict light_dict(const wavecomb::Scene& scene, uint32_t light);
 
-/// Light `light` with other values. Throws Error that names the light and the value.
+/// Returns a copy of a light with changed values. Throws Error that names the light and the value.
 wavecomb::Light edited_light(const wavecomb::Scene& scene, uint32_t light,
                              const nanobind::dict& values);

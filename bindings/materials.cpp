@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures and materials of SceneBuilder.
+/// Bindings of SceneBuilder for textures and materials.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -53,7 +53,7 @@ TextureUse texture_use(const nb::dict& d) {
 
 namespace {
 
-/// The value whose name is the one of that number in `names`; `what` is for an error.
+/// Returns the enum value with the index of `name` in `names`; `what` begins the error message.
 template <typename Enum, size_t N>
 Enum named(const char* what, const char* const (&names)[N], const std::string& name) {
   for (uint32_t i = 0; i < N; ++i)
@@ -89,7 +89,7 @@ uint32_t add_texture(SceneBuilder& builder,
   desc.srgb = srgb;
   desc.wrap_s = wrap(wrap_s);
   desc.wrap_t = wrap(wrap_t);
-  const nb::gil_scoped_release release;  // others may read images meanwhile
+  const nb::gil_scoped_release release;  // other threads may read images meanwhile
   return builder.add_texture(desc);
 }
 

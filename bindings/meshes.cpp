@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Meshes, curves, points, splats and instances of SceneBuilder.
+/// Bindings of SceneBuilder for meshes, curves, points, Gaussian splats and instances.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -23,10 +23,10 @@ using namespace wavecomb;
 
 namespace {
 
-/// In place of a group: none.
+/// Group index that means "no group".
 constexpr uint32_t kNoGroup = 0xffffffffu;
 
-/// Keeps arrays alive from C++; they are let go of with the GIL held.
+/// Returns an owner that keeps arrays alive from C++. It acquires the GIL to release them.
 std::shared_ptr<const void> hold(nb::list arrays) {
   return {new nb::list(std::move(arrays)), [](const void* p) {
             const nb::gil_scoped_acquire gil;
@@ -34,7 +34,8 @@ std::shared_ptr<const void> hold(nb::list arrays) {
           }};
 }
 
-/// Per vertex when (n, k), per corner when (m, 3, k); with steps before that where it `deforms`.
+/// Returns kVertex for values of shape (n, k) and kCorner for (m, 3, k), with a leading axis of
+/// motion steps if the mesh `deforms`.
 Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, const std::string& name,
                        bool deforms = false) {
   if (!values) return Attribute::kNone;
@@ -45,7 +46,8 @@ Attribute attribute_of(const std::optional<Array<float>>& values, size_t k, cons
   throw Error("mesh '" + name + "' has attributes that are neither per vertex nor per corner");
 }
 
-/// Attributes by name, each a rate and an array (values, components). `owners` collects the arrays.
+/// Converts attributes by name; each is a pair of rate and array (values, components). Adds the
+/// arrays to `owners`.
 std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& attributes,
                                          nb::list& owners) {
   std::vector<MeshAttribute> out;
@@ -68,7 +70,7 @@ std::vector<MeshAttribute> attributes_of(SceneBuilder& builder, const nb::dict& 
   return out;
 }
 
-/// Arrays as a mesh; they are kept alive, not copied.
+/// Creates a mesh that references the arrays without copying and keeps them alive.
 Mesh make_mesh(SceneBuilder& builder, const Array<float>& positions,
                const nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>& indices,
                const std::optional<Array<float>>& normals, const std::optional<Array<float>>& uvs,
@@ -125,7 +127,8 @@ uint32_t add_mesh(SceneBuilder& builder, const Array<float>& positions,
   return builder.add_mesh(std::move(mesh));
 }
 
-/// Plain meshes whose arrays lie one after the other; the first one's id.
+/// Adds triangle meshes without normals or uvs, whose arrays are concatenated; returns the first
+/// id.
 uint32_t add_meshes(SceneBuilder& builder, const Array<float>& positions,
                     const Array<uint32_t>& indices, const Array<uint32_t>& points,
                     const Array<uint32_t>& triangles, const Array<uint32_t>& materials,
@@ -137,12 +140,12 @@ uint32_t add_meshes(SceneBuilder& builder, const Array<float>& positions,
     throw Error("meshes need positions of shape (n, 3) and indices of shape (m, 3)");
   for (const Array<uint32_t>* each : {&points, &triangles, &materials, &asset_lengths, &groups})
     if (each->ndim() != 1 || each->size() != count)
-      throw Error("meshes need one of each number for each name");
+      throw Error("meshes need one value of each array per name");
   const auto total = [&](const Array<uint32_t>& sizes) {
     return std::accumulate(sizes.data(), sizes.data() + count, uint64_t{0});
   };
   if (total(points) != positions.shape(0) || total(triangles) != indices.shape(0))
-    throw Error("the sizes of meshes do not add up to their arrays");
+    throw Error("the sizes of the meshes do not match their arrays");
   nb::list owners;
   owners.append(nb::cast(positions));
   owners.append(nb::cast(indices));
@@ -177,8 +180,8 @@ void replace_mesh(SceneBuilder& builder, uint32_t id, const Array<float>& positi
                                      material, attributes, ""));
 }
 
-/// What curves and points have in common, ready but for primitive, segments and normals. `owners`
-/// collects their arrays.
+/// Creates the common part of curves and points; the caller sets primitive, segments and normals.
+/// Adds the arrays to `owners`.
 Mesh curved_mesh(SceneBuilder& builder, const Array<float>& positions, const Array<float>& radii,
                  const std::optional<Array<float>>& uvs,
                  const std::optional<Array<uint32_t>>& face_materials, uint32_t material,
@@ -248,7 +251,7 @@ uint32_t add_points(SceneBuilder& builder, const Array<float>& positions, const 
   return builder.add_mesh(std::move(mesh));
 }
 
-/// Rows of splats and the radii around them.
+/// Rows and bounding radii of Gaussian splats.
 struct SplatArrays {
   std::vector<SplatRow> rows;
   std::vector<float> radii;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The Python module wavecomb._core: thin, no logic. Documented in python/wavecomb/_core.pyi.
+/// Python module wavecomb._core: thin bindings without logic. Documented in
+/// python/wavecomb/_core.pyi.
 #include <nanobind/nanobind.h>
 
 #include "bind.h"
@@ -9,8 +10,8 @@ namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The native core of Wavecomb.";
-  // What lives when the interpreter ends, a window's last picture or an exception's, is no news to
-  // those who render; the list would also name other modules' objects.
+  // Objects that are alive at interpreter exit, such as a window's last image or one held by an
+  // exception, are harmless; the warnings would also list objects of other modules.
   nb::set_leak_warnings(false);
   nb::exception<wavecomb::Error>(m, "Error", PyExc_ValueError);
   bind_volumes(m);

@@ -40,8 +40,8 @@ using namespace wavecomb;
 
 namespace {
 
-/// Python's side of a policy. order() gets NumPy arrays of its own, so whatever it keeps or does to
-/// them harms nothing, and fills `keys`. Exceptions end the render and come out of it.
+/// Scheduling policy implemented in Python. order() gets copies of the arrays, so that it may keep
+/// or modify them, and fills `keys`. Exceptions end the render and propagate to its caller.
 class PythonPolicy final : public SchedulingPolicy {
  public:
   PythonPolicy(nb::object object, const Scene& scene) : object_(std::move(object)) {
@@ -95,7 +95,7 @@ class PythonPolicy final : public SchedulingPolicy {
     throw Error("policy column '" + name +
                 "' is not known; there are throughput, position_key, texture_key");
   }
-  /// A NumPy array of `values`, which it deletes when it goes.
+  /// Returns a NumPy array that owns `values`, which must come from new[].
   template <typename T>
   static nb::object owned(T* values, size_t n) {
     const nb::capsule owner(const_cast<std::remove_const_t<T>*>(values), [](void* p) noexcept {
@@ -103,14 +103,14 @@ class PythonPolicy final : public SchedulingPolicy {
     });
     return nb::cast(nb::ndarray<nb::numpy, T>(values, {n}, owner));
   }
-  /// A NumPy array that cannot be written.
+  /// Returns a read-only NumPy array with a copy of `values`.
   template <typename T>
   static nb::object copy(std::span<const T> values) {
     auto* own = new T[values.size()];
     std::copy(values.begin(), values.end(), own);
     return owned<const T>(own, values.size());
   }
-  /// What order() returned as a bool.
+  /// Converts the result of order() to bool. Throws Error for other types.
   bool truth(const nb::object& result) const {
     const auto type = nb::cast<std::string>(result.type().attr("__name__"));
     if (type != "bool" && type != "bool_")
@@ -154,7 +154,7 @@ auto image(nb::handle owner, const std::vector<T>& values, const Picture& p, siz
   return nb::ndarray<nb::numpy, const T>(values.data(), channels == 1 ? 2 : 3, shape, owner);
 }
 
-/// A layer of the picture, None where it was not asked for.
+/// Returns a layer of the image, or None if it was not requested.
 template <typename T>
 nb::object layer(nb::handle owner, std::vector<T> Picture::* values, size_t channels) {
   const Picture& p = nb::cast<const Result&>(owner).picture;
@@ -170,7 +170,7 @@ nb::dict aovs_dict(nb::handle owner) {
   return d;
 }
 
-/// Samples of each pixel (h, w), and their channels (n, 6); None where there is no deep picture.
+/// Returns sample counts (h, w) and samples (n, 6), or None without a deep image.
 nb::object deep_pair(nb::handle owner) {
   const Picture& p = nb::cast<const Result&>(owner).picture;
   if (p.deep.empty()) return nb::none();
@@ -179,7 +179,7 @@ nb::object deep_pair(nb::handle owner) {
                         nb::ndarray<nb::numpy, const float>(p.deep.values.data(), 2, shape, owner));
 }
 
-/// The rows of WAVECOMB_AOVS.
+/// Returns the rows of WAVECOMB_AOVS.
 nb::list aov_table() {
   static constexpr const char* kKinds[] = {"mean",     "mean_of_hits", "nearest",
                                            "coverage", "groups",       "expressions",
@@ -187,7 +187,7 @@ nb::list aov_table() {
   static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kMedian) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
-    // These have names of their own, or files.
+    // Expressions are requested by text, and deep images are separate files.
     if (aov.kind == AovKind::kExpressions || aov.kind == AovKind::kDeep) continue;
     nb::dict row;
     row["name"] = aov.name;
@@ -243,7 +243,7 @@ Result run_render(const std::function<WavefrontRenderer&(const Settings&)>& rend
     result.settings["policy"] = std::string(own_policy->name());
   }
   if (!(a.interval > 0) || !std::isfinite(a.interval))
-    throw Error("interval is the seconds between looks; it must be above 0");
+    throw Error("interval, in seconds between snapshots, must be finite and above 0");
   RenderOptions options = watched_by(a.progress, a.watcher, result.settings);
   options.recorder = a.recorder;
   options.policy = own_policy.get();

@@ -40,7 +40,7 @@ void edit(WavefrontRenderer& renderer, const nb::object& camera, const nb::dict&
   renderer.edit(change);
 }
 
-/// What `work` gives, while Python runs on.
+/// Calls `work` without the GIL and returns its result.
 template <typename Work>
 auto released(const Work& work) {
   const nb::gil_scoped_release release;

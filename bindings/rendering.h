@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Renders that Python asked for.
+/// Renders that are started from Python.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -15,16 +15,16 @@
 #include "wavecomb/render/snapshot.h"
 #include "wavecomb/scene/scene.h"
 
-/// A picture with the figures of its render.
+/// Image and statistics of a render.
 struct Result {
   wavecomb::Picture picture;
   wavecomb::RenderStatistics statistics;
   wavecomb::CostProfile profile;
   nanobind::dict settings;
-  std::vector<std::byte> learned;  ///< wavecomb::packed_training(); empty: nothing
+  std::vector<std::byte> learned;  ///< wavecomb::packed_training(); empty without training
 };
 
-/// What render() is called with; None where nothing is given.
+/// Arguments of render(); None for those that were not given.
 struct RenderArguments {
   nanobind::handle settings;
   nanobind::object progress, policy, costs;
@@ -35,8 +35,8 @@ struct RenderArguments {
   nanobind::object learned = nanobind::none();
 };
 
-/// Renders `scene` by what `renderer` gives, which is called without the GIL once the arguments are
-/// known to be good.
+/// Renders `scene` with the renderer that `renderer` returns. `renderer` is called without the GIL
+/// after the arguments have been checked.
 Result run_render(
     const std::function<wavecomb::WavefrontRenderer&(const wavecomb::Settings&)>& renderer,
     const wavecomb::Scene& scene, const RenderArguments& arguments);

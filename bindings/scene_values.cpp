@@ -25,11 +25,11 @@ using namespace wavecomb;
 
 namespace {
 
-// Inputs of OpenPBR by the names that Python gives them.
+// Members of OpenPbr by their Python names.
 template <typename Class, typename Value>
 using Members = std::vector<std::pair<const char*, Value Class::*>>;
 
-// Of an input, where it is of the kind that a list is for.
+// Expand to an input only if it has the type of the list.
 #define WAVECOMB_NUMBER_Number(name) {#name, &OpenPbr::name},
 #define WAVECOMB_NUMBER_Colour(name)
 #define WAVECOMB_NUMBER_Derived(name)
@@ -62,7 +62,7 @@ void put(nb::dict& d, const Class& object, const Members<Class, Value>& members)
   for (const auto& [name, member] : members) d[name] = to_python(object.*member);
 }
 
-/// Values out of a dict; errors begin with what it is of.
+/// Reads values from a dict; error messages begin with `what`.
 class Reader {
  public:
   Reader(std::string what, nb::dict values) : what_(std::move(what)), values_(std::move(values)) {}
@@ -75,7 +75,7 @@ class Reader {
   void take(const char* name, Value& to) {
     if (const nb::object value = next(name); value.is_valid()) read(name, value, to);
   }
-  /// Throws where there was more than has been taken; `which` says what the others are.
+  /// Throws Error if the dict has unknown keys; `which` qualifies the known ones in the message.
   void end(const char* which = "") const {
     if (nb::len(values_) == taken_) return;
     for (const auto& [key, value] : values_) {
@@ -113,7 +113,7 @@ class Reader {
   size_t taken_ = 0;
 };
 
-/// Runs visit<Value>() for colours, numbers and switches, in the order that people are shown them.
+/// Calls visit<Value>() for colours, numbers and flags, in display order.
 template <typename Visit>
 void for_each_kind(const Visit& visit) {
   visit.template operator()<Vec3<float>>();
@@ -134,7 +134,7 @@ void take_openpbr(Reader& reader, OpenPbr& to) {
   reader.take(to, kOpenPbrSwitches);
 }
 
-/// Names of the parameters that a graph drives.
+/// Returns the names of the parameters that a graph drives.
 nb::list driven_names(const Scene& scene, uint32_t graph) {
   nb::list names;
   const GraphSet& graphs = *scene.material_part()->graphs;
@@ -161,14 +161,13 @@ nb::dict texture_use_dict(const Scene& scene, const TextureUse& use) {
   return d;
 }
 
-/// Key and value of each entry: an id and a dict.
+/// Calls change(id, values) for each entry of `changes`.
 template <typename Change>
 void for_each_change(const char* kind, const nb::dict& changes, const Change& change) {
   for (const auto& [key, value] : changes) {
     uint32_t id = 0;
     if (!nb::try_cast(key, id) || !nb::isinstance<nb::dict>(value))
-      throw Error(std::string("what is edited must be {number of the ") + kind +
-                  ": {parameter: value}}");
+      throw Error(std::string("edits must be a dict {") + kind + " index: {parameter: value}}");
     change(id, nb::cast<nb::dict>(value));
   }
 }

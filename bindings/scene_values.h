@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Values of a scene as Python writes them: to be read, and to be changed.
+/// Conversion of scene values between Python and C++, for reading and editing.
 #pragma once
 
 #include <nanobind/ndarray.h>
@@ -12,7 +12,7 @@
 
 #include "wavecomb/scene/scene.h"
 
-/// USD's row-vector matrix at `m` as a column-vector map.
+/// Converts the row-major row-vector matrix (USD convention) at `m` to a column-vector transform.
 template <typename T>
 wavecomb::Affine affine(const T* m) {
   const auto at = [m](int row, int column) { return static_cast<float>(m[4 * row + column]); };
@@ -21,38 +21,39 @@ wavecomb::Affine affine(const T* m) {
   a.t = {at(3, 0), at(3, 1), at(3, 2)};
   return a;
 }
-/// Likewise of a 4 x 4 array; throws Error for any other.
+/// Converts a 4 x 4 array of float32 or float64 in USD convention. Throws Error for other arrays.
 wavecomb::Affine affine(
     const nanobind::ndarray<nanobind::c_contig, nanobind::device::cpu, nanobind::ro>& m);
 
-/// The parameters of program "openpbr" by name; throws Error for others.
+/// Reads the parameters of program "openpbr" by name. Throws Error for unknown names.
 wavecomb::OpenPbr openpbr_of(const std::string& material, const nanobind::dict& values);
 
 /// Throws Error unless i < count.
 void check_index(const char* kind, uint32_t i, size_t count);
 
-/// Which of the choices a name is; none where it is none of them, or no name.
+/// Returns the index of a name among `choices`, or nullopt if it is not a string or unknown.
 std::optional<uint32_t> index_in(const std::vector<const char*>& choices, nanobind::handle value);
-/// "a, b, c".
+/// Returns the names as "a, b, c".
 std::string listed(std::span<const char* const> choices);
 
-/// A map as USD's row-vector matrix, and back: 4 x 4 numbers. Throws Error that begins with `what`
-/// for anything else.
+/// Convert a transform to a row-vector matrix of 4 x 4 numbers (USD convention), and back.
+/// matrix_of throws Error that begins with `what` for other values.
 nanobind::list matrix(const wavecomb::Affine& m);
 wavecomb::Affine matrix_of(const std::string& what, nanobind::handle value);
 
-/// Parameters of material_table() by name into a material that has its name. Throws Error for
-/// others, and for values of another kind.
+/// Sets parameters of material_table() by name in a material, whose name must be set. Throws Error
+/// for unknown names and values of a wrong type.
 void take_parameters(wavecomb::Material& material, const nanobind::kwargs& values);
-/// material_table() as Python reads it.
+/// Returns material_table() as a list of dicts.
 nanobind::list material_rows();
-/// What programs read, as Python reads it.
+/// Returns which inputs each program reads, as a list of dicts.
 nanobind::list program_rows();
 
-/// As add_material takes it. Throws Error for ids that are not there.
+/// Returns a material as a dict in the format of add_material. Throws Error if the index is out of
+/// range.
 nanobind::dict material_dict(const wavecomb::Scene& scene, uint32_t material);
 
-/// What Renderer.edit() is told. Values that are not given stay as they are. Throws Error that
-/// names the object and the value.
+/// Converts the arguments of Renderer.edit(). Values that are not given stay unchanged. Throws
+/// Error that names the object and the value.
 wavecomb::SceneEdit scene_edit(const wavecomb::Scene& scene, const nanobind::object& camera,
                                const nanobind::dict& materials, const nanobind::dict& lights);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Settings in Python: an attribute for each row of setting_table(), and aovs and region.
+/// Settings in Python: an attribute per row of setting_table(), plus aovs and region.
 #include "settings.h"
 
 #include <nanobind/stl/optional.h>
@@ -22,12 +22,12 @@ using namespace wavecomb;
 
 namespace {
 
-/// Before the name of a light group, in names of AOVs and of layers.
+/// Prefix of light group names in AOV and layer names.
 constexpr const char* kLightPrefix = "light_";
-/// Before a light path expression, "lpe:NAME=EXPRESSION".
+/// Prefix of light path expressions: "lpe:NAME=EXPRESSION".
 constexpr const char* kExpressionPrefix = "lpe:";
 
-/// Settings::aovs, light_groups and expressions as names.
+/// Returns Settings::aovs, light_groups and expressions as names.
 std::vector<std::string> aov_names(const Settings& s) {
   std::vector<std::string> names = s.aovs.names();
   if (!s.light_groups.empty()) std::erase(names, "light_groups");
@@ -37,7 +37,7 @@ std::vector<std::string> aov_names(const Settings& s) {
   return names;
 }
 
-/// "lpe:NAME=EXPRESSION" as a name and a text.
+/// Parses "lpe:NAME=EXPRESSION".
 NamedExpression to_expression(const std::string& aov) {
   const std::string rest = aov.substr(std::string(kExpressionPrefix).size());
   const size_t equals = rest.find('=');
@@ -46,7 +46,7 @@ NamedExpression to_expression(const std::string& aov) {
   return {rest.substr(0, equals), rest.substr(equals + 1)};
 }
 
-/// "light_groups" stands for all of them, "light_NAME" for one.
+/// Sets the AOVs by name. "light_groups" selects all light groups, "light_NAME" one.
 void set_aovs(Settings& s, const std::vector<std::string>& names) {
   AovSet set{0};
   std::vector<std::string> groups;
@@ -70,7 +70,7 @@ void set_aovs(Settings& s, const std::vector<std::string>& names) {
   s.expressions = std::move(expressions);
 }
 
-/// None, or (x0, y0, x1, y1).
+/// Returns None or (x0, y0, x1, y1).
 nb::object region_of(const Settings& s) {
   if (!s.region) return nb::none();
   return nb::make_tuple(s.region->x0, s.region->y0, s.region->x1, s.region->y1);
@@ -101,7 +101,7 @@ nb::object to_python(const SettingValue& value) {
       value);
 }
 
-/// Numbers of NumPy, too.
+/// Converts a value from Python, including NumPy scalars.
 SettingValue from_python(const SettingInfo& setting, nb::handle value) {
   if (value.is_none()) return {};
   if (nb::isinstance<nb::bool_>(value)) return nb::cast<bool>(value);
@@ -112,10 +112,10 @@ SettingValue from_python(const SettingInfo& setting, nb::handle value) {
               nb::cast<std::string>(value.type().attr("__name__")));
 }
 
-/// Of SettingGroup.
+/// Names indexed by SettingGroup.
 constexpr const char* kGroups[] = {"picture", "work", "order"};
 
-/// A row as wavecomb.options reads it.
+/// Returns a row as the dict that wavecomb.options reads.
 nb::dict row_dict(const SettingInfo& setting) {
   const SettingValue value = setting.get(Settings{});
   const char* kind = !setting.choices.empty()                     ? "choice"

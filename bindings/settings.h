@@ -5,5 +5,5 @@
 
 #include "wavecomb/core/settings.h"
 
-/// All settings by name, as Settings.to_dict() gives them.
+/// Returns all settings by name, for Settings.to_dict().
 nanobind::dict settings_dict(const wavecomb::Settings& settings);

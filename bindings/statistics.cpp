@@ -12,7 +12,7 @@ using namespace wavecomb;
 
 namespace {
 
-/// Lists by depth: rays, shadow rays, records, and how many paths ended there.
+/// Returns lists by depth: rays, shadow rays, records, and number of paths that ended there.
 nb::dict depths_dict(const RenderStatistics& s) {
   nb::dict d;
   std::vector<uint64_t> ended;
@@ -41,7 +41,7 @@ nb::list materials_list(const RenderStatistics& s) {
   return out;
 }
 
-/// Sums over the materials of each program that shaded anything.
+/// Returns sums over the materials of each program that shaded any record.
 nb::dict programs_dict(const RenderStatistics& s) {
   struct Sum {
     uint64_t records = 0, timed = 0;

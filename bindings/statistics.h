@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render took, as a dict.
+/// Statistics of a render as dicts.
 #pragma once
 
 #include <nanobind/nanobind.h>
 
 #include "wavecomb/render/render_statistics.h"
 
-/// What `texture_store` of docs/statistics.md holds.
+/// Returns the `texture_store` entry of docs/statistics.md.
 nanobind::dict texture_store_dict(const wavecomb::StoreStatistics& statistics);
 
-/// The keys of docs/statistics.md that the core knows of. `picture_bytes`: 0 where there is no
-/// picture yet.
+/// Returns the keys of docs/statistics.md that the core provides. `picture_bytes`: memory of the
+/// image, or 0 if there is none yet.
 nanobind::dict statistics_dict(const wavecomb::RenderStatistics& statistics,
                                const nanobind::dict& settings, size_t picture_bytes);

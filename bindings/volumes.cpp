@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Grids of voxels, and volumes of SceneBuilder.
+/// Bindings of voxel grids, and of SceneBuilder for volumes.
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -21,7 +21,7 @@ namespace {
 
 using AnyArray = nb::ndarray<nb::c_contig, nb::device::cpu, nb::ro>;
 
-/// A grid, and where its voxels are in the volume's own space.
+/// Grid with its transform to the object space of the volume.
 struct PlacedVoxels {
   VolumeField field;
 };

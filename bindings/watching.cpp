@@ -39,13 +39,13 @@ nb::dict status_dict(const RenderStatus& s) {
   return d;
 }
 
-/// A view of memory that stays for as long as the callback runs.
+/// Returns an array view of memory that is valid while the callback runs.
 nb::object view(const void* data, size_t size) {
   return nb::cast(nb::ndarray<nb::numpy, const uint8_t>(data, {size}, nb::handle()),
                   nb::rv_policy::reference);
 }
 
-/// Bytes that the array owns.
+/// Returns an array that owns `bytes`.
 nb::object owned(std::vector<std::byte> bytes) {
   auto* own = new std::vector<std::byte>(std::move(bytes));
   const nb::capsule owner(own,
@@ -69,7 +69,7 @@ nb::dict state_dict(const Snapshot& s) {
   return d;
 }
 
-/// What Python gets of a snapshot: empty once the callback that got it is over.
+/// Snapshot in Python; its accessors throw once the callback that received it has returned.
 class LiveSnapshot {
  public:
   LiveSnapshot(const Snapshot& snapshot, const nb::dict& settings)
@@ -88,7 +88,7 @@ class LiveSnapshot {
   nb::dict settings_;
 };
 
-/// An array of the film's size that owns its values; those of one channel have two axes.
+/// Returns an array of the film's size that owns its values; single-channel arrays have two axes.
 template <typename T>
 nb::object image(const Film& film, std::vector<T> values, size_t channels) {
   auto* own = new std::vector<T>(std::move(values));
@@ -123,14 +123,14 @@ Request request_of(const nb::object& answer) {
               "'; it must be None, \"snapshot\" or \"stop\"");
 }
 
-/// The bytes of one entry of a state; throws unless there are `size`.
+/// Returns the bytes of one entry of a checkpoint state. Throws Error unless there are `size`.
 Bytes bytes_of(const nb::dict& state, const std::string& key, size_t size) {
   if (!state.contains(key.c_str()))
-    throw Error("the state to resume from has no '" + key + "'; it is of another build");
+    throw Error("the checkpoint has no '" + key + "'; it is from another build");
   const auto bytes = nb::cast<Bytes>(state[key.c_str()]);
   if (bytes.size() != size)
-    throw Error("the state to resume from has " + std::to_string(bytes.size()) + " bytes of '" +
-                key + "', not " + std::to_string(size) + "; it is of another picture");
+    throw Error("the checkpoint has " + std::to_string(bytes.size()) + " bytes of '" + key +
+                "', not " + std::to_string(size) + "; it is of a different image");
   return bytes;
 }
 
@@ -173,14 +173,14 @@ std::function<std::vector<std::byte>(Film&, PassState&)> resumed_from(const nb::
     }
     if (DeepFilm& deep = film.aovs().deep(); !deep.empty()) {
       if (!state.contains("film.deep"))
-        throw Error("the state to resume from has no 'film.deep'; it is of another build");
+        throw Error("the checkpoint has no 'film.deep'; it is from another build");
       deep.unpack(span_of(nb::cast<Bytes>(state["film.deep"])));
     }
     pass.target = nb::cast<uint32_t>(state["pass.target"]);
     const auto active = nb::cast<Bytes>(state["pass.active"]);
     if (active.size() != 0) bytes_of(state, "pass.active", film.pixel_count());
     pass.active.assign(active.data(), active.data() + active.size());
-    // None of these is of a version that had no such light, allotted, or learned, nothing.
+    // Checkpoints of older versions lack these entries if the feature did not exist.
     if (state.contains("pass.light_target")) {
       const Bytes light = bytes_of(state, "pass.light_target", sizeof(uint32_t));
       std::memcpy(&pass.light_target, light.data(), sizeof(uint32_t));

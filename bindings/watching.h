@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Python's side of watching a render: status, snapshots, and state to resume from.
+/// Callbacks to Python during a render: status, snapshots, and state for resuming.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -9,11 +9,11 @@
 #include "wavecomb/render/snapshot.h"
 #include "wavecomb/scene/scene.h"
 
-/// Options whose callbacks ask Python's `progress(done, total)` and `watcher`; either may be None.
-/// `settings`: for statistics of snapshots. The callbacks take the GIL; all three must outlive the
-/// render.
+/// Returns options with callbacks to Python's `progress(done, total)` and `watcher`, either of
+/// which may be None. `settings`: for the statistics of snapshots. The callbacks acquire the GIL;
+/// all three arguments must outlive the render.
 wavecomb::RenderOptions watched_by(const nanobind::object& progress,
                                    const nanobind::object& watcher, const nanobind::dict& settings);
-/// What RenderOptions::resume is to be for `state`, a Snapshot.state() of before.
+/// Returns RenderOptions::resume for `state`, the result of an earlier Snapshot.state().
 std::function<std::vector<std::byte>(wavecomb::Film&, wavecomb::PassState&)> resumed_from(
     const nanobind::dict& state);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The Python module wavecomb._cpu: what this CPU runs. Compiled for the compiler's baseline, so
-/// that it can be asked on any CPU before a library for a particular one is loaded.
+/// Python module wavecomb._cpu: instruction sets of this CPU. Compiled for the compiler's baseline,
+/// so that it can run on any CPU before a library for a specific one is loaded.
 #include <Python.h>
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace {
 
-/// The names of WAVECOMB_ISAS that this CPU and system run, best first; null ends them.
+/// Returns the WAVECOMB_ISAS that this CPU and system support, best first; unused entries are null.
 std::array<const char*, 4> runnable() {
   std::array<const char*, 4> names{};
   size_t count = 0;
@@ -40,12 +40,12 @@ PyObject* isas(PyObject*, PyObject*) {
 }
 
 PyMethodDef methods[] = {
-    {"isas", isas, METH_NOARGS, "Instruction sets that this CPU runs, best first."},
+    {"isas", isas, METH_NOARGS, "Returns the instruction sets that this CPU supports, best first."},
     {nullptr, nullptr, 0, nullptr}};
 
 PyModuleDef module = {PyModuleDef_HEAD_INIT,
                       "_cpu",
-                      "What this CPU runs.",
+                      "Instruction sets of this CPU.",
                       0,
                       methods,
                       nullptr,

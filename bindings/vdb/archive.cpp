@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A .vdb file, read by OpenVDB from a stream that throws where the file ends too early.
-/// openvdb::io::File continues behind the end of a file and gives zeros.
+/// Reader of .vdb files. It uses OpenVDB with a stream that throws at the end of the file, because
+/// openvdb::io::File continues past the end and reads zeros.
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/GridDescriptor.h>
@@ -19,7 +19,7 @@
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
-// By its prototype: openvdb/openvdb.h, which declares it, includes grids of points.
+// Declared here because openvdb/openvdb.h also includes grids of points.
 void initialize();
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb
@@ -40,7 +40,7 @@ struct Entry {
   const std::string& name() const { return descriptor.gridName(); }
 };
 
-/// Parts of a grid to read: the tree without values of voxels, or everything.
+/// Part of a grid to read: the tree without voxel values, or everything.
 enum class Part { kTopology, kWhole };
 
 class Archive final : public GridFile, private vio::Archive {
@@ -70,7 +70,7 @@ class Archive final : public GridFile, private vio::Archive {
   }
 
  private:
-  /// Returns what `read` returns; exceptions of the library become BrokenFile.
+  /// Returns the result of `read`. Converts exceptions of OpenVDB to BrokenFile.
   template <typename Read>
   static auto guarded(Read&& read) {
     try {
@@ -84,24 +84,24 @@ class Archive final : public GridFile, private vio::Archive {
 
   static std::string one_line(const char* text);
   void read_entries(int64_t size);
-  /// Sets the stream's properties that functions of the library read; forgets the grid before.
+  /// Sets the stream properties that OpenVDB reads, and discards those of the previous grid.
   void tag_stream();
-  /// A grid with its metadata and transform; null if the library does not know its type. The
-  /// stream is then at its tree.
+  /// Creates a grid with its metadata and transform, and leaves the stream at its tree. Returns
+  /// null if OpenVDB does not know its type.
   openvdb::GridBase::Ptr begin(const Entry& entry);
   const Entry& instance_parent(const Entry& entry) const;
-  /// A grid; null if the library does not know its type. Throws TooLarge after its topology was
-  /// read, and before there is memory for its values.
+  /// Reads a grid; returns null if OpenVDB does not know its type. Throws TooLarge after reading
+  /// its topology, before memory for its values is allocated.
   openvdb::GridBase::Ptr read_part(const Entry& entry, Part part, uint64_t most_bytes);
 
   std::ifstream stream_;
-  /// The stream holds the address of this.
+  /// The stream holds the address of this object.
   vio::StreamMetadata::Ptr metadata_;
   std::vector<Entry> entries_;
 };
 
 Archive::Archive(const std::string& path) {
-  // A read past the end throws; OpenVDB does not check.
+  // Reads past the end must throw, since OpenVDB does not check.
   const uintmax_t size = open_to_read(stream_, path);
   guarded([&] {
     readHeader(stream_);
@@ -123,18 +123,18 @@ Archive::Archive(const std::string& path) {
 
 void Archive::read_entries(int64_t size) {
   const int32_t count = readGridCount(stream_);
-  if (count < 0) throw BrokenFile("a count of grids below 0");
+  if (count < 0) throw BrokenFile("the number of grids is negative");
   std::map<std::string, uint32_t> known;
   for (int32_t i = 0; i < count; ++i) {
     Entry entry;
     entry.descriptor.read(stream_);
     const auto& d = entry.descriptor;
     const int64_t here = stream_.tellg();
-    // A file that is cut off loses its last grids; and no table leads in a circle.
+    // A truncated file lacks its last grids. Offsets must increase, so that no table forms a cycle.
     if (d.getEndPos() > size) throw BrokenFile("the file ends too early");
     if (d.getGridPos() < here || d.getBlockPos() < d.getGridPos() ||
         d.getEndPos() < d.getBlockPos())
-      throw BrokenFile("grids lie where they cannot be");
+      throw BrokenFile("grid offsets are out of order");
     entry.index = known[entry.name()]++;
     entries_.push_back(entry);
     d.seekToEnd(stream_);
@@ -146,7 +146,7 @@ const Entry& Archive::instance_parent(const Entry& entry) const {
     if (other.descriptor.uniqueName() == entry.descriptor.instanceParentName() &&
         !other.descriptor.isInstance())
       return other;
-  throw BrokenFile("a grid shares the voxels of one that is not there");
+  throw BrokenFile("a grid shares the voxels of a missing grid");
 }
 
 void Archive::tag_stream() {
@@ -180,7 +180,7 @@ openvdb::GridBase::Ptr Archive::read_part(const Entry& entry, Part part, uint64_
     if (entry.descriptor.isInstance()) {
       const openvdb::GridBase::Ptr parent = read_part(instance_parent(entry), part, most_bytes);
       if (parent == nullptr || parent->type() != grid->type())
-        throw BrokenFile("a grid shares the voxels of one of another type");
+        throw BrokenFile("a grid shares the voxels of a grid of another type");
       grid->setTree(parent->baseTreePtr());
       return grid;
     }
@@ -194,7 +194,7 @@ openvdb::GridBase::Ptr Archive::read_part(const Entry& entry, Part part, uint64_
 
 std::string Archive::one_line(const char* text) {
   std::string line(text);
-  // The library's exceptions begin with their names.
+  // Exceptions of OpenVDB begin with their type name.
   const size_t colon = line.find("Error: ");
   if (colon != std::string::npos && line.find(' ') == colon + 6) line.erase(0, colon + 7);
   std::replace_if(

@@ -45,7 +45,7 @@ void BrickWriter::add(const Origin& origin) {
     ++bricks_.facts.empty;
     return;
   }
-  if (bricks_.count == most_) throw BrokenFile("a grid that changed while it was read");
+  if (bricks_.count == most_) throw BrokenFile("a grid changed while it was read");
   unsigned char* out = bricks_.values.get() + bricks_.count * kBrickVoxels * format.voxel_bytes();
   if (format.is_half) {
     uint16_t halves[3 * kBrickVoxels];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Values of a grid as bricks of 8^3 voxels: leaf nodes, and the active tiles above them cut into
+/// Grid values as bricks of 8^3 voxels: leaf nodes, and active tiles of higher levels split into
 /// bricks.
 #pragma once
 
@@ -66,19 +66,19 @@ struct BrickOptions {
   bool drops_empty = false;
 };
 
-/// Number of bricks in a tile of `edge` voxels a side.
+/// Returns the number of bricks in a tile of `edge`^3 voxels.
 inline uint64_t bricks_of_tile(uint64_t edge) {
   const uint64_t along = edge / kBrickEdge;
   return along * along * along;
 }
 
-/// One line that says that `what` takes more bytes than there is room for.
+/// Returns one line that says that `what` needs more memory than allowed.
 std::string room_text(const std::string& what, uint64_t bytes, uint64_t most_bytes);
 
 /// Throws TooLarge if this many bricks take more than `most_bytes`.
 void check_size(uint64_t bricks, const BrickFormat& format, uint64_t most_bytes);
 
-/// Converts floats that are exactly representable to 16 bits.
+/// Converts floats that are exactly representable in 16 bits.
 void to_halves(const float* values, size_t count, uint16_t* halves);
 
 /// Fills bricks one after another. Values are converted to float before they arrive.

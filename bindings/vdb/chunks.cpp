@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Chunks of values, packed or not, as OpenVDB reads them, with their sizes checked before a byte
-/// is written.
+/// Decompression of chunks in OpenVDB files that checks sizes before it writes.
 ///
-/// The library's own functions read as many bytes as a file says that there are, and look
-/// afterwards whether there was room for them: a broken file overwrites what lies behind. Ours have
-/// the same names, and are found first, since the plug-in is what loads the library
-/// (cmake/vdb_exports.map lets them be seen).
+/// OpenVDB's functions read as many bytes as the file claims and check afterwards whether the
+/// buffer was large enough, so a broken file overwrites memory. The functions here have the same
+/// names and take precedence, since the plug-in loads the library (cmake/vdb_exports.map exports
+/// them).
 #include <openvdb/io/Compression.h>
 
 #include <cstdint>
@@ -16,10 +15,10 @@
 
 namespace {
 
-/// What a packer may add to what it cannot make smaller.
+/// Maximum size increase of incompressible data.
 constexpr uint64_t kOverhead = 1024;
 
-/// Reads the next chunk, of `bytes` once it is unpacked; to nowhere if `data` is null.
+/// Reads the next chunk, of `bytes` bytes when unpacked. Skips it if `data` is null.
 template <typename Unpack>
 void read_chunk(std::istream& is, char* data, size_t bytes, Unpack&& unpack) {
   int64_t size = 0;
@@ -28,7 +27,7 @@ void read_chunk(std::istream& is, char* data, size_t bytes, Unpack&& unpack) {
       size <= 0 ? uint64_t{0} - static_cast<uint64_t>(size) : static_cast<uint64_t>(size);
   const bool is_plain = size <= 0;
   if (is_plain ? length != bytes : length > 2 * uint64_t{bytes} + kOverhead)
-    OPENVDB_THROW(openvdb::IoError, "a chunk of " << bytes << " bytes says that it has " << length);
+    OPENVDB_THROW(openvdb::IoError, "a chunk of " << bytes << " bytes claims to have " << length);
   if (data == nullptr) {
     is.seekg(static_cast<std::streamoff>(length), std::ios_base::cur);
   } else if (is_plain) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A file of grids that is open, written by OpenVDB or NanoVDB.
+/// Interface of open grid files, written by OpenVDB or NanoVDB.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace vdb {
 
-/// Functions throw BrokenFile, std::system_error and std::bad_alloc.
+/// Open file of grids. Functions throw BrokenFile, std::system_error and std::bad_alloc.
 class GridFile {
  public:
   GridFile() = default;
@@ -21,22 +21,22 @@ class GridFile {
 
   virtual size_t size() const = 0;
   virtual Head head(size_t number) const = 0;
-  /// Describes a grid; false if the library does not know its type.
+  /// Describes a grid. Returns false if the library does not know its type.
   virtual bool describe(size_t number, GridFacts& facts) = 0;
-  /// Reads a grid's values. Throws BrokenFile if its type is not read, and TooLarge.
+  /// Reads a grid's values. Throws BrokenFile if its type is not supported, and TooLarge.
   virtual Bricks read(size_t number, const BrickOptions& options, GridFacts& facts) = 0;
 };
 
-/// Opens a file. Its first bytes decide which library's it is, not its name.
+/// Opens a file. The format is detected from its first bytes, not its name.
 std::unique_ptr<GridFile> open_file(const std::string& path);
 
 /// Opens a .vdb file (archive.cpp).
 std::unique_ptr<GridFile> open_archive(const std::string& path);
 
-/// Registers OpenVDB's types of grids. Called once, before any file is opened.
+/// Registers OpenVDB's grid types. Call once before opening files.
 void initialize_openvdb();
 
-/// Version of OpenVDB, "10.0.1".
+/// Returns the version of OpenVDB, such as "10.0.1".
 const char* openvdb_version();
 
 }  // namespace vdb

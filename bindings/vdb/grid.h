@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Description of a grid in a file, and the errors of reading one. Knows neither library.
+/// Description of a grid in a file, and errors of reading one. Independent of OpenVDB and NanoVDB.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@
 
 namespace vdb {
 
-/// The file is not a volume file, ends too early, or holds what no library writes. The text is one
+/// Error: the file is not a volume file, is truncated, or has invalid contents. The message is one
 /// line that says what is wrong.
 struct BrokenFile : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Reading needs more memory than allowed. The text is one line that says how much.
+/// Error: reading needs more memory than allowed. The message is one line that says how much.
 struct TooLarge : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -45,15 +45,15 @@ struct IndexBox {
   }
 };
 
-/// Properties of a grid that need no values of voxels.
+/// Properties of a grid that do not require voxel values.
 struct GridFacts {
-  /// Whether bricks can be made of a grid of this type.
+  /// Whether bricks can be made from a grid of this type.
   bool is_read = false;
   /// "fog volume", "level set", "staggered" or "unknown".
   std::string kind;
   /// Row-major matrix of p' = p M; empty if the transform is not affine.
   std::optional<std::array<double, 16>> index_to_object;
-  /// 1 or 3 components; empty if the type is not read.
+  /// Background value: 1 or 3 components; empty if the type is not supported.
   std::vector<float> background;
   /// Number of active voxels.
   uint64_t voxels = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The Python module wavecomb._vdb: .vdb and .nvdb files. Documented in
-/// python/wavecomb/_vdb.pyi. It is loaded where there are volumes, and nowhere else.
+/// Python module wavecomb._vdb: reading of .vdb and .nvdb files. Documented in
+/// python/wavecomb/_vdb.pyi. Loaded only for stages with volumes.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
@@ -18,7 +18,7 @@ namespace nb = nanobind;
 
 namespace {
 
-/// (4, 4) rows of p' = p M; None if the transform is not affine.
+/// Returns (4, 4) rows of p' = p M, or None if the transform is not affine.
 nb::object rows_of(const std::optional<std::array<double, 16>>& matrix) {
   if (!matrix) return nb::none();
   nb::list rows;
@@ -34,7 +34,7 @@ nb::tuple tuple_of(const std::array<int32_t, 3>& xyz) {
   return nb::make_tuple(xyz[0], xyz[1], xyz[2]);
 }
 
-/// Adds what both lists and bricks say of a grid.
+/// Adds the entries that grids() and bricks() have in common.
 void add_facts(nb::dict& d, const vdb::GridFacts& facts) {
   d["kind"] = facts.kind;
   d["index_to_object"] = rows_of(facts.index_to_object);
@@ -78,7 +78,7 @@ nb::list grids(const std::string& path, bool heads) {
   return found;
 }
 
-/// A buffer as an array that owns it.
+/// Converts a buffer to an array that owns it.
 template <typename T>
 nb::object array_of(std::unique_ptr<T[]>&& values, std::initializer_list<size_t> shape,
                     nb::dlpack::dtype dtype) {

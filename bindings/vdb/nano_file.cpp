@@ -18,7 +18,7 @@ namespace vdb {
 
 namespace {
 
-/// Of a segment (nanovdb::io::Header).
+/// Header of a segment (nanovdb::io::Header).
 struct SegmentHead {
   std::array<char, 8> magic;
   uint32_t version;
@@ -27,7 +27,7 @@ struct SegmentHead {
 };
 static_assert(sizeof(SegmentHead) == 16);
 
-/// Of a grid in a segment, before its name (nanovdb::io::MetaData).
+/// Header of a grid in a segment, before its name (nanovdb::io::MetaData).
 struct GridHead {
   uint64_t size, file_size, name_key, voxels;
   uint32_t type, kind;
@@ -44,9 +44,9 @@ static_assert(sizeof(GridHead) == 176);
 
 constexpr char kMagic[] = "NanoVDB";
 constexpr char kMagicOfOthers[] = "BDVonaN";
-/// In which a grid is packed by Blosc.
+/// Unpacked size of the chunks in which Blosc compresses a grid.
 constexpr uint64_t kNanoChunk = uint64_t{1} << 30;
-/// More than zlib and Blosc make smaller.
+/// Upper bound of the compression ratios of zlib and Blosc.
 constexpr uint64_t kMostPacked = 1100;
 constexpr uint32_t kLongestName = 1 << 16;
 
@@ -54,14 +54,14 @@ std::string version_text(uint32_t version) {
   return std::to_string(version >> 21) + "." + std::to_string((version >> 10) & 2047);
 }
 
-/// Throws where a segment is not one that we read.
+/// Throws BrokenFile if a segment is not supported.
 void check_head(const SegmentHead& head) {
   if (std::memcmp(head.magic.data() + 1, kMagicOfOthers, 7) == 0)
     throw BrokenFile("it was written on a machine of the other byte order");
   if (std::memcmp(head.magic.data(), kMagic, 7) != 0)
-    throw BrokenFile("what should be a head of grids is none");
+    throw BrokenFile("a segment has no valid header");
   if (head.magic[7] == '1')
-    throw BrokenFile("it is a grid without a head: write it with nanovdb::io::writeGrid");
+    throw BrokenFile("it is a grid without a header: write it with nanovdb::io::writeGrid");
   const uint32_t major = head.version >> 21, known = nano_major_version();
   if (known == 0) throw BrokenFile("this build is without NanoVDB (libnanovdb-dev)");
   if (major != known)
@@ -69,8 +69,8 @@ void check_head(const SegmentHead& head) {
                      (major < known ? "older" : "newer") + " than " + std::to_string(known) +
                      ", which is read: convert it, or give the .vdb file that it was made from");
   if (head.magic[7] != '0' && head.magic[7] != '2')
-    throw BrokenFile("it is no file of grids that is known");
-  if (head.codec > 2) throw BrokenFile("it is packed in a way that is not known");
+    throw BrokenFile("it is an unknown kind of NanoVDB file");
+  if (head.codec > 2) throw BrokenFile("its compression is not known");
 }
 
 /// Location of a grid in a file.
@@ -82,7 +82,7 @@ struct NanoEntry {
   uint32_t type = 0;
   /// 0: plain, 1: zlib, 2: Blosc.
   uint16_t codec = 0;
-  /// Bytes of it in memory, and in the file from `offset`.
+  /// Size in bytes in memory, and in the file from `offset`.
   uint64_t size = 0, file_size = 0, offset = 0;
 };
 
@@ -119,7 +119,7 @@ class NanoFile final : public GridFile {
   }
 
  private:
-  /// OpenVDB's name of the type, with the bits of quantised grids: "Tree_fp8_5_4_3".
+  /// Returns OpenVDB's name of the type, with the bits of quantised grids: "Tree_fp8_5_4_3".
   static std::string type_name(const NanoEntry& entry) {
     return std::string("Tree_") + nano_type_word(entry.type) + "_5_4_3";
   }
@@ -161,7 +161,7 @@ void NanoFile::find_grids(uint64_t file_bytes) {
     const size_t first = entries_.size();
     for (uint32_t i = 0; i < head.count; ++i) {
       const auto grid = take<GridHead>();
-      if (grid.name_size > kLongestName) throw BrokenFile("a name of a grid that is too long");
+      if (grid.name_size > kLongestName) throw BrokenFile("the name of a grid is too long");
       std::string name(grid.name_size, '\0');
       stream_.read(name.data(), grid.name_size);
       NanoEntry& entry = entries_.emplace_back();
@@ -205,7 +205,7 @@ void NanoFile::unpack(const NanoEntry& entry, char* to) {
 
 AlignedBytes NanoFile::load(const NanoEntry& entry, uint64_t most_bytes) {
   if (entry.codec == 0 ? entry.size != entry.file_size : entry.size / kMostPacked > entry.file_size)
-    throw BrokenFile("sizes of a grid that do not fit each other");
+    throw BrokenFile("the sizes of a grid are inconsistent");
   if (entry.size > most_bytes) throw TooLarge(room_text("the grid", entry.size, most_bytes));
   AlignedBytes bytes(static_cast<char*>(::operator new[](entry.size, kAligned)));
   try {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A .nvdb file: segments of grids in the memory layout of NanoVDB, plain or packed.
+/// Reader of .nvdb files: segments of grids in NanoVDB's memory layout, plain or compressed.
 ///
-/// NanoVDB follows whatever offsets a file holds. Here its structures serve as layouts alone, and
-/// each offset is checked before it is followed.
+/// NanoVDB follows offsets in a file without checks. Here its structures are used only as memory
+/// layouts, and each offset is checked before use.
 #pragma once
 
 #include <memory>
@@ -12,11 +12,11 @@
 
 namespace vdb {
 
-/// Whether a file begins as those of NanoVDB do; false if it cannot be opened.
+/// Returns whether a file begins with NanoVDB's magic number; false if it cannot be opened.
 bool is_nano_file(const std::string& path);
 
-/// Opens a .nvdb file and finds its grids. Reading throws TooLarge also if the packed grid takes
-/// more than `most_bytes`.
+/// Opens a .nvdb file and reads its table of grids. Reading a grid throws TooLarge also if its
+/// unpacked size exceeds `most_bytes`.
 std::unique_ptr<GridFile> open_nano_file(const std::string& path);
 
 }  // namespace vdb

@@ -21,18 +21,18 @@ namespace vdb {
 
 namespace {
 
-/// A range of bytes that is looked into by offsets.
+/// Byte range with bounds-checked access.
 class Buffer {
  public:
   Buffer(const unsigned char* bytes, uint64_t size) : bytes_(bytes), size_(size) {}
 
   uint64_t size() const { return size_; }
 
-  /// `count` structures of the layout at an offset. Throws where they do not lie in the buffer.
+  /// Returns `count` structures at an offset. Throws BrokenFile if they exceed the buffer.
   template <typename T>
   const T* at(uint64_t offset, uint64_t count = 1) const {
     if (offset > size_ || offset % alignof(T) != 0 || count > (size_ - offset) / sizeof(T))
-      throw BrokenFile("a grid whose nodes lie where they cannot be");
+      throw BrokenFile("a grid with nodes at invalid offsets");
     return reinterpret_cast<const T*>(bytes_ + offset);
   }
 
@@ -55,7 +55,7 @@ void put(const Value& value, float* to) {
 using Origin = BrickWriter::Origin;
 constexpr int32_t kRootEdge = 4096;
 
-/// Throws where a leaf does not lie in the buffer with all of its values.
+/// Returns a leaf. Throws BrokenFile if it exceeds the buffer.
 template <typename Build>
 const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   using Leaf = typename nanovdb::NanoLeaf<Build>::DataType;
@@ -68,9 +68,9 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   return leaf;
 }
 
-/// The nodes of a grid, which are walked from the root. They depend on the type of values alone,
-/// not on how leaves are quantised, so that this is instantiated once for both. Offsets lead from
-/// node to node; that no more nodes are met than there is room for bounds the cost of a cycle.
+/// Traversal of a grid's nodes from the root. Depends on the type of values only, not on the
+/// quantisation of leaves, so it is instantiated once for both. The number of visited nodes is
+/// limited to those that fit in the buffer, which bounds the cost of a cycle of offsets.
 template <typename Value>
 class NanoWalk {
  public:
@@ -89,13 +89,13 @@ class NanoWalk {
 
   const Value& background() const { return root_->mBackground; }
 
-  /// Calls `on_tile(origin, edge, value)` for active tiles and `on_leaf(origin, offset)`, in the
-  /// order of OpenVDB's trees.
+  /// Calls `on_tile(origin, edge, value)` for active tiles and `on_leaf(origin, offset)` for
+  /// leaves, in the order of OpenVDB's trees.
   template <typename OnTile, typename OnLeaf>
   void walk(OnTile&& on_tile, OnLeaf&& on_leaf) const {
     uint64_t nodes = 0;
     const auto count_node = [&] {
-      if (++nodes > most_nodes_) throw BrokenFile("nodes in a circle");
+      if (++nodes > most_nodes_) throw BrokenFile("a cycle of nodes");
     };
     for (const auto& [origin, tile] : root_tiles()) {
       if (tile->child == 0) {
@@ -118,7 +118,7 @@ class NanoWalk {
  private:
   using Tile = typename Root::Tile;
 
-  /// Entries of the root by their origins.
+  /// Returns the entries of the root, sorted by origin.
   std::vector<std::pair<Origin, const Tile*>> root_tiles() const {
     const uint32_t count = root_->mTableSize;
     const Tile* tiles = buffer_.at<Tile>(at_root_ + sizeof(Root), count);
@@ -130,11 +130,12 @@ class NanoWalk {
     }
     std::sort(found.begin(), found.end());
     for (uint32_t t = 1; t < count; ++t)
-      if (found[t].first == found[t - 1].first) throw BrokenFile("two nodes in one place");
+      if (found[t].first == found[t - 1].first) throw BrokenFile("two nodes at one position");
     return found;
   }
 
-  /// Children and active tiles of an inner node of 2^Log2 entries an edge, each of `edge` voxels.
+  /// Visits children and active tiles of an inner node with 2^Log2 entries per edge, each of `edge`
+  /// voxels per side.
   template <typename Node, int Log2, typename OnTile, typename OnChild>
   void walk_inner(uint64_t at, const Origin& origin, int32_t edge, OnTile&& on_tile,
                   OnChild&& on_child) const {
@@ -160,11 +161,11 @@ class NanoWalk {
   const Root* root_ = nullptr;
 };
 
-/// A grid of one type of values, whose leaves are read by functions of their build type.
+/// Grid of one value type, whose leaves are read by a function for their build type.
 template <typename Value>
 class NanoGrid {
  public:
-  /// Voxels of a leaf. `is_outside`: inactive, and of the background value.
+  /// Voxels of a leaf. `is_outside`: inactive and equal to the background.
   struct LeafValues {
     std::array<float, kChannels<Value> * kBrickVoxels> values;
     std::array<bool, kBrickVoxels> is_on, is_outside;
@@ -187,7 +188,7 @@ class NanoGrid {
   NanoGrid(const Buffer& buffer, const LeafKind& kind)
       : buffer_(buffer), kind_(kind), tree_(buffer, kind.bytes) {}
 
-  /// Background, and number and bounds of active voxels.
+  /// Sets background, and number and bounds of active voxels.
   void describe(GridFacts& facts) const {
     facts.background.resize(kChannels<Value>);
     put(tree_.background(), facts.background.data());
@@ -286,20 +287,20 @@ const char* kind_of(const nanovdb::GridData& data) {
   }
 }
 
-/// Checks the head of a grid against the table of its file.
+/// Returns the header of a grid after checking it against the file's table.
 const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
   const auto* data = whole.at<nanovdb::GridData>(0);
   if (std::memcmp(&data->mMagic, "NanoVDB", 7) != 0)
-    throw BrokenFile("a grid that does not begin like one");
+    throw BrokenFile("a grid without a valid header");
   if (data->mVersion.getMajor() != nano_major_version())
-    throw BrokenFile("a grid of another version than its file");
+    throw BrokenFile("a grid whose version differs from its file");
   if (data->mGridSize > whole.size() || data->mGridType != static_cast<nanovdb::GridType>(type))
-    throw BrokenFile("a grid that is not what the file's table says");
+    throw BrokenFile("a grid that differs from the file's table");
   return *data;
 }
 
-/// Calls `use` with the types of values and of leaves of a nanovdb::GridType; false if it is not
-/// read.
+/// Calls `use` with the value and leaf types of a nanovdb::GridType. Returns false if it is not
+/// supported.
 template <typename Use>
 bool with_build(uint32_t type, Use&& use) {
   switch (static_cast<nanovdb::GridType>(type)) {
@@ -388,7 +389,7 @@ Bricks nano_bricks(const unsigned char*, uint64_t, uint32_t, const BrickOptions&
 #endif
 
 const char* nano_type_word(uint32_t type) {
-  // By the numbers of nanovdb::GridType.
+  // Indexed by nanovdb::GridType.
   constexpr const char* kWords[] = {
       "unknown", "float", "double", "int16", "int32", "int64", "vec3s", "vec3d", "mask",  "half",
       "uint32",  "bool",  "rgba8",  "fp4",   "fp8",   "fp16",  "fpn",   "vec4s", "vec4d", "index"};

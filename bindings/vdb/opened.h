@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A file that is read, whose stream throws where something is missing.
+/// Input files whose streams throw at the end of file.
 #pragma once
 
 #include <cerrno>
@@ -11,7 +11,7 @@
 
 namespace vdb {
 
-/// Opens it, and gives its size in bytes. What cannot be read of it later throws. Throws
+/// Opens a file and returns its size in bytes. Later reads past the end throw. Throws
 /// std::system_error.
 inline uintmax_t open_to_read(std::ifstream& stream, const std::string& path) {
   std::error_code code;

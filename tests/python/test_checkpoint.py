@@ -265,7 +265,7 @@ def test_damaged_files_are_refused(cornell: Any, tmp_path: Path) -> None:
 def test_state_of_another_film_is_refused(cornell: Any) -> None:
     watcher = StopAt(0)
     _core.render(cornell.scene, _core.Settings(width=8, height=8, spp=1), watcher=watcher)
-    with pytest.raises(_core.Error, match="of another picture"):
+    with pytest.raises(_core.Error, match="of a different image"):
         _core.render(cornell.scene, _core.Settings(width=8, height=9, spp=1), state=watcher.state)
     with pytest.raises(_core.Error, match=r"no 'film\.errors'"):
         _core.render(

@@ -20,8 +20,8 @@ def test_what_is_wrong_is_said():
     assert "Write an expression" in problem("  ")
     assert problem("C<RQ>L").startswith("at character 4 ('Q')")
     assert problem("C<RD") and problem("C(RD")
-    assert "it begins with no camera" in problem("<RD>L")
-    assert "a name is of letters, digits" in problem("CL", name="a b")
+    assert "it does not begin with a camera" in problem("<RD>L")
+    assert "the name may contain only letters, digits" in problem("CL", name="a b")
     assert problem("C<L.'rim'>", groups=("key", "fill")) == (
         "There is no light group 'rim' in the stage; there are: key, fill."
     )
