@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// wavecomb._core.Renderer.
+/// Bindings of class wavecomb._core.Renderer.
 #include "wavecomb/render/renderer.h"
 #include "wavecomb/render/cost_profile.h"
 #include "wavecomb/render/learned.h"

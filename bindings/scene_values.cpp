@@ -75,7 +75,8 @@ class Reader {
   void take(const char* name, Value& to) {
     if (const nb::object value = next(name); value.is_valid()) read(name, value, to);
   }
-  /// Throws Error if the dict has unknown keys; `which` qualifies the known ones in the message.
+  /// Throws Error if the dict has unknown keys; the message appends `which`, such as " that can be
+  /// changed".
   void end(const char* which = "") const {
     if (nb::len(values_) == taken_) return;
     for (const auto& [key, value] : values_) {

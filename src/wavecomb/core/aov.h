@@ -35,13 +35,13 @@ enum class AovSource : uint8_t {
   kGuide,   ///< after the last vertex that provides denoiser features
   kLight,   ///< when light contributes to the path
   kWay,     ///< as kLight, separated by sampling technique
-  kTime,    ///< from the clock
+  kTime,    ///< measured with the clock
   kBounce,  ///< over all bounces of the path
 };
 
 /// X(enumerator, name, channels, kind, source, title): one bit each, in this order. `channels` is 0
-/// for layers that are not numeric or are several. `title` is the label in the window; "" hides the
-/// layer there.
+/// for kinds that are not numeric or have several layers. `title` is the label in the window; ""
+/// hides the layer there.
 // clang-format off
 #define WAVECOMB_AOVS(X)                                                                      \
   X(Albedo, "albedo", 3, kMean, kVertex, "Albedo")                                            \

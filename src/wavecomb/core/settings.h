@@ -170,7 +170,7 @@ struct Settings {
 struct LightPathRefusal {
   std::string what, instead;
 };
-/// Returns the first such setting.
+/// Returns the first setting that light paths cannot be combined with, if any.
 LightPathRefusal light_path_refusal(const Settings& settings);
 /// Returns the Error for such a setting; `settings` must use light paths.
 Error light_path_error(const Settings& settings, const LightPathRefusal& refusal);

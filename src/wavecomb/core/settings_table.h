@@ -15,8 +15,8 @@
 
 namespace wavecomb {
 
-/// Value as callers see it; for settings with choices, the name of one. None (monostate) selects a
-/// default that depends on other settings.
+/// Value as callers see it; for settings with choices, the name of a choice. None (monostate)
+/// selects a default that depends on other settings.
 using SettingValue = std::variant<std::monostate, bool, int64_t, double, std::string>;
 
 /// Value of a setting with choices.

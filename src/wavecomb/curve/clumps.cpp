@@ -131,7 +131,7 @@ uint32_t pieces_of(const ClumpEntry& segment) {
   return segment.number % kPieceNodes;
 }
 
-/// Returns all segments, ordered so that nearby ones are in the same group of `group` segments.
+/// Returns all segments, ordered so that groups of `group` segments are compact in space.
 std::vector<ClumpEntry> segments_of(const Mesh& mesh, size_t group, const CurveClumps::Both& both) {
   std::vector<ClumpEntry> out(mesh.indices.size());
   over_all(0, out.size(), 1u << 14, both, [&](size_t s) {

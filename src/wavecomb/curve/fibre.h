@@ -1,4 +1,5 @@
-/// Shading frame of a hair fibre at a hit. The frame of a fibre where a ray has met it.
+// SPDX-License-Identifier: Apache-2.0
+/// Shading frame of a hair fibre at a hit.
 #pragma once
 
 #include "wavecomb/core/frame.h"

@@ -112,7 +112,7 @@ class SegmentTest {
   static bool passes_by(const Bezier& piece, double r) {
     const double x = piece.p[3].x - piece.p[0].x, y = piece.p[3].y - piece.p[0].y;
     const auto beside = [&](int k) { return x * piece.p[k].y - y * piece.p[k].x; };
-    const double b0 = beside(0), b1 = beside(1), b2 = beside(2);  // and beside(3) is beside(0)
+    const double b0 = beside(0), b1 = beside(1), b2 = beside(2);  // beside(3) equals beside(0)
     const double least = std::min(b0, std::min(b1, b2)), most = std::max(b0, std::max(b1, b2));
     const double reach = r * r * (x * x + y * y) * (1 + 1e-9);
     return (least > 0 && least * least > reach) || (most < 0 && most * most > reach);
@@ -168,10 +168,10 @@ class SegmentTest {
     }
   }
 
-  /// Newton step towards the entry or exit of a tube. The ray intersects the sphere of parameter u
-  /// at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. It enters the tube where z - sqrt(h) is minimal
-  /// (side -1) and leaves it where z + sqrt(h) is maximal (side 1). If curve and radius are linear
-  /// around u,
+  /// Returns a step in u towards the entry or exit of a tube. The ray intersects the sphere of
+  /// parameter u at z(u) -+ sqrt(h(u)), h = r^2 - x^2 - y^2. It enters the tube where z - sqrt(h)
+  /// is minimal (side -1) and leaves it where z + sqrt(h) is maximal (side 1). If curve and radius
+  /// are linear around u,
   ///   A w + B = -side z' sqrt(h),  A = r'^2 - x'^2 - y'^2,  B = r r' - x x' - y y',
   /// at u + w. This describes a cone with spherical ends; w = 0 is the exact condition.
   double step(double u, int side) const {

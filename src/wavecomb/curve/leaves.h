@@ -1,5 +1,5 @@
-/// Conservative test of a ray against the straight sub-segments of a tube. Which leaves of a piece
-/// of a tube a ray may meet.
+// SPDX-License-Identifier: Apache-2.0
+/// Conservative test of a ray against the straight sub-segments of a tube.
 #pragma once
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// Parametrisation of curves and points. Traversal computes the surface coordinates (u, v) of a
 /// hit, and shading reconstructs the surface from them.
 ///

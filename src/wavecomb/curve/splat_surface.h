@@ -1,5 +1,5 @@
-/// Position and emitted radiance of a hit on a Gaussian splat. From a hit on a splat to the place
-/// and the light there.
+// SPDX-License-Identifier: Apache-2.0
+/// Position and emitted radiance of a hit on a Gaussian splat.
 #pragma once
 
 #include "wavecomb/curve/harmonics.h"

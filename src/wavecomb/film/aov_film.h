@@ -42,7 +42,7 @@ class AovFilm {
 
   /// Cryptomatte levels: object, material, asset.
   static constexpr uint32_t kCryptoLevels = 3;
-  /// Ids written per pixel, of the CryptoPixel::kIds that are counted. Two fit in an RGBA layer, so
+  /// Number of ids written per pixel; CryptoPixel counts up to kIds. An RGBA layer holds two, so
   /// files have three layers per level.
   static constexpr uint32_t kCryptoRanks = 6;
 

@@ -20,9 +20,9 @@ struct ErrorMap {
   ///   e = sum over rgb |I - A| / sqrt(sum over rgb I)
   /// with I the mean of all samples and A the mean of one half of them (Dammertz, Hanika and
   /// Keller, "A Hierarchical Automatic Stopping Condition for Monte Carlo Global Illumination",
-  /// WSCG 2010, equation 1). With light splats, I and A each include the splats, which have halves
-  /// of their own. For independent samples |I - A| is distributed like |I - truth|. Infinite if no
-  /// pixel of the window has an error estimate yet; pixels that are not finite count as 0.
+  /// WSCG 2010, equation 1). With light splats, I and A each include the splats, whose half is
+  /// summed separately. For independent samples |I - A| is distributed like |I - truth|. Infinite
+  /// if no pixel of the window has an error estimate yet; pixels that are not finite count as 0.
   std::vector<float> error;
   /// sum |I - A| / sum I over all pixels and channels; infinite if no pixel has an estimate yet.
   double mean_relative = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /// Statistics of the coherence of a shading order, measured on a sample of queues outside the timed
 /// phases.
 #pragma once

@@ -271,7 +271,7 @@ template <typename F>
 inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t,
                        const Footprint<F>& footprint, const Mask<F>& active) {
   if (texture.tiles) [[unlikely]] {
-    // Copies allow the values that all other textures use to stay in registers.
+    // Copies the arguments, so that textures without tiles keep them in registers.
     const F u = s, v = t;
     const Footprint<F> f = footprint;
     const Mask<F> on = active;

@@ -1,5 +1,5 @@
-/// Replacement policy for texture tiles in memory. Which tiles are in memory, and which of them
-/// goes next.
+// SPDX-License-Identifier: Apache-2.0
+/// Replacement policy for texture tiles in memory.
 #pragma once
 
 #include <cstddef>
