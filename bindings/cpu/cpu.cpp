@@ -18,7 +18,7 @@ std::array<const char*, 4> runnable() {
   if (__builtin_cpu_supports("x86-64-v3")) names[count++] = "x86-64-v3";
   if (__builtin_cpu_supports("x86-64-v2")) names[count++] = "x86-64-v2";
 #elif defined(__aarch64__)
-  names[count++] = "armv8-a";  // all of them
+  names[count++] = "armv8-a";  // every AArch64 CPU
 #endif
   return names;
 }

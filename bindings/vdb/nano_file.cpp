@@ -78,9 +78,9 @@ struct NanoEntry {
   std::string name;
   /// Position among the grids of this name.
   uint32_t index = 0;
-  /// nanovdb::GridType.
+  /// Type of the grid, a nanovdb::GridType.
   uint32_t type = 0;
-  /// 0: plain, 1: zlib, 2: Blosc.
+  /// Compression: 0 is none, 1 zlib, 2 Blosc.
   uint16_t codec = 0;
   /// Size in bytes in memory, and in the file from `offset`.
   uint64_t size = 0, file_size = 0, offset = 0;

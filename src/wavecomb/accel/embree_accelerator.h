@@ -7,7 +7,7 @@
 
 #include "wavecomb/scene/scene.h"
 
-struct RTCSceneTy;  // from Embree
+struct RTCSceneTy;  // Embree's scene type
 
 namespace wavecomb {
 

@@ -184,7 +184,7 @@ void EmbreeHierarchy::attach_light(uint32_t id, const PlacedShape& shape) const 
   } else {
     RTCGeometry g = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(g, 1);
-    rtcSetGeometryUserData(g, const_cast<PlacedShape*>(&shape));  // only read
+    rtcSetGeometryUserData(g, const_cast<PlacedShape*>(&shape));  // callbacks only read it
     rtcSetGeometryBoundsFunction(g, light_box, nullptr);
     rtcSetGeometryIntersectFunction(
         g, rule_ != HitRule::kEmbree ? intersect_lights : intersect_lights_bare);

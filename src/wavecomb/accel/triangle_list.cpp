@@ -55,7 +55,7 @@ struct ListTracer {
   template <typename F>
   struct Packet {
     Vec3<F> o, d;
-    std::array<F, TriangleList::kMostVertices> x, y;  ///< of vertices, in the frame of each ray
+    std::array<F, TriangleList::kMostVertices> x, y;  ///< vertex coordinates in each ray's frame
 
     Packet(const TriangleList& list, const RaySpan& rays, size_t base)
         : o(load<F>(rays.ox + base), load<F>(rays.oy + base), load<F>(rays.oz + base)),

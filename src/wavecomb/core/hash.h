@@ -17,8 +17,8 @@ inline U hash_u32(U x) {
   return x;
 }
 
-/// Hashes two words; the second may be uniform. Bijective in either argument for a fixed other one,
-/// so that no two pixels share random numbers for a given seed.
+/// Hashes two words; the second may be the same in all lanes. Bijective in either argument for a
+/// fixed other one, so that no two pixels share random numbers for a given seed.
 template <typename U>
 inline U hash_u32(const U& a, const std::type_identity_t<U>& b) {
   return hash_u32<U>(hash_u32<U>(a) + b * 0x9e3779b9u);

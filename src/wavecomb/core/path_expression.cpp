@@ -14,7 +14,7 @@ namespace {
 constexpr uint32_t kMostNfaStates = 2000;
 /// Maximum number of states of the deterministic automaton before minimisation.
 constexpr size_t kMostSets = 4096;
-using StateSet = std::vector<uint32_t>;  ///< ascending
+using StateSet = std::vector<uint32_t>;  ///< sorted in ascending order
 
 /// Nondeterministic automaton of all expressions (Thompson 1968).
 class PathNfa {

@@ -122,7 +122,7 @@ class Film {
   struct Layers {
     std::vector<float> beauty, albedo, normal, depth, variance;
     std::vector<uint32_t> samples;
-    std::vector<AovLayer> aovs;  ///< of AovFilm::finish, and "unbiased" if the beauty is reweighted
+    std::vector<AovLayer> aovs;  ///< AovFilm::finish, plus "unbiased" if beauty is reweighted
     DeepLayer deep;
   };
   /// Returns all layers and ends the film. Sums are freed as soon as they are used, because sums

@@ -189,7 +189,7 @@ class SplatLayer {
   }
 
   SplatSums sums_, half_;
-  std::vector<int64_t> paths_ = std::vector<int64_t>(2);  ///< light paths: all; those of the half
+  std::vector<int64_t> paths_ = std::vector<int64_t>(2);  ///< light paths: total, half
   std::vector<uint32_t> samples_;
   double scale_ = 1;
 };

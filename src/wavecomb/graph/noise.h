@@ -138,7 +138,7 @@ inline F cell(const F (&p)[N]) {
   for (size_t i = 0; i < N; ++i) at[i] = UInt<F>(to_int<F>(floor(bounded<F>(p[i]))));
   return unit_of<F>(hash(at));
 }
-/// Returns value `k` of several of the lattice cell of `p`.
+/// Returns the k-th hashed value of the lattice cell of `p`.
 template <typename F, size_t N>
 inline F cell(const F (&p)[N], uint32_t k) {
   UInt<F> at[N + 1];
