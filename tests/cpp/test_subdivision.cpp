@@ -97,14 +97,14 @@ TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
   std::vector<int32_t> corners = kCorners;
   desc.cage.corners = corners;
   corners[3] = 8;
-  EXPECT_EQ(complaint(desc), "a face names a point that is not there");
+  EXPECT_EQ(complaint(desc), "a face refers to a point that does not exist");
   corners[3] = -1;
-  EXPECT_EQ(complaint(desc), "a face names a point that is not there");
+  EXPECT_EQ(complaint(desc), "a face refers to a point that does not exist");
   corners[3] = corners[0];
-  EXPECT_EQ(complaint(desc), "a face has one point twice");
+  EXPECT_EQ(complaint(desc), "a face uses a point twice");
   desc = cube(1);
   desc.cage.scheme = Scheme::kLoop;
-  EXPECT_EQ(complaint(desc), "Loop subdivision needs triangles, and a face is none");
+  EXPECT_EQ(complaint(desc), "Loop subdivision needs triangles, but a face is not a triangle");
   desc = cube(1);
   std::vector<int32_t> sizes = kSizes;
   desc.cage.face_sizes = sizes;
@@ -126,7 +126,7 @@ TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
   const std::vector<uint32_t> triangle = {0, 1, 9}, face = {0};
   desc.triangles = triangle;
   desc.triangle_faces = face;
-  EXPECT_EQ(complaint(desc), "a face names a point that is not there");
+  EXPECT_EQ(complaint(desc), "a face refers to a point that does not exist");
 }
 
 TEST(Subdivision, ManyFacesOnOneEdgeAreKeptSharp) {

@@ -94,7 +94,7 @@ def test_what_is_no_good_ends_in_a_line(
         render(cornell, guiding="off").save_learned(tmp_path / "none.learned")
     write_scene("spread", tmp_path / "other.usdc", triangles=10000, texture_mb=0.0)
     other = wavecomb.load(tmp_path / "other.usdc").scene
-    with pytest.raises(wavecomb._core.Error, match="learned before"):
+    with pytest.raises(wavecomb._core.Error, match="the saved guiding field does not fit"):
         render(other, spp=1, learn_from=taught)
     file = tmp_path / "a.learned"
     save_learned(file, taught.learned)

@@ -586,10 +586,10 @@ def test_a_level_beyond_memory_is_refused(tmp_path, monkeypatch):
 
 BROKEN = {
     "Loop subdivision needs triangles": 'uniform token subdivisionScheme = "loop"',
-    "a crease names a point that is not there": (
+    "a crease refers to a point that does not exist": (
         "int[] creaseIndices = [0, 9]; int[] creaseLengths = [2]; float[] creaseSharpnesses = [5]"
     ),
-    "a sharp corner names a point": "int[] cornerIndices = [-3]; float[] cornerSharpnesses = [5]",
+    "a sharp corner refers to a point": "int[] cornerIndices = [-3]; float[] cornerSharpnesses = [5]",
 }
 
 
@@ -624,7 +624,7 @@ def test_degenerate_faces_and_shapes_that_are_no_manifolds(tmp_path):
                        [1, -1, 0]], float)  # fmt: skip
     twice = mesh(points, [[0, 1, 2, 2]])
     recorder, loaded = load(tmp_path, twice, subdivision=2)
-    assert "a face has one point twice: drawn as polygons" in said(loaded)
+    assert "a face uses a point twice: drawn as polygons" in said(loaded)
     line = mesh(points, [[0, 1], [0, 1, 2, 3]])
     recorder, loaded = load(tmp_path, line, subdivision=2)
     assert "fewer than three corners: drawn as polygons" in said(loaded)

@@ -11,7 +11,7 @@ namespace {
 void check_points(std::span<const int32_t> points, uint32_t count, const char* what) {
   for (const int32_t p : points)
     if (p < 0 || static_cast<uint32_t>(p) >= count)
-      throw Error(std::string(what) + " names a point that is not there");
+      throw Error(std::string(what) + " refers to a point that does not exist");
 }
 
 }  // namespace
@@ -21,7 +21,7 @@ void check_cage(const Cage& cage) {
   for (const int32_t size : cage.face_sizes) {
     if (size < 3) throw Error("a face has fewer than three corners");
     if (cage.scheme == Scheme::kLoop && size != 3)
-      throw Error("Loop subdivision needs triangles, and a face is none");
+      throw Error("Loop subdivision needs triangles, but a face is not a triangle");
     if (static_cast<size_t>(size) > cage.corners.size() - at)
       throw Error("the face counts do not add up to the number of face indices");
     at += static_cast<size_t>(size);
@@ -37,14 +37,14 @@ void check_cage(const Cage& cage) {
     sorted.assign(face.begin(), face.end());
     std::sort(sorted.begin(), sorted.end());
     if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
-      throw Error("a face has one point twice");
+      throw Error("a face uses a point twice");
     at += static_cast<size_t>(size);
   }
   check_points(cage.crease_edges, cage.vertex_count, "a crease");
   check_points(cage.corner_vertices, cage.vertex_count, "a sharp corner");
   if (cage.crease_edges.size() != 2 * cage.crease_sharpness.size() ||
       cage.corner_vertices.size() != cage.corner_sharpness.size())
-    throw Error("creases or corners do not have a sharpness each");
+    throw Error("creases or corners and their sharpness values differ in number");
   for (const FaceVaryingIndices& channel : cage.channels) {
     if (channel.indices.size() != cage.corners.size())
       throw Error("a face-varying primvar does not have an index for each corner");
@@ -59,7 +59,7 @@ Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
     throw Error("a face-varying primvar has the wrong number of values");
   Welded out;
   out.indices.resize(corners.size());
-  // The distinct values of each point so far, as a list of corners.
+  // Linked list per point of the corners with distinct values found so far.
   constexpr uint32_t kEnd = ~0u;
   std::vector<uint32_t> first(vertex_count, kEnd), next(corners.size(), kEnd);
   for (size_t c = 0; c < corners.size(); ++c) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The polygons that subdivision surfaces are made from, and values on their corners.
+/// Control cage of a subdivision surface, and face-varying values on its corners.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace wavecomb {
 enum class Scheme : uint8_t { kCatmullClark, kLoop, kBilinear };
 /// UsdGeomMesh::interpolateBoundary: none, edgeOnly, edgeAndCorner.
 enum class BoundaryRule : uint8_t { kNone, kEdgeOnly, kEdgeAndCorner };
-/// UsdGeomMesh::faceVaryingLinearInterpolation: what is kept linear, least first.
+/// UsdGeomMesh::faceVaryingLinearInterpolation, from the least to the most that stays linear.
 enum class FaceVaryingRule : uint8_t {
   kNone,
   kCornersOnly,
@@ -22,36 +22,37 @@ enum class FaceVaryingRule : uint8_t {
   kAll,
 };
 
-/// Face-varying values: an index for each corner of the cage. Corners of one point with one index
-/// are joined; others are apart.
+/// Indices of face-varying values, one for each corner of the cage. Corners at a vertex are joined
+/// if their indices are equal, and separate otherwise.
 struct FaceVaryingIndices {
   std::span<const int32_t> indices;
   uint32_t value_count = 0;
 };
 
-/// The polygons that a surface is made from. Arrays are the caller's; the constructor of
-/// Subdivision reads them.
+/// Control cage: polygons, creases and boundary rules. The caller owns the arrays; Subdivision
+/// reads them in its constructor only.
 struct Cage {
-  std::string name;  ///< for messages
+  std::string name;  ///< used in error messages
   Scheme scheme = Scheme::kCatmullClark;
   BoundaryRule boundary = BoundaryRule::kEdgeAndCorner;
   FaceVaryingRule face_varying = FaceVaryingRule::kCornersPlus1;
-  bool smooth_triangles = false;  ///< Catmull-Clark: triangleSubdivisionRule "smooth"
+  bool smooth_triangles = false;  ///< Catmull-Clark: triangleSubdivisionRule is "smooth"
   uint32_t vertex_count = 0;
   std::span<const int32_t> face_sizes, corners;
   std::span<const int32_t> holes;
-  std::span<const int32_t> crease_edges;     ///< 2 points for each edge
-  std::span<const float> crease_sharpness;   ///< one for each edge; 10 and more: infinite
-  std::span<const int32_t> corner_vertices;  ///< sharp points
+  std::span<const int32_t> crease_edges;     ///< 2 points per edge
+  std::span<const float> crease_sharpness;   ///< one per edge; 10 or more means infinitely sharp
+  std::span<const int32_t> corner_vertices;  ///< sharp vertices
   std::span<const float> corner_sharpness;
   std::vector<FaceVaryingIndices> channels;
 };
 
-/// Throws Error, one line that says what is wrong with the cage: what OpenSubdiv takes for granted.
+/// Validates everything that OpenSubdiv assumes about a cage. Throws Error with a one-line
+/// description of the first fault.
 void check_cage(const Cage& cage);
 
-/// Indices that join the corners of a point where their values (corners, width) are equal, bit for
-/// bit, and the values that they address.
+/// Face-varying values without duplicates: an index for each corner, and the values that they
+/// address, (count, width).
 struct Welded {
   std::vector<int32_t> indices;
   std::vector<float> values;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The corners of a polygon by place, for clip_ears.
+/// Spatial index of the corners of a polygon, for clip_ears.
 #pragma once
 
 #include <algorithm>
@@ -15,12 +15,13 @@ struct Corner {
   bool operator==(const Corner&) const = default;
 };
 
-/// Twice the signed area of the triangle a, b, c.
+/// Returns twice the signed area of triangle a, b, c; positive if counter-clockwise.
 inline double turn_of(const Corner& a, const Corner& b, const Corner& c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-/// A k-d tree of places, from which corners are taken one by one. Corners at one place are one.
+/// k-d tree of positions in the plane from which corners are removed one by one. Corners with equal
+/// coordinates share a position.
 class CornerTree {
  public:
   static constexpr uint32_t kNone = 0xffffffffu;
@@ -61,7 +62,7 @@ class CornerTree {
   size_t place_count() const { return places_.size(); }
   uint32_t place_of(uint32_t corner) const { return place_of_[corner]; }
 
-  /// Takes a corner; true: it was the last one at its place.
+  /// Removes a corner. Returns whether it was the last one at its position.
   bool remove(uint32_t corner) {
     const uint32_t place = place_of_[corner];
     if (--counts_[place] > 0) return false;
@@ -69,9 +70,10 @@ class CornerTree {
     return true;
   }
 
-  /// A place in or on the triangle a, b, c (counter-clockwise) where corners are left, other than
-  /// those three; kNone: there is none. Which one of several is left to chance, so that what is
-  /// taken next is seldom it. Adds nodes looked at to `steps`.
+  /// Finds a position inside or on the counter-clockwise triangle a, b, c that still has corners
+  /// and is not a vertex of the triangle. Returns kNone if there is none. The search order is
+  /// pseudo-random: the same blocking corner is then seldom found again just before it is removed.
+  /// Adds the number of visited nodes to `steps`.
   uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {
     const double lo_x = std::min({a.x, b.x, c.x}), hi_x = std::max({a.x, b.x, c.x});
     const double lo_y = std::min({a.y, b.y, c.y}), hi_y = std::max({a.y, b.y, c.y});
@@ -108,14 +110,14 @@ class CornerTree {
 
   struct Node {
     Corner lo, hi;
-    uint32_t begin, end;     ///< of places
-    uint32_t alive;          ///< places with corners left
-    uint32_t parent, child;  ///< first of two; kNone: a leaf
+    uint32_t begin, end;     ///< range of positions
+    uint32_t alive;          ///< positions with remaining corners
+    uint32_t parent, child;  ///< first of two children; kNone: leaf
   };
   struct Edge {
     Corner from, to;
-    /// Whether all of a box is to its right. Rounding is monotonic, so that this is as the places
-    /// in it would say themselves.
+    /// Whether the box lies entirely to the right of the edge. Floating-point rounding is
+    /// monotonic, so the result agrees with tests of the positions inside.
     bool off(const Node& n) const {
       return turn_of(from, to, {to.y > from.y ? n.lo.x : n.hi.x, to.x > from.x ? n.hi.y : n.lo.y}) <
              0;
@@ -153,8 +155,8 @@ class CornerTree {
   }
 
   std::vector<Node> nodes_;
-  std::vector<Corner> places_;    ///< in the order of the leaves
-  std::vector<uint32_t> counts_;  ///< corners left at each
+  std::vector<Corner> places_;    ///< in leaf order
+  std::vector<uint32_t> counts_;  ///< remaining corners per position
   std::vector<uint32_t> leaf_of_, place_of_;
   uint32_t random_ = 1;
 };

@@ -11,7 +11,8 @@ namespace {
 
 constexpr uint32_t kNone = CornerTree::kNone;
 
-/// A set of numbers below n that finds the next one: bits, and bits of words that have some.
+/// Set of integers below n that finds its next element fast. A hierarchy of bit sets: each upper
+/// bit says whether the 64-bit word below it is non-zero.
 class NumberSet {
  public:
   explicit NumberSet(size_t n) {
@@ -33,7 +34,7 @@ class NumberSet {
       i /= 64;
     }
   }
-  /// The least that is `i` or more, or kNone.
+  /// Returns the smallest element >= i, or kNone.
   uint32_t next(uint32_t i) const {
     size_t up = 0;
     for (;; ++up, i = i / 64 + 1) {
@@ -51,7 +52,7 @@ class NumberSet {
   std::vector<std::vector<uint64_t>> levels_;
 };
 
-/// What is left of a polygon.
+/// Ear clipping of one polygon.
 class Clipper {
  public:
   Clipper(std::span<const Corner> corners, uint64_t most_steps)
@@ -96,12 +97,12 @@ class Clipper {
   }
 
  private:
-  /// Where a corner waits, with others, for a place to be free.
+  /// Entry in the list of corners that wait until a blocking position is free.
   struct Blocked {
     uint32_t place = kNone, next = kNone, previous = kNone;
   };
 
-  /// The first ear from `due` on; `due` itself where there is none.
+  /// Returns the first ear at or after corner `due`, or `due` if there is none.
   uint32_t next_ear(uint32_t due) {
     for (uint32_t at = due;;) {
       uint32_t found = open_.next(at);
@@ -155,7 +156,7 @@ class Clipper {
   std::vector<uint32_t> next_, previous_;
   std::vector<Blocked> blocked_;
   CornerTree tree_;
-  std::vector<uint32_t> first_;  ///< by place: of the corners that wait for it
+  std::vector<uint32_t> first_;  ///< by position: first of the corners that it blocks
 };
 
 }  // namespace

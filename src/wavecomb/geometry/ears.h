@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Polygons of any shape as triangles.
+/// Triangulation of arbitrary polygons by ear clipping.
 #pragma once
 
 #include <cstdint>
@@ -8,27 +8,28 @@
 
 namespace wavecomb {
 
-/// Triangles of a polygon.
+/// Triangulation of a polygon.
 struct Ears {
-  std::vector<int64_t> corners;  ///< of each triangle three: count - 2 of them
-  uint64_t hurried = 0;          ///< corners that were cut without a look: the steps ran out
+  std::vector<int64_t> corners;  ///< 3 per triangle, n - 2 triangles for n corners
+  uint64_t hurried = 0;          ///< ears cut without a test, once the step limit was reached
 };
 
-/// Steps that take about a second; a face of 100,000 corners takes two thirds of them at the worst
-/// that is known, one of 5,000 a fiftieth.
+/// Step limit of clip_ears, about a second. In the worst known cases a face of 100,000 corners
+/// takes two thirds of it and a face of 5,000 corners a fiftieth.
 inline constexpr uint64_t kEarSteps = uint64_t{1} << 26;
 
-/// Triangles of one polygon in the plane, counter-clockwise, by clipping ears from its first corner
-/// on (G. Meisters, "Polygons Have Ears", 1975). An ear has no other corner of what is left of the
-/// polygon within or on it, but such as lie on its own three (the bridge to a hole). Where none is
-/// left, the polygon crosses itself and the corner that is due is cut anyhow.
+/// Triangulates a polygon in the plane, counter-clockwise, by clipping ears from its first corner
+/// on (G. Meisters, "Polygons Have Ears", 1975). A corner is an ear if no other remaining corner
+/// lies in or on its triangle. Corners that coincide with a vertex of the triangle are excepted, as
+/// they occur at bridges to holes. If no ear is left, the polygon intersects itself, and the next
+/// corner is cut regardless.
 ///
-/// A corner is looked at again only when its neighbours changed or the corner that stood in its way
-/// is gone; corners in the way are found by a k-d tree. So a polygon of n corners takes
-/// O(n sqrt(n)) steps at the worst that is known, self-crossing ones too.
+/// A corner is tested again only after its neighbours changed or the corner that blocked it was
+/// removed. A k-d tree finds blocking corners. In the worst known cases, self-intersecting polygons
+/// included, n corners take O(n sqrt(n)) steps.
 ///
-/// `flat`: x and y of each corner. Corners that are not finite, and those that are left after
-/// `most_steps`, are cut without a look.
+/// `flat` holds x and y of each corner. If a coordinate is not finite, the result is a fan. Corners
+/// that remain after `most_steps` are cut without a test.
 Ears clip_ears(std::span<const double> flat, uint64_t most_steps = kEarSteps);
 
 }  // namespace wavecomb

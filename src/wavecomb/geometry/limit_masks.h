@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Vertex values of a refined topology by OpenSubdiv's masks, in bands of points that any number of
-/// threads work on.
+/// Evaluation of OpenSubdiv's vertex masks in bands of vertices, on any number of threads.
 ///
-/// Far::PrimvarRefiner computes the same, a whole level in one call on one thread. Masks, and the
-/// order in which their weights are added, are its own, so each bit is, too. Topology is refined
-/// uniformly: every point has all its neighbours.
+/// Far::PrimvarRefiner computes the same values, but a whole level per call on one thread. Masks
+/// and the order of additions are those of OpenSubdiv, so the results are bitwise equal. The
+/// topology is refined uniformly: every vertex has all its neighbours.
 #pragma once
 
 #include <opensubdiv/far/topologyLevel.h>
@@ -22,10 +21,10 @@ namespace wavecomb::masks {
 namespace Far = OpenSubdiv::Far;
 namespace Sdc = OpenSubdiv::Sdc;
 
-/// Elements that one task takes.
+/// Elements per task.
 inline constexpr size_t kBand = 4096;
 
-/// N floats as OpenSubdiv wants them.
+/// Primvar value of N floats with the interface that OpenSubdiv expects.
 template <int N>
 struct Values {
   float v[N];
@@ -35,12 +34,12 @@ struct Values {
   }
 };
 
-/// Weights of a point, the ends of its edges and its faces, as Sdc::Scheme fills them in.
+/// Weights of a vertex, its edges and its faces, with the interface that Sdc::Scheme expects.
 class Mask {
  public:
   using Weight = float;
 
-  /// Makes room for a point with that many edges, or faces, around it.
+  /// Reserves room for a vertex with `around` edges or faces, or for an edge with that many faces.
   void fit(int around) {
     const size_t size = 1 + 2 * (static_cast<size_t>(around) + 2);
     if (weights_.size() < size) weights_.resize(size);
@@ -58,7 +57,7 @@ class Mask {
   bool AreFaceWeightsForFaceCenters() const { return for_centers_; }
   void SetFaceWeightsForFaceCenters(bool on) { for_centers_ = on; }
 
-  // The mask of an edge has two points and no edges.
+  // The mask of an edge has two vertex weights and no edge weights.
   float& VertexWeight(int i) { return weights_[static_cast<size_t>(i)]; }
   float& EdgeWeight(int i) { return weights_[1 + static_cast<size_t>(i)]; }
   float& FaceWeight(int i) { return weights_[faces_at_ + static_cast<size_t>(i)]; }
@@ -73,7 +72,7 @@ class Mask {
   bool for_centers_ = false;
 };
 
-/// The faces at an edge.
+/// Faces around an edge, with the interface that Sdc::Scheme expects of an edge.
 struct EdgeAround {
   const Far::TopologyLevel& level;
   int edge;
@@ -89,7 +88,7 @@ struct EdgeAround {
   }
 };
 
-/// What is around a point, and its child on the next level.
+/// Neighbourhood of a vertex and its child on the next level, as Sdc::Scheme expects them.
 struct VertexAround {
   const Far::TopologyLevel &level, &next;
   int vertex, child;
@@ -111,7 +110,8 @@ struct VertexAround {
   }
 };
 
-/// Runs f(i) for 0 to n - 1 in bands; f is made anew for each band by `make()`, with its scratch.
+/// Runs f(i) for i from 0 to n - 1 in parallel bands. Each band gets a separate f, and with it its
+/// scratch memory, from `make()`.
 template <typename Make>
 void in_bands(int n, Make&& make) {
   parallel_bands(static_cast<size_t>(n), kBand, [&](size_t first, size_t last) {
@@ -120,25 +120,25 @@ void in_bands(int n, Make&& make) {
   });
 }
 
-/// The end of an edge that is not `vertex`.
+/// Returns the end of an edge that is not `vertex`.
 inline int other_end(const Far::TopologyLevel& level, int edge, int vertex) {
   const Far::ConstIndexArray ends = level.GetEdgeVertices(edge);
   return ends[0] == vertex ? ends[1] : ends[0];
 }
 
-/// The point of a face two corners behind the given one.
+/// Returns the vertex of a face two corners after `corner`.
 inline int opposite(const Far::TopologyLevel& level, int face, int corner) {
   const Far::ConstIndexArray points = level.GetFaceVertices(face);
   const int at = corner + 2;
   return points[at >= points.size() ? at - points.size() : at];
 }
 
-/// Values of `next`, a level's child, from those of the level.
+/// Refines values from a level to its child `next`.
 template <Sdc::SchemeType kScheme, typename V>
 void refine(const Sdc::Options& options, const Far::TopologyLevel& level,
             const Far::TopologyLevel& next, const V* from, V* to) {
   const Sdc::Scheme<kScheme> scheme(options);
-  // Loop has no points in the middle of faces. Edges and points read those that others have.
+  // Edge and vertex children read the values of face children. Loop has no face children.
   if constexpr (kScheme != Sdc::SCHEME_LOOP)
     in_bands(level.GetNumFaces(), [&] {
       return [&, weights = std::vector<float>()](int face) mutable {
@@ -195,8 +195,8 @@ void refine(const Sdc::Options& options, const Far::TopologyLevel& level,
   });
 }
 
-/// Values at the limit of the points of the last level: out(vertex, value, u, v), with two
-/// derivatives, which are null where they are not asked for (kTangents) or there are none.
+/// Computes limit values of the vertices of the last level. Calls out(vertex, value, u, v), where u
+/// and v point to the derivatives; they are null unless kTangents, and at vertices without faces.
 template <Sdc::SchemeType kScheme, bool kTangents, typename V, typename Out>
 void limit(const Sdc::Options& options, const Far::TopologyLevel& level, const V* from, Out&& out) {
   const Sdc::Scheme<kScheme> scheme(options);
@@ -205,7 +205,7 @@ void limit(const Sdc::Options& options, const Far::TopologyLevel& level, const V
       const Far::ConstIndexArray edges = level.GetVertexEdges(vertex);
       V value, by_u, by_v;
       value.Clear();
-      if (edges.size() == 0) {  // a point of no face
+      if (edges.size() == 0) {  // an isolated vertex
         value.AddWithWeight(from[vertex], 1.f);
         out(vertex, value, static_cast<const V*>(nullptr), static_cast<const V*>(nullptr));
         return;

@@ -12,7 +12,8 @@ void bake_points(std::span<const float> points, std::span<const double, 16> matr
     const double x = points[i], y = points[i + 1], z = points[i + 2];
     for (size_t k = 0; k < 3; ++k) {
       const double turned = std::fma(z, matrix[8 + k], std::fma(y, matrix[4 + k], x * matrix[k]));
-      out[i + k] = static_cast<float>((0.0 + turned) + matrix[12 + k]);  // 0.0: no zero is negative
+      // 0.0 avoids negative zeros
+      out[i + k] = static_cast<float>((0.0 + turned) + matrix[12 + k]);
     }
   }
 }
@@ -39,7 +40,7 @@ std::optional<PointBounds> bounds_of(std::span<const float> points, double limit
   for (size_t i = 0; i + 2 < points.size(); i += 3) {
     for (size_t k = 0; k < 3; ++k) {
       const float value = points[i + k];
-      is_near = is_near && std::abs(static_cast<double>(value)) < limit;  // not of NaN
+      is_near = is_near && std::abs(static_cast<double>(value)) < limit;  // false for NaN
       bounds[0][k] = std::min(bounds[0][k], value);
       bounds[1][k] = std::max(bounds[1][k], value);
     }
@@ -54,7 +55,7 @@ uint32_t corners_of_faces(std::span<const int32_t> counts, std::span<const int32
   if (indices.size() != counts.size() * static_cast<size_t>(size)) return 0;
   bool is_plain = true;
   for (const int32_t count : counts) is_plain = is_plain && count == size;
-  uint32_t highest = 0;  // negative ones are large as unsigned
+  uint32_t highest = 0;  // negative indices are large as unsigned
   for (const int32_t index : indices) highest = std::max(highest, static_cast<uint32_t>(index));
   return is_plain && highest < point_count ? static_cast<uint32_t>(size) : 0;
 }

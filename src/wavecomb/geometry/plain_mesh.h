@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What nearly all meshes are: triangles alone or quads alone, every index in range, every point
-/// where it can be drawn. Anything else is for who reads meshes with care, and says what is wrong.
+/// Fast path for common meshes: all triangles or all quads, indices in range, points at moderate
+/// coordinates. Other meshes take the general path, which reports what is wrong.
 #pragma once
 
 #include <array>
@@ -11,28 +11,30 @@
 
 namespace wavecomb {
 
-/// Lowest and highest coordinates.
+/// Lowest and highest coordinates of a set of points.
 using PointBounds = std::array<std::array<float, 3>, 2>;
 
-/// Points under a transform, in double precision: x' = x m00 + y m10 + z m20 + m30, each product
-/// but the first added in one rounding, as matrix products have it.
+/// Transforms points in double precision: x' = x m00 + y m10 + z m20 + m30. All products but the
+/// first use fma, as a matrix product does.
 ///
 /// `points`, `out`: 3 per point. `matrix`: 4 x 4, for row vectors.
 void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
                  std::span<float> out);
 
-/// Normals under the inverse transpose of a transform, in double precision as above, of unit
-/// length.
+/// Transforms normals by the inverse transpose, in double precision, and normalises them.
 ///
-/// `normals`, `out`: 3 per normal. `inverse`: the transform's, 4 x 4, for row vectors.
+/// `normals`, `out`: 3 per normal. `inverse`: inverse of the points' transform, 4 x 4, for row
+/// vectors.
 void bake_normals(std::span<const float> normals, std::span<const double, 16> inverse,
                   std::span<float> out);
 
-/// The bounds of points; none where a coordinate is not finite, or `limit` or more from the origin.
+/// Computes the bounds of points. Returns nothing if there is no point, if a coordinate is NaN, or
+/// if its magnitude is `limit` or more.
 std::optional<PointBounds> bounds_of(std::span<const float> points, double limit);
 
-/// 3 where all faces are triangles, 4 where all are quads; 0 of anything else, of no faces, and
-/// where `counts` do not add up to `indices` or one of these is not below `point_count`.
+/// Returns 3 if all faces are triangles, 4 if all are quads, and otherwise 0. Also returns 0 if
+/// there are no faces, if `counts` do not add up to the number of `indices`, or if an index is not
+/// below `point_count`.
 uint32_t corners_of_faces(std::span<const int32_t> counts, std::span<const int32_t> indices,
                           size_t point_count);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Points and directions in double precision, for making geometry.
+/// Double-precision points and vectors for geometry processing.
 #pragma once
 
 #include <cmath>
@@ -21,18 +21,18 @@ inline Point cross_of(const Point& a, const Point& b) {
 inline double length_of(const Point& a) {
   return std::sqrt(dot_of(a, a));
 }
-/// Length 1, or (0, 0, 1) for what has no direction.
+/// Normalises a vector; (0, 0, 1) if its length is zero or not finite.
 inline Point unit(const Point& p) {
   const double square = dot_of(p, p);
   if (!(square > 0) || !std::isfinite(square)) return {0, 0, 1};
   return p * (1 / std::sqrt(square));
 }
 
-/// Point i of (n, 3) values.
+/// Reads point i of an (n, 3) array.
 inline Point point_at(std::span<const float> values, size_t i) {
   return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
 }
-/// The same, written.
+/// Writes point i of an (n, 3) array.
 inline void put(std::span<float> values, size_t i, const Point& p) {
   values[3 * i] = static_cast<float>(p.x);
   values[3 * i + 1] = static_cast<float>(p.y);

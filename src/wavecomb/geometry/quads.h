@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Quads as triangles.
+/// Triangulation of quads.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,14 @@
 
 namespace wavecomb {
 
-/// Corners of the two triangles of each quad, 6 per quad in order.
+/// Splits each quad into two triangles; returns their corners, 6 per quad.
 ///
-/// Each quad is cut along the diagonal whose smaller triangle is the larger of the two, areas
-/// signed by the quad's normal; from its first corner where both are alike.
+/// The diagonal is chosen so that the smaller of the two triangles is as large as possible, where
+/// areas are signed by the quad's normal. If both diagonals are equally good, it starts at the
+/// first corner.
 ///
-/// `points`: 3 per point. `indices`: point of each corner; they must be in range. `starts`: first
-/// corner of each quad, whose others follow it; empty: the corners are all those of quads.
+/// `points`: 3 per point. `indices`: point of each corner, which must be in range. `starts`: index
+/// of the first corner of each quad, whose other corners follow it; empty if all faces are quads.
 std::vector<int64_t> split_quads(std::span<const float> points, std::span<const int32_t> indices,
                                  std::span<const int64_t> starts);
 

@@ -10,9 +10,9 @@
 namespace wavecomb {
 namespace {
 
-/// Of edges that are not in the picture.
+/// Weight of edges outside the image.
 constexpr double kUnseen = 0.125;
-/// Edges a little outside the picture count as in it.
+/// Image bounds are enlarged by this factor.
 constexpr double kMargin = 1.1;
 
 Point transformed(const double* m, const Point& p) {
@@ -29,7 +29,7 @@ bool is_inside(const Point& p, const ScreenView& view) {
   return std::abs(x) <= kMargin * view.half[0] && std::abs(y) <= kMargin * view.half[1];
 }
 
-/// Mean of lengths, weighted by length.
+/// Length-weighted mean of lengths.
 struct Mean {
   double sum = 0, squares = 0;
   void add(double length) {
@@ -58,7 +58,7 @@ double edge_pixels(std::span<const float> points, std::span<const int32_t> face_
       const Point& b = seen[static_cast<size_t>(corners[at + (c + 1) % count])];
       const Point along = b - a, middle = (a + b) * 0.5;
       const double length = length_of(along);
-      // No nearer than half the edge: what passes the camera is not infinitely large.
+      // The distance is at least half the edge length, so edges that pass the camera stay finite.
       const double distance = view.is_parallel ? 1 : std::max(length_of(middle), 0.5 * length);
       if (!(distance > 0)) continue;
       const double pixels = view.pixels * length / distance;

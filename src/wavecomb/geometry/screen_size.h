@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How large the edges of a mesh are in the picture.
+/// Projected size of mesh edges, by which subdivision levels are chosen.
 #pragma once
 
 #include <array>
@@ -8,22 +8,21 @@
 
 namespace wavecomb {
 
-/// The view that a level of subdivision is chosen for.
+/// Camera for which a subdivision level is chosen.
 struct ScreenView {
-  /// From the world to the camera's space, row vectors; the camera looks along -z.
+  /// World to camera space, for row vectors; the camera looks along -z.
   std::array<double, 16> to_camera;
-  /// What is far is as large as what is near, or all directions are in the picture.
+  /// Orthographic projection, or a projection of all directions.
   bool is_parallel = false, is_all_round = false;
-  double centre[2], half[2];  ///< of the camera's window, as wide as the picture
-  double pixels;              ///< for each unit of the window
+  double centre[2], half[2];  ///< centre and half-size of the camera window
+  double pixels;              ///< pixels per unit of the window
 };
 
-/// Length in pixels of the edges of polygons in one placement: the mean of those in the picture,
-/// long ones counting by their length. Edges outside the picture, and those behind the camera,
-/// count an eighth of what they would have at their distance: reflections and shadows need no more.
-/// The greater of both.
+/// Returns the length-weighted mean projected length of the edges of one instance, in pixels. Edges
+/// outside the image or behind the camera form a separate mean with weight 1/8, as reflections and
+/// shadows need less detail; the larger mean counts.
 ///
-/// `to_world`: row vectors, 16 numbers. Points must be finite and corners in range.
+/// `to_world`: 4 x 4, for row vectors. Points must be finite and corners in range.
 double edge_pixels(std::span<const float> points, std::span<const int32_t> face_sizes,
                    std::span<const int32_t> corners, const double* to_world,
                    const ScreenView& view);

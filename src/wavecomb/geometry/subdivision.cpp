@@ -20,7 +20,7 @@ namespace {
 namespace Far = OpenSubdiv::Far;
 namespace Sdc = OpenSubdiv::Sdc;
 
-/// What OpenSubdiv said last on this thread: its callbacks are one for the process.
+/// First message of OpenSubdiv on this thread. Its callbacks are global to the process.
 thread_local std::string last_message;
 
 void catch_messages() {
@@ -37,7 +37,7 @@ void catch_messages() {
 
 using masks::Values;
 
-/// Calls f with a std::integral_constant of `width`.
+/// Calls f with `width` as a std::integral_constant. Throws Error for widths other than 1 to 4.
 template <typename F>
 auto with_width(uint32_t width, F&& f) {
   switch (width) {
@@ -50,7 +50,7 @@ auto with_width(uint32_t width, F&& f) {
     case 4:
       return f(std::integral_constant<int, 4>());
     default:
-      throw Error("primvars that are refined have 1 to 4 components");
+      throw Error("only primvars of 1 to 4 components can be refined");
   }
 }
 
@@ -89,7 +89,7 @@ struct Subdivision::Refiner {
   Scheme scheme;
   Sdc::Options options;
   bool manifold = true;
-  /// Faces of the last level that are drawn, in order, where it has holes: else all are.
+  /// Visible faces of the last level, in order. Empty without holes, when all are visible.
   bool has_holes = false;
   std::vector<int> drawn;
 
@@ -97,13 +97,13 @@ struct Subdivision::Refiner {
   const Far::TopologyLevel& last() const { return far->GetLevel(level()); }
   size_t vertices_of(int l) const { return static_cast<size_t>(far->GetLevel(l).GetNumVertices()); }
 
-  /// Face of the cage of a face of the last level.
+  /// Returns the cage face that a face of the last level came from.
   int base_of(int face) const {
     for (int l = level(); l > 0; --l) face = far->GetLevel(l).GetFaceParentFace(face);
     return face;
   }
 
-  /// Looks which faces are drawn.
+  /// Collects the visible faces.
   void find_drawn() {
     const Far::TopologyLevel& cage = far->GetLevel(0);
     for (int f = 0; f < cage.GetNumFaces() && !has_holes; ++f) has_holes = cage.IsFaceHole(f);
@@ -115,7 +115,7 @@ struct Subdivision::Refiner {
     return has_holes ? drawn.size() : static_cast<size_t>(last().GetNumFaces());
   }
 
-  /// Calls f(place, face) for the faces that are drawn, in bands.
+  /// Calls f(index, face) for each visible face, in parallel bands.
   template <typename F>
   void each_drawn(F&& f) const {
     parallel_bands(drawn_count(), masks::kBand, [&](size_t first, size_t end) {
@@ -123,8 +123,8 @@ struct Subdivision::Refiner {
     });
   }
 
-  /// Refines values of the cage level by level with `step(level, from, to)`, sizes by
-  /// `size(level)`.
+  /// Refines values of the cage level by level with `step(level, from, to)`; `size(level)` is the
+  /// number of values.
   template <typename V, typename Size, typename Step>
   std::vector<V> refine(std::span<const float> values, Size&& size, Step&& step) const {
     const size_t width = sizeof(V) / sizeof(float);
@@ -165,13 +165,13 @@ std::vector<float> flat(const std::vector<V>& values) {
   return {first, first + values.size() * (sizeof(V) / sizeof(float))};
 }
 
-/// Floats as the values that they are.
+/// Reinterprets an array of floats as primvar values.
 template <typename V>
 V* values_in(float* floats) {
   return reinterpret_cast<V*>(floats);
 }
 
-/// Unit normal of two derivatives; 0 where they nearly line up and tell nothing.
+/// Unit normal from two derivatives; 0 if they are nearly parallel.
 Point normal_of(const Values<3>& by_u, const Values<3>& by_v) {
   const Point u{by_u.v[0], by_u.v[1], by_u.v[2]}, v{by_v.v[0], by_v.v[1], by_v.v[2]};
   const Point normal = cross_of(u, v);
@@ -184,7 +184,7 @@ Point normal_of(const Values<3>& by_u, const Values<3>& by_v) {
 Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   if (level < 1 || level > kMaxLevel) throw Error("the level of subdivision must be 1 to 10");
   check_cage(cage);
-  // OpenSubdiv counts with 32 bits; each level has four times the corners.
+  // OpenSubdiv counts with 32 bits, and each level multiplies the corners by four.
   if ((cage.corners.size() >> (31 - 2 * level)) > 0)
     throw Error("too many faces for level " + std::to_string(level));
   catch_messages();
@@ -221,7 +221,7 @@ Subdivision::Subdivision(const Cage& cage, uint32_t level) {
   refiner_->options = options_of(cage);
   refiner_->far.reset(Factory::Create(desc, options));
   if (refiner_->far == nullptr)
-    throw Error(last_message.empty() ? "its topology cannot be subdivided" : last_message);
+    throw Error(last_message.empty() ? "OpenSubdiv cannot refine its topology" : last_message);
   const Far::TopologyLevel base = refiner_->far->GetLevel(0);
   for (int e = 0; e < base.GetNumEdges() && refiner_->manifold; ++e)
     refiner_->manifold = !base.IsEdgeNonManifold(e);
@@ -277,12 +277,12 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   const auto sharp = [&](int e) {
     const Far::ConstIndexArray around = last.GetEdgeFaces(e);
     if (around.size() != 2 || last.GetEdgeSharpness(e) > 0) return true;
-    // A bilinear surface has an edge wherever its cage has one.
+    // A bilinear surface has an edge wherever the cage has one.
     return refiner_->scheme == Scheme::kBilinear &&
            refiner_->base_of(around[0]) != refiner_->base_of(around[1]);
   };
-  // Where sharp edges may cut a point's surroundings apart: few points, found by all threads and
-  // numbered by one, in their order.
+  // Vertices whose faces may be separated by sharp edges. There are few: all threads find them, and
+  // one thread numbers them in order.
   const size_t points = refiner_->vertices_of(refiner_->level());
   std::vector<std::vector<int>> cut((points + masks::kBand - 1) / masks::kBand);
   parallel_bands(points, masks::kBand, [&](size_t first, size_t end) {
@@ -293,7 +293,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
       if (cuts >= 2 && last.GetVertexFaces(v).size() >= 2) cut[first / masks::kBand].push_back(v);
     }
   });
-  // Where each face of the level is in `faces`.
+  // Index in `faces` of each face of the level.
   std::vector<uint32_t> place;
   if (refiner_->has_holes) {
     place.assign(static_cast<size_t>(last.GetNumFaces()), ~0u);
@@ -304,7 +304,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   std::vector<int> sector;
   const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    // Faces that share a smooth edge are in one sector: the lowest of them names it.
+    // Faces that share a smooth edge belong to one sector, named by its lowest face.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
     for (const int e : edges) {
@@ -335,7 +335,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
 
 std::vector<float> Subdivision::vertex(std::span<const float> values, uint32_t width,
                                        std::vector<float>* normals) const {
-  if (normals != nullptr && width != 3) throw Error("normals are of points");
+  if (normals != nullptr && width != 3) throw Error("normals need values of 3 components");
   return with_width(width, [&](auto n) {
     using V = Values<decltype(n)::value>;
     return refiner_->with_scheme([&](auto scheme) {

@@ -13,21 +13,23 @@
 namespace wavecomb {
 namespace {
 
-/// Points, corners or faces that one task takes.
+/// Elements per task.
 constexpr size_t kBand = 16384;
 
-/// A surface on its way to triangles. Corners are in the order of `faces`.
+/// A surface before its triangulation. Corner arrays follow the order of `faces`.
 struct Work {
   RefinedFaces faces;
-  std::vector<float> positions;   ///< 3 for each point
-  std::vector<uint32_t> sectors;  ///< normal of each corner
-  std::vector<float> normals;     ///< 3 for each normal
-  std::vector<float> uvs;         ///< 2 for each value
-  std::vector<uint32_t> uv_at;    ///< value of each corner; empty: no coordinates
+  std::vector<float> positions;   ///< 3 per vertex
+  std::vector<uint32_t> sectors;  ///< index of the normal of each corner
+  std::vector<float> normals;     ///< 3 per normal
+  std::vector<float> uvs;         ///< 2 per texture coordinate
+  std::vector<uint32_t> uv_at;    ///< index into uvs of each corner; empty without texture
+                                  ///< coordinates
 };
 
-/// Which normals are sums over faces, as places in a list of sums; ~0: the limit's own is known.
-/// That is where `work.normals` has one that is not 0, for the points that have one normal.
+/// Determines which normals are computed as sums over faces. Returns their index in the list of
+/// sums, or ~0 if the limit normal is known. It is known if it is non-zero in `work.normals` and
+/// the vertex has a single normal.
 std::vector<uint32_t> sum_places(const Work& work, size_t normal_count, size_t& sum_count) {
   const size_t known = work.normals.size() / 3, points = work.faces.vertex_count;
   std::vector<uint32_t> places(normal_count, ~0u);
@@ -42,8 +44,8 @@ std::vector<uint32_t> sum_places(const Work& work, size_t normal_count, size_t& 
   return places;
 }
 
-/// Sums over corners in their order: calls f(corner, first, end) for all of them, on each thread
-/// for its own range of the `count` things that are summed up.
+/// Calls f(corner, first, end) for all corners in order. Each thread handles a separate range
+/// [first, end) of the `count` accumulators, so sums do not depend on the number of threads.
 template <typename F>
 void each_corner(size_t corners, size_t count, F&& f) {
   const size_t share = std::max(kBand, (count + loop_threads() - 1) / loop_threads());
@@ -52,8 +54,9 @@ void each_corner(size_t corners, size_t count, F&& f) {
   });
 }
 
-/// Normals at the limit: those that `work` has where a point has one, else of the faces in its
-/// sector: the sum of the normals at its corners there, times twice the areas of the corners.
+/// Computes normals. A vertex with a single normal keeps the limit normal in `work` if it is not 0.
+/// Other normals are the normalised sum of the area-weighted corner normals of the faces in their
+/// sector.
 void set_normals(Work& work, size_t normal_count) {
   size_t sum_count = 0;
   const std::vector<uint32_t> places = sum_places(work, normal_count, sum_count);
@@ -76,7 +79,7 @@ void set_normals(Work& work, size_t normal_count) {
   });
 }
 
-/// Moves the points along their normals.
+/// Moves vertices along their normals by the mean displacement of the adjacent corners.
 void displace(Work& work, const SurfaceDesc& desc) {
   const size_t points = work.faces.vertex_count;
   std::vector<double> moves(points, 0.0), counts(points, 0.0);
@@ -104,12 +107,12 @@ void displace(Work& work, const SurfaceDesc& desc) {
   });
 }
 
-/// Takes points and normals through desc.matrix, in double precision.
+/// Transforms points and normals by desc.matrix, in double precision.
 void place(Work& work, const SurfaceDesc& desc, bool& mirrored) {
   const std::array<double, 16>& m = desc.matrix;
   const Point x{m[0], m[1], m[2]}, y{m[4], m[5], m[6]}, z{m[8], m[9], m[10]},
       t{m[12], m[13], m[14]};
-  // Rows of the cofactor matrix: det M times its inverse transpose.
+  // Rows of the cofactor matrix: det(M) times the inverse transpose.
   const Point cx = cross_of(y, z), cy = cross_of(z, x), cz = cross_of(x, y);
   mirrored = dot_of(x, cx) < 0;
   const double side = (mirrored ? -1 : 1) * (desc.left_handed ? -1 : 1);
@@ -132,13 +135,13 @@ double distance2(const std::vector<float>& positions, uint32_t a, uint32_t b) {
   return dot_of(d, d);
 }
 
-/// The triangles, with a point for each pair of normal and texture coordinate. `origins`, if given,
-/// gets the corner of `work` that each of theirs came from.
+/// Writes the triangles, with a point for each combination of normal and texture coordinate. If not
+/// null, `origins` receives the corner of `work` that each triangle corner came from.
 void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32_t>* origins) {
   const uint32_t k = work.faces.size;
   const size_t corners = work.faces.corners.size();
   constexpr uint32_t kEnd = ~0u;
-  // Points that were made of each normal so far, as lists.
+  // Linked list per normal of the points created so far.
   std::vector<uint32_t> first(work.normals.size() / 3, kEnd), next, point, uv_of, normal_of;
   std::vector<uint32_t> ids(corners);
   for (size_t c = 0; c < corners; ++c) {
@@ -146,7 +149,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
     uint32_t* link = &first[work.sectors[c]];
     while (*link != kEnd && uv_of[*link] != uv) link = &next[*link];
     if (*link == kEnd) {
-      // The link may lie in `next`, which grows here.
+      // `link` may point into `next`, which is resized below.
       const auto id = static_cast<uint32_t>(point.size());
       *link = id;
       next.push_back(kEnd);
@@ -188,7 +191,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
         continue;
       }
       const uint32_t* q = &work.faces.corners[at];
-      // The shorter diagonal, where it is shorter by more than rounding.
+      // Use the shorter diagonal, with a tolerance for rounding.
       const bool is_other =
           distance2(work.positions, q[1], q[3]) < 0.98 * distance2(work.positions, q[0], q[2]);
       set(2 * f, at, {0, 1, is_other ? 3u : 2u});
@@ -197,7 +200,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
   });
 }
 
-/// A primvar on the refined faces: values and the value of each corner.
+/// Primvar on the refined faces: values and the index for each corner.
 struct Spread {
   std::vector<float> values;
   std::vector<uint32_t> at;
@@ -219,7 +222,7 @@ Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
   return {};
 }
 
-/// The same of polygons, which are triangles.
+/// Spreads a primvar over polygons at level 0, which are triangulated already.
 Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces) {
   Spread out{{primvar.values.begin(), primvar.values.end()}, faces.corners};
   if (primvar.kind == PrimvarKind::kFaceVarying) std::iota(out.at.begin(), out.at.end(), 0u);
@@ -229,7 +232,8 @@ Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces)
   return out;
 }
 
-/// A primvar on the triangles, whose corners are those of refined faces that `origins` names.
+/// Moves a primvar to the triangles. `origins` holds the corner of the refined faces for each
+/// triangle corner.
 SurfaceValues on_triangles(const Spread& spread, uint32_t width,
                            const std::vector<uint32_t>& origins, const SurfaceMesh& mesh) {
   SurfaceValues out;
@@ -262,13 +266,13 @@ void check_displacement(const SurfaceDesc& desc) {
   if (desc.displacements.empty()) return;
   if (!desc.face_displacement.empty() &&
       desc.face_displacement.size() != desc.cage.face_sizes.size())
-    throw Error("its faces do not have a displacement each");
+    throw Error("its faces and their displacement indices differ in number");
   for (const int32_t which : desc.face_displacement)
     if (which >= static_cast<int32_t>(desc.displacements.size()))
-      throw Error("a face has a displacement that is not there");
+      throw Error("a face refers to a displacement that does not exist");
 }
 
-/// The corners of polygons, which are there already.
+/// Prepares polygons that are displaced but not subdivided.
 Work polygons(const SurfaceDesc& desc) {
   Work work;
   work.faces.size = 3;
@@ -276,11 +280,12 @@ Work polygons(const SurfaceDesc& desc) {
   work.faces.corners.assign(desc.triangles.begin(), desc.triangles.end());
   work.faces.base.assign(desc.triangle_faces.begin(), desc.triangle_faces.end());
   for (const uint32_t p : work.faces.corners)
-    if (p >= desc.cage.vertex_count) throw Error("a face names a point that is not there");
+    if (p >= desc.cage.vertex_count) throw Error("a face refers to a point that does not exist");
   for (const uint32_t f : work.faces.base)
-    if (f >= desc.cage.face_sizes.size()) throw Error("a triangle is of a face that is not there");
+    if (f >= desc.cage.face_sizes.size())
+      throw Error("a triangle refers to a face that does not exist");
   if (work.faces.corners.size() != 3 * work.faces.base.size())
-    throw Error("its triangles do not have a face each");
+    throw Error("its triangles and their face indices differ in number");
   work.positions.assign(desc.points.begin(), desc.points.end());
   work.sectors = work.faces.corners;
   work.uvs.assign(desc.uvs.values.begin(), desc.uvs.values.end());
@@ -291,7 +296,8 @@ Work polygons(const SurfaceDesc& desc) {
   if (!work.uv_at.empty() && work.uv_at.size() != work.faces.corners.size())
     throw Error("a face-varying primvar has the wrong number of values");
   for (const uint32_t i : work.uv_at)
-    if (i >= work.uvs.size() / 2) throw Error("a texture coordinate is not there");
+    if (i >= work.uvs.size() / 2)
+      throw Error("a corner refers to a texture coordinate that does not exist");
   set_normals(work, work.faces.vertex_count);
   return work;
 }
@@ -311,7 +317,7 @@ float Displacement::at(float u, float v) const {
 
 SurfaceMesh make_surface(const SurfaceDesc& desc) {
   if (desc.points.size() != size_t{3} * desc.cage.vertex_count)
-    throw Error("its points are not triples");
+    throw Error("its points do not have three coordinates each");
   check_displacement(desc);
   SurfaceMesh mesh;
   Work work;
@@ -329,7 +335,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
     uint32_t count = 0;
     work.sectors = surface.normal_sectors(work.faces, count);
     normal_count = count;
-    // Points by all threads, texture coordinates by one of them.
+    // Threads share the evaluation of points; one of them evaluates the texture coordinates.
     parallel_bands(2, 1, [&](size_t task, size_t) {
       if (task == 0) {
         Spread uvs = spread(desc.uvs, surface, work.faces);
@@ -337,7 +343,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
         work.uv_at = std::move(uvs.at);
         return;
       }
-      // The limit of a bilinear surface has no derivatives of its own at points.
+      // A bilinear limit surface has no derivatives at vertices.
       const bool has_normals = desc.cage.scheme != Scheme::kBilinear;
       work.positions = surface.vertex(desc.points, 3, has_normals ? &work.normals : nullptr);
     });
@@ -345,7 +351,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
       primvars[i] = spread(desc.primvars[i], surface, work.faces);
     });
   }
-  // OpenSubdiv's tables are gone by now.
+  // The scope above has released OpenSubdiv's tables.
   if (desc.level > 0) set_normals(work, normal_count);
   if (!desc.displacements.empty()) {
     displace(work, desc);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A subdivision surface, or displaced polygons, as a triangle mesh.
+/// Conversion of subdivision surfaces and displaced polygons to triangle meshes.
 #pragma once
 
 #include <array>
@@ -12,68 +12,71 @@
 
 namespace wavecomb {
 
-/// How far points move along their normals: a constant, or a texture where there is one.
+/// Displacement along the normal: a texture if there is one, else a constant.
 struct Displacement {
   float constant = 0;
   TextureUse use;
   const TextureView* texture = nullptr;
 
-  /// At texture coordinates of the mesh.
+  /// Returns the distance at texture coordinates (u, v) of the mesh.
   float at(float u, float v) const;
 };
 
-/// Where the values of a primvar are.
+/// Interpolation of a primvar.
 enum class PrimvarKind : uint8_t { kNone, kVertex, kVarying, kFaceVarying };
 
 struct SurfacePrimvar {
   PrimvarKind kind = PrimvarKind::kNone;
-  /// (points, width), or of its channel; face-varying ones at level 0, but for uvs: (triangles, 3,
-  /// width).
+  /// (points, width), or (values of the channel, width). At level 0, face-varying values other than
+  /// uvs are (triangles, 3, width).
   std::span<const float> values;
   uint32_t width = 1;
-  uint32_t channel = 0;  ///< of Cage::channels, where it is face-varying
+  uint32_t channel = 0;  ///< index into Cage::channels if face-varying
 };
 
-/// What a surface is made from. Arrays are the caller's.
+/// Input of make_surface. The caller owns the arrays.
 struct SurfaceDesc {
   Cage cage;
-  std::span<const float> points;  ///< 3 for each point of the cage
-  /// 0: no subdivision, the triangles below; only for polygons that are displaced.
+  std::span<const float> points;  ///< 3 per point of the cage
+  /// 0: no subdivision; displaces the triangles below.
   uint32_t level = 1;
-  std::span<const uint32_t> triangles;         ///< level 0: 3 points each
-  std::span<const uint32_t> triangle_faces;    ///< level 0: their faces
-  std::span<const uint32_t> triangle_corners;  ///< level 0: 3 each, of the face-varying values
+  std::span<const uint32_t> triangles;         ///< level 0: 3 points per triangle
+  std::span<const uint32_t> triangle_faces;    ///< level 0: cage face of each triangle
+  std::span<const uint32_t> triangle_corners;  ///< level 0: 3 indices of face-varying values per
+                                               ///< triangle
   SurfacePrimvar uvs;
   std::vector<SurfacePrimvar> primvars;
   std::vector<Displacement> displacements;
-  /// Of each face of the cage, an index into displacements or -1; empty: all have the first.
+  /// For each face of the cage an index into displacements, or -1 for none. Empty: all faces use
+  /// the first displacement.
   std::span<const int32_t> face_displacement;
-  /// From the cage's space to the mesh's, row vectors: p' = p M.
+  /// Transform from cage to mesh space, for row vectors: p' = p M.
   std::array<double, 16> matrix{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   bool left_handed = false;
 };
 
-/// Values of a primvar on triangles: (points, width), or (triangles, 3, width) where corners of a
-/// point differ.
+/// Values of a primvar on triangles: (points, width), or with per_corner (triangles, 3, width)
+/// because corners at a point differ.
 struct SurfaceValues {
   std::vector<float> values;
   bool per_corner = false;
 };
 
-/// Triangles with values per point: where a normal or a texture coordinate differs between faces,
-/// the point is there once for each, at the same place bit for bit.
+/// Triangle mesh with values per point. A vertex is duplicated, with bitwise equal positions, where
+/// normals or texture coordinates differ between faces.
 struct SurfaceMesh {
-  std::vector<float> positions, normals, uvs;  ///< 3, 3, 2 for each point; uvs may be empty
-  std::vector<uint32_t> triangles;             ///< counter-clockwise from outside
-  std::vector<uint32_t> faces;                 ///< face of the cage of each triangle
+  std::vector<float> positions, normals, uvs;  ///< 3, 3 and 2 per point; uvs may be empty
+  std::vector<uint32_t> triangles;             ///< 3 points per triangle, counter-clockwise seen
+                                               ///< from outside
+  std::vector<uint32_t> faces;                 ///< cage face of each triangle
   std::vector<SurfaceValues> primvars;         ///< one for each of SurfaceDesc::primvars
   bool is_manifold = true;
 };
 
-/// Makes the triangles. Points lie on the limit surface, and normals are the limit's; displaced
-/// points lie off it, along its normals, by the mean of what the faces around them say, so that no
-/// seam of texture coordinates or materials opens; normals are then those of the displaced
-/// triangles. Throws Error, one line, where the cage is no good.
+/// Triangulates the surface. Points lie on the limit surface and have its normals. Displaced points
+/// move along the limit normal by the mean displacement of the adjacent faces, so no gaps open at
+/// seams of texture coordinates or materials; their normals are those of the displaced triangles.
+/// Throws Error with a one-line description if the input is invalid.
 SurfaceMesh make_surface(const SurfaceDesc& desc);
 
 }  // namespace wavecomb

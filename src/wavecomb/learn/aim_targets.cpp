@@ -11,14 +11,14 @@
 namespace wavecomb {
 namespace {
 
-/// Of paths that start as their lights alone would have it: who finds what no path has met yet, and
-/// what keeps weights bounded.
+/// Fraction of light paths that start unaimed. They reach surfaces that no training path has hit
+/// and keep the weights of aimed paths bounded.
 constexpr float kEvenShare = 0.25f;
-/// Places that a sphere has at least, and candidates of a cut along an axis.
+/// Minimum number of training samples per sphere, and number of candidate split cells per axis.
 constexpr uint32_t kLeastLessons = 4, kCuts = 16;
-/// Least radius of a sphere over that of the scene, and largest.
+/// Range of sphere radii, relative to the radius of the scene.
 constexpr double kLeastRadius = 0x1p-12, kMostRadius = 1;
-/// What a cut must gain, of the whole worth.
+/// Minimum likelihood gain of a split, relative to the total contribution.
 constexpr double kLeastCutGain = 0.01;
 
 using Place = std::array<float, 3>;
@@ -27,7 +27,7 @@ Place place_of(const AimLesson& lesson) {
   return {lesson.x, lesson.y, lesson.z};
 }
 
-/// Lessons as a whole.
+/// Bounding box, total contribution and number of a set of training samples.
 struct Heap {
   Place lo{}, hi{};
   double worth = 0;
@@ -44,14 +44,15 @@ struct Heap {
   void add(const Heap& other) {
     if (other.count > 0) add(other.lo, other.hi, other.worth, other.count);
   }
-  /// Of the sphere around the box, with room for what so few places do not show.
+  /// Radius of the sphere around the box, enlarged by 1 + 1 / sqrt(count) because few samples
+  /// underestimate the extent.
   double radius(double scene) const {
     double square = 0;
     for (size_t a = 0; a < 3; ++a) square += 0.25 * std::pow(double{hi[a]} - double{lo[a]}, 2);
     const double room = 1 + 1 / std::sqrt(static_cast<double>(std::max(count, 1u)));
     return std::clamp(std::sqrt(square) * room, kLeastRadius * scene, kMostRadius * scene);
   }
-  /// W log(W / A).
+  /// Log-likelihood of the set, up to a constant: W log(W / A) with A = r^2.
   double likelihood(double scene) const {
     return worth > 0 ? worth * (std::log(worth) - 2 * std::log(radius(scene))) : 0;
   }
@@ -69,14 +70,15 @@ struct Piece {
   Cut cut;
 };
 
-/// The cell of a place along an axis of a box.
+/// Returns the index of the split cell, of kCuts along `axis` of `box`, that contains `at`.
 uint32_t cut_cell(const Heap& box, size_t axis, float at) {
   const float wide = box.hi[axis] - box.lo[axis];
   const float share = wide > 0 ? (at - box.lo[axis]) / wide : 0;
   return std::min(static_cast<uint32_t>(share * static_cast<float>(kCuts)), kCuts - 1);
 }
 
-/// The best cut of a piece across its box.
+/// Finds the axis-aligned split of `whole` that gains most likelihood; a gain of 0 means that there
+/// is none.
 Cut best_cut(std::span<const AimLesson> lessons, const Heap& whole, double scene) {
   Cut best;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -86,7 +88,7 @@ Cut best_cut(std::span<const AimLesson> lessons, const Heap& whole, double scene
       const Place p = place_of(lesson);
       cells[cut_cell(whole, axis, p[axis])].add(p, p, double{lesson.worth}, 1);
     }
-    std::array<Heap, kCuts> above;  // of the cells from there on
+    std::array<Heap, kCuts> above;  // sums of cells i and higher
     Heap sum;
     for (size_t i = kCuts; i-- > 0;) {
       sum.add(cells[i]);
@@ -113,7 +115,7 @@ Piece make_piece(std::span<const AimLesson> all, size_t begin, size_t end, doubl
   return piece;
 }
 
-/// All that are worth something, in pieces.
+/// Splits the samples greedily, the largest gain first, into at most LightAim::kMost pieces.
 std::vector<Piece> cut_up(std::vector<AimLesson>& all, double scene) {
   std::vector<Piece> pieces{make_piece(all, 0, all.size(), scene)};
   const double least = kLeastCutGain * pieces[0].heap.worth;

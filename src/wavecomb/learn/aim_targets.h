@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where paths from lights should be aimed, by what some of them brought to the picture.
+/// Fits the spheres that light paths are aimed at to training light paths.
 #pragma once
 
 #include <span>
@@ -8,20 +8,23 @@
 
 namespace wavecomb {
 
-/// Of a path from a light: the first place it met, and the luminance that it brought after a bounce
-/// at least. What its first vertex shows to the camera, light samples find as well.
+/// Training sample of a light path: its first hit, and the luminance that it contributes to the
+/// image from its second vertex on. The contribution of the first vertex is not counted, because
+/// light samples find it as well.
 struct AimLesson {
   float x = 0, y = 0, z = 0;
   float worth = 0;
 };
 
-/// Spheres around the places that were worth something: boxes are halved as long as that makes the
-/// worth denser, the one that gains most first. With W_k the worth of a box and A_k = r_k^2, a
-/// mixture that chooses sphere k by W_k and is even within it is, over the same of one sphere, more
-/// dense where light comes from by the exponential of
+/// Fits spheres around the first hits of light paths that contribute to the image. Bounding boxes
+/// are split as long as that increases the likelihood, the largest gain first.
+///
+/// With W_k the contribution in box k and A_k = r_k^2, the mixture chooses sphere k with a
+/// probability proportional to W_k and is uniform within it. Compared with a single sphere, its
+/// log-likelihood is higher by
 ///   sum_k W_k log(W_k / A_k) - W log(W / A),
-/// which is what halving is to add to: the maximum of likelihood. `scene_radius`: of the sphere
-/// around all surfaces. Without any worth there are none.
+/// which the splits maximise. `scene_radius` is the radius of the bounding sphere of all surfaces.
+/// Returns no spheres if fewer than four samples contribute.
 LightAim aim_targets(std::span<const AimLesson> lessons, float scene_radius);
 
 }  // namespace wavecomb

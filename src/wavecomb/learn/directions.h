@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Directions as points of the unit square, by a map that keeps areas: bins of the square are bins
-/// of equal solid angle.
+/// Equal-area map between directions and the unit square: equal bins of the square cover equal
+/// solid angles.
 ///
-/// P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008: the
-/// square as a folded octahedron. With a = 2u - 1, b = 2v - 1, d = 1 - |a| - |b|, r = 1 - |d|:
+/// P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008. The
+/// square is a folded octahedron. With a = 2u - 1, b = 2v - 1, d = 1 - |a| - |b|, r = 1 - |d|:
 ///   z = sign(d) (1 - r^2),   phi = (pi / 4) ((|b| - |a|) / r + 1),
 ///   x = sign(a) r sqrt(2 - r^2) cos(phi),   y = sign(b) r sqrt(2 - r^2) sin(phi).
 #pragma once
@@ -13,7 +13,7 @@
 
 namespace wavecomb {
 
-/// The direction of a point of the unit square.
+/// Maps the point (u, v) of the unit square to a unit vector.
 template <typename F>
 inline Vec3<F> octahedral_direction(const F& u, const F& v) {
   const F a = fma(u, F(2.f), F(-1.f)), b = fma(v, F(2.f), F(-1.f));
@@ -27,11 +27,11 @@ inline Vec3<F> octahedral_direction(const F& u, const F& v) {
           copysign(F(1.f - r2), d)};
 }
 
-/// The point of a unit vector, in [0, 1]: the inverse of octahedral_direction.
+/// Maps a unit vector to the unit square [0, 1]^2: the inverse of octahedral_direction.
 template <typename F>
 inline Vec2<F> octahedral_point(const Vec3<F>& w) {
   const F r = safe_sqrt(F(1.f - abs(w.z)));
-  // phi over pi / 2, in [0, 1].
+  // phi divided by pi / 2, in [0, 1]
   const F turn = atan2(abs(w.y), abs(w.x)) * (2.f * kInvPi);
   F b = turn * r, a = r - b;
   const Mask<F> below = w.z < 0.f;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Looking up and sampling the field that guides bounces. Bodies are in guide.inl.
+/// Lookup and sampling of the guiding field. The definitions are in guide.inl.
 ///
-/// A bounce is sampled by the BSDF with probability a and by the field with 1 - a, and whichever
-/// gave a direction, its density is that of the mixture:
+/// The BSDF samples a bounce with probability a, the guiding field with 1 - a. Either way the
+/// density of the direction is that of the mixture:
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi)
 /// (one-sample model with the balance heuristic, Veach 1997, 9.2.4; path guiding: Vorba et al.
-/// 2014, Mueller et al. 2017). p_guide is constant in each of 1,024 bins of equal solid angle, of
-/// directions from the middle of a region (guide_sphere.h).
+/// 2014, Mueller et al. 2017). p_guide is constant in each of kGuideBins bins of equal solid angle.
+/// The bins are directions from the centre of a region (guide_sphere.h).
 #pragma once
 
 #include "wavecomb/core/lanes.h"
@@ -15,19 +15,20 @@
 
 namespace wavecomb {
 
-/// Where a vertex is in the field.
+/// Result of a lookup: the region of a vertex in the guiding field.
 template <typename F>
 struct GuidePlace {
-  UInt<F> axis{0u};  ///< which way its surface faces: of kGuideAxes
+  UInt<F> axis{0u};  ///< direction that the surface faces, see guide_axis
   UInt<F> region{kNoGuideRegion};
-  Vec3<F> offset{F(0.f), F(0.f), F(0.f)};  ///< in the region's sphere
-  F bsdf_share{1.f};                       ///< a; 1: not guided
+  Vec3<F> offset{F(0.f), F(0.f), F(0.f)};  ///< position relative to the region's sphere, see
+                                           ///< sphere_offset
+  F bsdf_share{1.f};                       ///< a; 1 means: not guided
   F survival{0.f};                         ///< GuideView::survival
   Mask<F> known{false};                    ///< lanes with a region
   Mask<F> guided{false};                   ///< lanes with a < 1
 };
 
-/// Which way `n` faces most: 2 i, or 2 i + 1 where component i is below 0.
+/// Returns the axis direction closest to `n`: 2 i, or 2 i + 1 if component i is negative.
 template <typename F>
 inline UInt<F> guide_axis(const Vec3<F>& n) {
   using U = UInt<F>;
@@ -38,23 +39,24 @@ inline UInt<F> guide_axis(const Vec3<F>& n) {
   return axis + select(Mask<U>(along < 0.f), U(1u), U(0u));
 }
 
-/// The place of a surface at p that faces `axis` on the side that it is seen from.
+/// Finds the region of a shading point at p. `axis` is the guide_axis of the normal on the viewer's
+/// side. The region is kNoGuideRegion where the field has no training samples.
 template <typename F>
 [[gnu::noinline]] GuidePlace<F> find_guide(const GuideView& guide, const Vec3<F>& p,
                                            const UInt<F>& axis, const UInt<F>& material,
                                            const Mask<F>& active);
 
-/// Density over solid angle with which sample_guide gives the world's unit vector w.
+/// Density, per solid angle, with which sample_guide returns the world-space unit vector w.
 template <typename F>
 [[gnu::noinline]] F guide_pdf(const GuideView& guide, const GuidePlace<F>& place, const Vec3<F>& w,
                               const Mask<F>& active);
 
-/// A direction by the field, in world space, for two numbers in [0, 1).
+/// Samples a direction in world space from the region's distribution; u and v are in [0, 1).
 template <typename F>
 [[gnu::noinline]] Vec3<F> sample_guide(const GuideView& guide, const GuidePlace<F>& place,
                                        const F& u, const F& v, const Mask<F>& active);
 
-/// One over the brightness of the picture at pixel (x, y); 0: not known.
+/// Returns 1 / (brightness of the image around pixel (x, y)), or 0 if it is not known.
 template <typename F>
 inline F picture_importance(const GuideView& guide, const F& x, const F& y, const Mask<F>& active) {
   using U = UInt<F>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of guide.h, for the units that instantiate them.
+/// Definitions for guide.h. Include this file only where the templates are instantiated.
 #pragma once
 
 #include "wavecomb/learn/guide.h"
@@ -8,7 +8,7 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Steps of 2^-kGuideBits of the grid along an axis.
+/// Converts a coordinate to grid steps, of which there are 2^kGuideBits per axis.
 template <typename F>
 inline UInt<F> guide_steps(const F& p, float lo, float scale) {
   constexpr auto most = static_cast<float>((1u << kGuideBits) - 1);
@@ -16,7 +16,7 @@ inline UInt<F> guide_steps(const F& p, float lo, float scale) {
   return UInt<F>(to_int<F>(clamp(select(is_finite(at), at, F(0.f)), F(0.f), F(most))));
 }
 
-/// The cell of a place in steps of the grid.
+/// Finds the cell that contains the grid position (x, y, z).
 template <typename F>
 inline UInt<F> guide_cell(const GuideView& guide, const UInt<F>& x, const UInt<F>& y,
                           const UInt<F>& z, const Mask<F>& active) {
@@ -38,7 +38,8 @@ inline UInt<F> guide_cell(const GuideView& guide, const UInt<F>& x, const UInt<F
   return entry & (kGuideCell - 1);
 }
 
-/// The bin of 16 in the words from `first` on whose numbers have k among them, and its word.
+/// Entry of a cumulative row that contains sample value k: its bin and its 32-bit word. The row
+/// starts at tables[first] and has kGuideSide bins.
 template <typename F>
 struct GuideBin {
   UInt<F> bin, word;
@@ -59,7 +60,7 @@ inline GuideBin<F> find_guide_bin(const uint32_t* tables, const UInt<F>& first, 
   return {bin, word};
 }
 
-/// Where number u x 65536 lies among a bin's numbers, in [0, 1).
+/// Position of a sample value (u x 65536) within its bin, in [0, 1).
 template <typename F>
 inline F place_in_bin(const F& numbers, const UInt<F>& word) {
   const F start = F(Int<F>(word & 0xffffu)), count = F(Int<F>(word >> 16));

@@ -12,11 +12,11 @@
 namespace wavecomb {
 namespace {
 
-/// One over the radii that are tried, to one over the mean distance (the harmonic one).
+/// Candidates for the inverse radius, relative to the inverse of the harmonic mean distance.
 constexpr std::array<float, 4> kNearnesses = {0.f, 0.5f, 1.f, 1.5f};
-/// Bounces that try them.
+/// Number of bounces with which the candidates are compared.
 constexpr size_t kTried = 2048;
-/// Deviation of the blur, in radians, and how many of them it reaches.
+/// Standard deviation of the blur in radians, and its cutoff in standard deviations.
 constexpr double kBlur = 0.09, kBlurReach = 3;
 
 Vec3<float> vector_of(const float (&v)[3]) {
@@ -34,7 +34,8 @@ uint32_t bin_of(const TrainingRecord& r, const GuideSphere& sphere) {
   return step(at.y) * kGuideSide + step(at.x);
 }
 
-/// The middle, and one over the mean distance of what bounces met, as their light weighs it.
+/// Computes the mean position of the bounces and the mean inverse distance of their hits, weighted
+/// by contribution. No bounce has a weight above `cut`.
 GuideSphere sphere_of(Bounces bounces, double cut) {
   double middle[3] = {}, nearness = 0, weight = 0;
   for (const TrainingRecord* r : bounces) {
@@ -65,7 +66,7 @@ double farthest(Bounces bounces, const GuideSphere& sphere) {
   return std::sqrt(most);
 }
 
-/// For each bin those that its weight goes to, and the shares of it.
+/// For each bin, the bins that receive its weight after the blur, with their fractions.
 using Blur = std::array<std::vector<std::pair<uint32_t, double>>, kGuideBins>;
 
 Blur make_blur() {

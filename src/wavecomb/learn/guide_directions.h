@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where a region's light comes from, as its bounces tell.
+/// Distribution of incident directions of a region, estimated from its training bounces.
 #pragma once
 
 #include <array>
@@ -13,26 +13,28 @@
 
 namespace wavecomb {
 
-/// Weights of bins, row by row of the square of directions from the middle.
+/// Weights of direction bins, row by row of the equal-area square (directions.h).
 using DirectionBins = std::array<double, kGuideBins>;
-/// The middle of a bin.
+/// Returns the unit vector at the centre of a bin.
 Vec3<float> bin_direction(uint32_t bin);
 
 using Bounces = std::span<const TrainingRecord* const>;
 
-/// The sphere by which bounces of a region agree best on where light comes from: about the mean of
-/// their places, and of the radius, of a few, by which the sum of squares of what the bins have is
-/// greatest. How far bounces went says what to try: openings are nearer than what is seen
-/// through them. No bounce counts for more than `cut`.
+/// Fits the sphere on which the incident light of a region is assumed to lie. Its centre is the
+/// mean position of the bounces. Its radius is the candidate whose direction bins have the largest
+/// sum of squares, that is, the most concentrated distribution. Candidates are multiples of the
+/// mean hit distance, because an opening is nearer than what is seen through it. The value of each
+/// bounce is clamped to `cut`.
 GuideSphere fit_sphere(Bounces bounces, double cut);
 
-/// `count` of the bounces, evenly spread.
+/// Returns `count` of the bounces at equal index intervals, or all if there are fewer.
 std::vector<const TrainingRecord*> some_bounces(Bounces bounces, size_t count);
 
-/// What bounces bring by the direction that they take, seen from the middle of `sphere`.
+/// Sums the values of bounces, clamped to `cut`, by their direction as seen from the centre of
+/// `sphere`.
 DirectionBins direction_bins(Bounces bounces, const GuideSphere& sphere, double cut);
 
-/// The bins blurred by some 5 degrees, which a region's hundreds of bounces are too few to tell.
+/// Blurs the bins by about 5 degrees, since a few hundred bounces per region leave gaps.
 DirectionBins smoothed(const DirectionBins& bins);
 
 }  // namespace wavecomb

@@ -15,17 +15,17 @@
 namespace wavecomb {
 namespace {
 
-/// A cell with more records is divided.
+/// Cells with more records are divided.
 constexpr size_t kCellRecords = 2048;
-/// Records with which a region has a distribution of its own.
+/// Minimum number of records for a region to get a separate distribution.
 constexpr double kOwnRecords = 64;
-/// Records that tell directions, of more in a cell that is divided.
+/// Maximum number of records from which the directions of a cell are computed.
 constexpr size_t kDirections = 8192;
-/// How many records the distribution of the cell above counts for, in directions and in shares.
+/// Weight of the parent cell's distribution and moments, in records.
 constexpr double kPrior = 64;
-/// Records of a material that restrict how much it is guided.
+/// Minimum number of records of a material before it limits guiding.
 constexpr double kMaterialRecords = 512;
-/// Share of the BSDF before there is anything to weigh it by.
+/// Fraction of bounces sampled by the BSDF in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
 
 uint32_t code_of(const GuideGrid& grid, const float (&p)[3]) {
@@ -34,7 +34,7 @@ uint32_t code_of(const GuideGrid& grid, const float (&p)[3]) {
   return morton_3(step[0], step[1], step[2]);
 }
 
-/// Every third bit of a Morton code, gathered.
+/// Extracts every third bit of a Morton code, starting with the lowest.
 uint32_t compact_bits_3(uint32_t x) {
   uint32_t out = 0;
   for (uint32_t i = 0; i < kGuideBits; ++i) out |= (x >> (3 * i) & 1u) << i;
@@ -51,7 +51,7 @@ GuideGrid::GuideGrid(const float (&low)[3], const float (&high)[3]) {
   }
 }
 
-/// Divides space and makes the regions, from the whole down.
+/// Builds the octree from the root down and creates the regions.
 class GuideFieldBuilder {
  public:
   GuideFieldBuilder(GuideField& field, std::span<const TrainingRecord> records, size_t materials,
@@ -95,13 +95,13 @@ class GuideFieldBuilder {
   }
 
  private:
-  /// What the records of a cell that face one way say.
+  /// Statistics of the records of one cell whose surfaces face one axis.
   struct RegionPart {
-    DirectionBins density{};  ///< its sum is 1, or 0 where nothing is known
+    DirectionBins density{};  ///< sums to 1, or 0 if nothing is known
     double count = 0;
-    GuideSphere sphere;  ///< that the directions of `density` are of
+    GuideSphere sphere;  ///< centre of the directions of `density`
     ShareMoments moments;
-    uint32_t region = kNoGuideRegion;  ///< once it is made
+    uint32_t region = kNoGuideRegion;  ///< once created
   };
   using Cell = std::array<RegionPart, kGuideAxes>;
 
@@ -118,14 +118,15 @@ class GuideFieldBuilder {
         parts_.material_share[m] = kBsdfShares[moments[m].best()];
   }
 
-  /// No value counts for more: of n, root n means, so that none outweighs all others.
+  /// Returns the clamp for values: sqrt(n) times the mean of n values, so that no single one
+  /// dominates.
   static double largest(std::span<const TrainingRecord> records) {
     double sum = 0;
     for (const TrainingRecord& r : records) sum += double{r.value};
     return records.empty() ? 0 : sum / std::sqrt(static_cast<double>(records.size()));
   }
 
-  /// What records [begin, end) say, leaning on the cell above.
+  /// Computes the statistics of records [begin, end), blended with those of the parent cell.
   void read(uint32_t depth, size_t begin, size_t end) {
     Cell& cell = levels_[depth];
     const std::span here = std::span(records_).subspan(begin, end - begin);
@@ -156,7 +157,8 @@ class GuideFieldBuilder {
     }
   }
 
-  /// The region of a part; of the cell above where too little is known. kNoGuideRegion: none.
+  /// Returns the region of a cell and axis. Too few records: the region of the nearest ancestor
+  /// with enough, or kNoGuideRegion.
   uint32_t region_of(uint32_t depth, uint32_t axis) {
     RegionPart& part = levels_[depth][axis];
     if (part.count < kOwnRecords) return depth > 0 ? region_of(depth - 1, axis) : kNoGuideRegion;
@@ -173,7 +175,8 @@ class GuideFieldBuilder {
     return part.region;
   }
 
-  /// Octree: the node of `depth` whose codes begin as `code` does; its records are [begin, end).
+  /// Processes the octree node of `depth` whose Morton codes share the prefix of `code`. Its
+  /// records are [begin, end).
   void divide(uint32_t depth, uint32_t code, size_t begin, size_t end) {
     read(depth, begin, end);
     if (end - begin <= cell_records_ || depth == kGuideBits) {
@@ -219,7 +222,7 @@ class GuideFieldBuilder {
     }
   }
 
-  /// Writes `entry` to all of the grid that the node covers.
+  /// Writes `entry` to all grid entries that the node covers.
   void fill(uint32_t depth, uint32_t code, uint32_t entry) {
     const uint32_t x = compact_bits_3(code), y = compact_bits_3(code >> 1),
                    z = compact_bits_3(code >> 2);
@@ -251,14 +254,14 @@ class GuideFieldBuilder {
   }
 
   GuideField& field_;
-  GuideParts& parts_;  ///< of the field
+  GuideParts& parts_;  ///< parts of field_
   bool first_, guides_;
-  std::vector<TrainingRecord> records_;  ///< in the order of their codes
-  std::vector<ShareRatios> ratios_;      ///< of the same; none in the first round
+  std::vector<TrainingRecord> records_;  ///< sorted by Morton code
+  std::vector<ShareRatios> ratios_;      ///< of records_; empty in the first round
   std::vector<uint32_t> codes_;
   size_t cell_records_ = kCellRecords;
-  std::array<std::vector<const TrainingRecord*>, kGuideAxes> by_axis_;  ///< of read()
-  std::array<Cell, kGuideBits + 1> levels_;  ///< from the whole down to where divide() is
+  std::array<std::vector<const TrainingRecord*>, kGuideAxes> by_axis_;  ///< scratch of read()
+  std::array<Cell, kGuideBits + 1> levels_;  ///< path from the root to the node in divide()
   double bring_ = 0, guided_ = 0, off_ = 0, on_ = 0;
 };
 
@@ -289,7 +292,7 @@ void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const Path
     double count = 0, value = 0, squared = 0, cost = 0;
   };
   const size_t regions = parts_.bsdf_share.size();
-  std::vector<Sums> sums(regions + 1);  // the last: of all
+  std::vector<Sums> sums(regions + 1);  // the last one: all regions
   parts_.survival.assign(regions, 0.f);
   const auto for_each = [&, v = view()](const auto& add) {
     for (const BounceLesson& lesson : lessons) {
@@ -307,7 +310,7 @@ void GuideField::weigh_bounces(std::span<const BounceLesson> lessons, const Path
     s.value += double{lesson.value};
     s.cost += double{lesson.cost};
   });
-  // As no bounce counts for more than root n mean ones.
+  // Clamp squares as values are clamped: no bounce counts for more than sqrt(n) times the mean.
   for_each([](Sums& s, const BounceLesson& lesson) {
     s.squared += std::min(double{lesson.squared}, s.value * s.value / s.count);
   });

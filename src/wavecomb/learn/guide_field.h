@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The field that guides bounces, made of what bounces have taught.
+/// The guiding field: incident light by region of space and direction, learned from training
+/// bounces.
 ///
-/// Cells are an octree over the bounds of the scene, divided where more than kCellRecords bounces
-/// brought light. A region's distribution is the mean of what came back by direction, over the
-/// bounces in its cell whose surfaces face its way; where those are few, it leans on the cells
-/// around: with n bounces and the distribution q of the cell above,
-///   p = (n p_own + kPrior q) / (n + kPrior).
+/// Cells are an octree over the bounds of the scene. A cell with more than kCellRecords
+/// contributing bounces is divided. A region is the part of a cell whose surfaces face one axis
+/// direction. Its distribution is the mean value of its bounces by direction. With few bounces it
+/// is blended with the distribution q of the parent cell:
+///   p = (n p_own + kPrior q) / (n + kPrior)   for n bounces.
 ///
-/// How many bounces of a region the BSDF samples follows from the second moment that mixtures
-/// would have had, estimated from the same bounces: with x what one brought (its pdf p, p_b by the
-/// BSDF, p_g by the field then),
-///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g)
-/// and a the share, of a few, whose S is least: 1 where guiding gains nothing.
+/// The fraction a of a region's bounces that the BSDF samples minimises the second moment of the
+/// mixture, estimated from the same bounces. For values x sampled with density p, and the densities
+/// p_b of the BSDF and p_g of the guiding field:
+///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g).
+/// The candidates for a are kBsdfShares; 1 is chosen where guiding does not help.
 ///
-/// All sums are in the order of the records, so that equal records make equal fields.
+/// Sums follow the order of the records, so equal records give bitwise equal fields.
 #pragma once
 
 #include <array>
@@ -29,39 +30,43 @@
 
 namespace wavecomb {
 
-/// The grid that cells lie in: over the scene's bounds.
+/// Grid of 2^kGuideBits steps per axis over the bounds of the scene.
 struct GuideGrid {
   float lo[3] = {}, scale[3] = {};
 
-  /// Corners of the bounds, lo <= hi.
+  /// Takes the corners of the bounds, low <= high.
   GuideGrid(const float (&low)[3], const float (&high)[3]);
 };
 
-/// Where a bounce begins: at p, on a surface that faces `axis`.
+/// Packs position and axis: the Morton code of the grid position of p, and in the lowest three bits
+/// the guide_axis of the surface.
 uint64_t bounce_place(const GuideGrid& grid, const Vec3<float>& p, uint32_t axis);
 
-/// What a field is, in numbers.
+/// Summary figures of a field.
 struct GuideFacts {
-  uint64_t records = 0;  ///< bounces that brought light
+  uint64_t records = 0;  ///< bounces that contribute light
   uint32_t cells = 0, regions = 0, guided_regions = 0;
-  /// Mean share of guided bounces, and what mixtures leave of the second moment of what bounces
-  /// bring; both weighted by what they bring to the picture.
+  /// Mean probability that the field samples a bounce, and second moment of the mixture relative to
+  /// that of the BSDF alone. Both are weighted by the contribution of bounces to the image.
   double guided_share = 0, moment_ratio = 1;
 };
 
 class GuideField {
  public:
-  /// A field that guides nothing, but tells which way surfaces face.
+  /// Creates an empty field. It guides nothing but defines the grid for bounce_place.
   explicit GuideField(const GuideGrid& grid) : grid_(grid) {}
-  /// The field that the records teach. `materials`: how many there are; `first`: records hold no
-  /// density of a field yet, so that each region is guided half the time. `most_bytes`: cells
-  /// stay larger where it would else take more.
+  /// Builds a field from training records. `materials` is the number of materials. `first` means:
+  /// the records hold no densities of a field yet, so each region is guided half of the time. With
+  /// `guides` false, all bounces are left to the BSDF. The cell size doubles until the field takes
+  /// at most `most_bytes` or cannot shrink further.
   GuideField(const GuideGrid& grid, std::span<const TrainingRecord> records, size_t materials,
              bool first, bool guides, size_t most_bytes);
-  /// A field of before, of a scene with so many materials. Throws Error where `parts` are none.
+  /// Restores a field that was saved for a scene with this number of materials. Throws Error if
+  /// `parts` are inconsistent.
   GuideField(const GuideGrid& grid, GuideParts parts, const GuideFacts& facts, size_t materials);
 
-  /// Tells the regions what their bounces are worth, by bounces with and without light.
+  /// Computes the survival factor of each region from bounces with and without contribution
+  /// (learn/worth.h).
   void weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths);
 
   GuideView view() const;

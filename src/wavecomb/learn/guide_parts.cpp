@@ -11,12 +11,12 @@
 namespace wavecomb {
 namespace {
 
-/// Whether the entries are kGuideTopCells and bricks, each of which divides one entry, no deeper
-/// than kGuideLevels, and all others are cells below `cells`.
+/// Checks the grid: kGuideTopCells entries followed by bricks. Each brick divides exactly one entry
+/// and is at most kGuideLevels deep. All other entries refer to cells below `cells`.
 bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   if (entries.size() < kGuideTopCells || (entries.size() - kGuideTopCells) % kGuideBrickCells != 0)
     return false;
-  std::vector<uint32_t> bricks{0}, next;  // first entries
+  std::vector<uint32_t> bricks{0}, next;  // their first entries
   std::vector<bool> seen((entries.size() - kGuideTopCells) / kGuideBrickCells);
   for (uint32_t level = 0; level <= kGuideLevels; ++level) {
     next.clear();
@@ -39,7 +39,7 @@ bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   return true;
 }
 
-/// Whether a row of a table shares out all of 65536 numbers, some to each bin.
+/// Checks that a cumulative row assigns all 65536 values and at least one to each bin.
 bool is_row(std::span<const uint32_t> words) {
   uint32_t start = 0;
   for (const uint32_t word : words) {
@@ -80,10 +80,10 @@ void check_guide_parts(const GuideParts& parts, size_t materials) {
       std::all_of(parts.cells.begin(), parts.cells.end(),
                   [=](uint32_t r) { return r < regions || r == kNoGuideRegion; }) &&
       is_grid(parts.entries, parts.cells.size() / kGuideAxes) && are_rows(parts.tables) &&
-      // A material's least share is 0 where nothing is known; a region's never is.
+      // A material may have a minimum of 0, which means unknown; a region never has.
       are_between(parts.bsdf_share, 0x1p-20f, 1.f) && are_between(parts.material_share, 0.f, 1.f);
   if (!is_field)
-    throw Error("what was learned before, and is to be used again, is damaged; start anew");
+    throw Error("the saved guiding field does not fit this scene or is damaged; train a new one");
 }
 
 }  // namespace wavecomb

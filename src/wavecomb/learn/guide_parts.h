@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a field that guides bounces is made of: the arrays that kernels read (GuideView).
+/// Arrays that make up a guiding field, as kernels read them through GuideView.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// The arrays of GuideView, by its names.
+/// Arrays of GuideView, with the same names.
 struct GuideParts {
   std::vector<uint32_t> entries, cells, tables;
   std::vector<GuideSphere> spheres;
@@ -23,8 +23,9 @@ struct GuideParts {
   }
 };
 
-/// Throws Error unless they are those of a field with regions, of a scene with so many materials:
-/// what comes out of a file must not have kernels read beyond an array, or divide by nothing.
+/// Validates arrays that come from a file, so that kernels neither read out of bounds nor divide by
+/// zero. Throws Error unless they form a field with at least one region for a scene with this
+/// number of materials.
 void check_guide_parts(const GuideParts& parts, size_t materials);
 
 }  // namespace wavecomb

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Directions as they are from the middle of a region, for its light is taken to lie on a sphere
-/// about it.
+/// Parallax compensation: directions of incident light relative to the centre of a region.
 ///
-/// A lamp or a door a few metres away is in another direction from each place of a region. With o
-/// the place and y what it sees along w, both from the middle and in radii of the sphere,
+/// A light or a door a few metres away lies in a different direction from each point of a region.
+/// The incident light is therefore assumed to lie on a sphere around the region's centre. With o
+/// the shading point and y the point seen along w, both relative to the centre and in units of the
+/// radius:
 ///   y = o + s w,   |y| = 1,   s = c - o.w,   c = sqrt((o.w)^2 + 1 - |o|^2) = y.w,
-/// y is the direction from the middle, and a density p over such directions is one of p s^2 / c
-/// over w: the sphere's area is the solid angle from its middle, and c / s^2 of that from o.
-/// Where |o| < 1 each w has one y and each y one w. (L. Ruppert, S. Herholz, H. P. A. Lensch,
-/// "Robust Fitting of Parallax-Aware Mixtures for Path Guiding", SIGGRAPH 2020, move the means of
-/// lobes so; for bins the whole map has to be one.)
+/// y is the direction from the centre. A density p over y becomes p s^2 / c over w: an area element
+/// of the sphere subtends its area from the centre and c / s^2 of it from o. For |o| < 1 the map
+/// from w to y is one-to-one.
+///
+/// L. Ruppert, S. Herholz, H. P. A. Lensch, "Robust Fitting of Parallax-Aware Mixtures for Path
+/// Guiding", SIGGRAPH 2020, move the means of lobes this way; bins need the map of all directions.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -17,16 +19,16 @@
 
 namespace wavecomb {
 
-/// What a region's light is taken to lie on.
+/// Sphere on which the incident light of a region is assumed to lie.
 struct GuideSphere {
-  float middle[3] = {};  ///< of the places in the region
-  float nearness = 0;    ///< one over the radius; 0: all places see one thing in one direction
+  float middle[3] = {};  ///< centre of the region's positions
+  float nearness = 0;    ///< 1 / radius; 0 means: no parallax
 };
 
-/// No place is farther from the middle, in radii.
+/// Maximum distance of a shading point from the centre, in radii.
 inline constexpr float kMostOffset = 0.7f;
 
-/// A place in a sphere: from its middle, in radii, and kMostOffset at most.
+/// Position relative to the centre of the sphere, in radii, clamped to length kMostOffset.
 template <typename F>
 inline Vec3<F> sphere_offset(const Vec3<F>& p, const Vec3<F>& middle, const F& nearness) {
   const auto along = [&](const F& x, const F& m) {
@@ -37,15 +39,15 @@ inline Vec3<F> sphere_offset(const Vec3<F>& p, const Vec3<F>& middle, const F& n
   return o * safe_sqrt(F(most / max(dot(o, o), F(most))));
 }
 
-/// A direction from the middle, and by how much a density over such directions is larger where
-/// they are seen from the place.
+/// Direction from the centre, and the factor from a density over such directions to a density over
+/// directions from the shading point.
 template <typename F>
 struct FromMiddle {
   Vec3<F> w;
   F factor;
 };
 
-/// What the place at `offset` sees along the unit vector w.
+/// Maps the direction w from the shading point at `offset` to the direction from the centre.
 template <typename F>
 inline FromMiddle<F> seen_from_middle(const Vec3<F>& offset, const Vec3<F>& w) {
   const F along = dot(offset, w);
@@ -54,7 +56,8 @@ inline FromMiddle<F> seen_from_middle(const Vec3<F>& offset, const Vec3<F>& w) {
   return {offset + w * s, s * s / c};
 }
 
-/// The unit vector along which the place at `offset` sees what lies along w from the middle.
+/// Maps the direction w from the centre to the direction from the shading point at `offset`: the
+/// inverse of seen_from_middle.
 template <typename F>
 inline Vec3<F> seen_from_place(const Vec3<F>& offset, const Vec3<F>& w) {
   return normalize(w - offset);

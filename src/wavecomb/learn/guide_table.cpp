@@ -9,8 +9,8 @@
 namespace wavecomb {
 namespace {
 
-/// Shares out 65536 numbers among 16 bins by weight: one each, the others by rounding the running
-/// sum, so that they add up.
+/// Assigns 65536 sample values to kGuideSide bins by weight. Each bin gets one, and the rest
+/// follows the rounded cumulative sum, so that the total is exact.
 void write_row(std::span<const double, kGuideSide> weights, std::span<uint32_t, kGuideSide> words) {
   constexpr uint32_t kNumbers = 1u << 16;
   const double all = std::accumulate(weights.begin(), weights.end(), 0.0);

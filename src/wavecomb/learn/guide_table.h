@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A region's distribution as the table that kernels read.
+/// Conversion of a region's distribution to the table that kernels sample.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace wavecomb {
 
-/// Writes the table of a distribution over bins, row by row of the square; weights are finite and
-/// at least 0. Each bin gets one number of 65536 of its row at least, so that no density is 0;
-/// all are alike where the weights are 0.
+/// Writes the sampling table of a distribution over bins, which are ordered by rows of the
+/// equal-area square. Weights are finite and not negative. Each bin gets at least one of the 65536
+/// values of its row, so no density is 0. The table is uniform if all weights are 0.
 void write_guide_table(std::span<const double, kGuideBins> weights,
                        std::span<uint32_t, kGuideWords> table);
 

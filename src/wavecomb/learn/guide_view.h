@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The field that guides bounces, as kernels read it.
+/// Device layout of the guiding field.
 ///
-/// Space is divided into cells, each cell by which way a surface faces into six regions, and a
-/// region has the distribution of the directions where light comes from, as its surfaces reflect
-/// it and as they are from its middle. Nothing of it changes while waves run.
+/// Space is divided into cells, and each cell into six regions by the axis direction that a surface
+/// faces. A region holds the distribution of incident light times BSDF by direction, as seen from
+/// the region's centre. The field is constant while waves run.
 #pragma once
 
 #include <cstdint>
@@ -12,43 +12,45 @@
 
 namespace wavecomb {
 
-/// Bins of directions each way: 32 x 32 of equal solid angle, some 7 degrees wide.
+/// Number of direction bins per axis of the equal-area square. A bin is about 7 degrees wide.
 inline constexpr uint32_t kGuideSide = 32;
 inline constexpr uint32_t kGuideBins = kGuideSide * kGuideSide;
-/// Words of a region's table: a row of marginals, then a row for each of them. A word is the
-/// start of a bin's share of 65536 numbers in its low half, and how many it has in its high half.
+/// Number of 32-bit words in the table of a region: one marginal row, then one conditional row for
+/// each of its bins. The low half of a word is the first of 65536 sample values of a bin, the high
+/// half is their number.
 inline constexpr uint32_t kGuideWords = kGuideSide + kGuideBins;
-/// Ways that a surface can face: +x, -x, +y, -y, +z, -z.
+/// Number of axis directions that a surface can face: +x, -x, +y, -y, +z, -z.
 inline constexpr uint32_t kGuideAxes = 6;
 
-/// Cells lie in a grid of 2^4 each way, whose entries may be divided in 2^2 each way, three times.
+/// The top level of the grid has 2^4 entries per axis. An entry can be divided into a brick of 2^2
+/// entries per axis, up to three times.
 inline constexpr uint32_t kGuideTopBits = 4, kGuideBrickBits = 2, kGuideLevels = 3;
 inline constexpr uint32_t kGuideBits = kGuideTopBits + kGuideLevels * kGuideBrickBits;
 static_assert(kGuideBits == 10, "morton_3 has ten bits for each axis");
 inline constexpr uint32_t kGuideTopCells = 1u << (3 * kGuideTopBits);
 inline constexpr uint32_t kGuideBrickCells = 1u << (3 * kGuideBrickBits);
-/// An entry of the grid with this bit is a cell: its number is in the other bits. Without, it is
-/// the first entry of the brick that divides it.
+/// Flag of grid entries that refer to a cell, whose index is in the remaining bits. Without the
+/// flag, an entry is the index of the first entry of a brick.
 inline constexpr uint32_t kGuideCell = 0x80000000u;
 inline constexpr uint32_t kNoGuideRegion = 0xffffffffu;
 
-/// What kernels need of the field. Without a grid nothing is guided.
+/// Pointers to the arrays of the guiding field. A null `grid` means: no guiding.
 struct GuideView {
-  const uint32_t* grid = nullptr;    ///< kGuideTopCells entries, then bricks
-  const uint32_t* cells = nullptr;   ///< region, or kNoGuideRegion, of (kGuideAxes * cell + axis)
-  const uint32_t* tables = nullptr;  ///< kGuideWords of each region
-  const GuideSphere* spheres = nullptr;  ///< of each region: where its light lies
-  const float* bsdf_share = nullptr;     ///< of each region: of bounces that the BSDF alone samples
-  /// Of each region: the probability of going on of a path whose throughput over the brightness of
-  /// the picture is 1, where that is a probability (learn/worth.h).
+  const uint32_t* grid = nullptr;        ///< kGuideTopCells entries, then bricks
+  const uint32_t* cells = nullptr;       ///< region or kNoGuideRegion by kGuideAxes * cell + axis
+  const uint32_t* tables = nullptr;      ///< kGuideWords per region
+  const GuideSphere* spheres = nullptr;  ///< per region: where its light lies
+  const float* bsdf_share = nullptr;     ///< per region: probability that the BSDF samples a bounce
+  /// Per region: survival probability of a path whose throughput equals the brightness of the
+  /// image, before it is clamped (learn/worth.h).
   const float* survival = nullptr;
-  const float* material_share = nullptr;  ///< the least of those that a material allows
-  /// One over the brightness of the picture, in tile_rows x tile_rows tiles; null: not known.
+  const float* material_share = nullptr;  ///< per material: minimum of bsdf_share
+  /// 1 / (brightness of the image) in tile_rows x tile_rows tiles; null means: not known.
   const float* tiles = nullptr;
   uint32_t tile_rows = 0;
-  float tiles_of_x = 0, tiles_of_y = 0;  ///< tiles in a pixel
-  float lo[3] = {};                      ///< corner of the grid
-  float scale[3] = {};                   ///< cells of 2^-kGuideBits of the grid in a unit of space
+  float tiles_of_x = 0, tiles_of_y = 0;  ///< tiles per pixel
+  float lo[3] = {};                      ///< lower corner of the grid
+  float scale[3] = {};                   ///< grid steps per unit of length
 };
 
 }  // namespace wavecomb

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a bounce teaches.
+/// Training sample of the guiding field.
 #pragma once
 
 #include <cstdint>
 
 namespace wavecomb {
 
-/// A bounce that brought light.
+/// A training bounce that contributes light.
 struct TrainingRecord {
-  float p[3];      ///< the vertex
-  float wi[3];     ///< the direction
-  float nearness;  ///< one over the distance of what it met; 0: nothing; below 0: not known
+  float p[3];      ///< position of the vertex
+  float wi[3];     ///< sampled direction
+  float nearness;  ///< 1 / distance to the next hit; 0: no hit; negative: unknown
   uint32_t material;
-  uint8_t axis;  ///< which way its surface faces: guide_axis
-  /// What came back along it over the throughput that the path arrived with: an estimate of the
-  /// integral of f Le |cos| over directions, by one of them.
+  uint8_t axis;  ///< guide_axis of the surface
+  /// Radiance that returned along wi times BSDF over density: a one-sample estimate of the integral
+  /// of f Le |cos| over directions.
   float value;
-  float pdf;        ///< of the direction, as it was sampled
-  float bsdf_pdf;   ///< by the BSDF alone
-  float guide_pdf;  ///< by the field then in use; 0: there was none
-  float weight;     ///< throughput at arrival over the brightness of the picture there
+  float pdf;        ///< density with which wi was sampled
+  float bsdf_pdf;   ///< density of wi under the BSDF alone
+  float guide_pdf;  ///< density under the field in use; 0 if there was none
+  float weight;     ///< throughput over image brightness
 };
 
 }  // namespace wavecomb

@@ -1,30 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What every program's BSDF offers. Directions are local: z is the shading normal, wo and wi point
-/// away from the surface, |w| = 1.
+/// Interface of the BSDF of a shading program. Directions are unit vectors in local space: z is the
+/// shading normal, and wo and wi point away from the surface.
 ///
 /// A program is a class template `Bsdf<F>` with
 ///
 ///   static constexpr ProgramId kProgram;
-///   static constexpr uint32_t kInputs;      what it reads
-///   BsdfTraits, or what differs from them
-///   using Params;                          where it takes what no row can say (params.h)
-///   Bsdf(const Params&, bool schlick);     ShadingParams, or else ParamsOf
-///   Color<F> albedo() const;               for the AOV: diffuse and specular colour
-///   Mask<F> has_non_delta() const;         lanes where light sampling makes sense
-///   View view(wo) const;                   what depends on wo alone; wo itself in the simple ones
-///   F delta_probability(wo) const;         with which sample() chooses a delta lobe
+///   static constexpr uint32_t kInputs;      inputs whose textures it reads
+///   BsdfTraits as base class                members overridden where they differ
+///   using Params;                           optional: parameters with a separate fetch (params.h)
+///   Bsdf(const Params&, bool schlick);      ParamsOf, usually ShadingParams
+///   Color<F> albedo() const;                for the AOV: diffuse and specular colour
+///   Mask<F> has_non_delta() const;          lanes that benefit from light samples
+///   View view(wo) const;                    values that depend on wo only; by default wo itself
+///   F delta_probability(wo) const;          probability with which sample() chooses a delta lobe
 ///   BsdfEval<F> eval(wo, wi) const;
-///   Color<F> diffuse_f_cos(wo, wi) const;  the part of eval's that counts as diffuse
-///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    numbers in [0, 1)
-/// The four of them take a view in place of wo, too.
-///   Mask<F> is_layered() const;    optional: lanes where what a delta lobe lets through is not
-///   alike
-///                                  in both directions
+///   Color<F> diffuse_f_cos(wo, wi) const;   the diffuse part of eval
+///   BsdfSample<F> sample(wo, u_lobe, u, v) const;    sample values in [0, 1)
+///   Mask<F> is_layered() const;             optional: lanes whose transmission through a delta
+///   lobe
+///                                           differs between the two directions
 ///
-/// A program that shades what is no surface (kOnSurface false: an event in a medium) is the same
-/// with a phase function in place of the BSDF, without a cosine, and has
+/// delta_probability, eval, diffuse_f_cos and sample also accept a view in place of wo.
 ///
-///   static auto interact(const Vertex<F>&);    what it meets: integrate/steps/interact.h says how
+/// A program for scattering in media (kOnSurface false) has a phase function in place of the BSDF,
+/// without a cosine, and
+///
+///   static auto interact(const Vertex<F>&);    the interaction, see integrate/steps/interact.h
 #pragma once
 
 #include <array>
@@ -34,57 +35,58 @@
 
 namespace wavecomb {
 
-/// What the integrator knows of a program. Programs are derived from this and say what differs.
+/// Compile-time properties of a program. A program derives from this and overrides what differs.
 struct BsdfTraits {
   static constexpr bool kEmits = false;         ///< its materials may emit
-  static constexpr bool kAbsorbs = false;       ///< rays inside lose light: Params::transmittance
-  static constexpr bool kHasNonDelta = true;    ///< has lobes that light sampling makes sense for
-  static constexpr bool kTransmits = false;     ///< those may lead to the other side
-  static constexpr bool kWalks = false;         ///< light may walk below: has `enters(wo, wi)`
-  static constexpr bool kHasTerminator = true;  ///< rays start beyond the terminator of its normals
+  static constexpr bool kAbsorbs = false;       ///< attenuates rays inside: Params::transmittance
+  static constexpr bool kHasNonDelta = true;    ///< has lobes that light samples can evaluate
+  static constexpr bool kTransmits = false;     ///< non-delta lobes may lead to the other side
+  static constexpr bool kWalks = false;         ///< has subsurface walks and `enters(wo, wi)`
+  static constexpr bool kHasTerminator = true;  ///< offsets rays at the shadow terminator
   static constexpr bool kTextured = true;       ///< its materials may read textures or graphs
-  static constexpr bool kReadsIor = false;      ///< the index of refraction says something
-  static constexpr bool kOnSurface = true;      ///< shades hits; or else it has an `interact`
-  static constexpr bool kOnSplats = false;      ///< emits what splats do where it is on those
-  /// Scatters as a whole fibre does, about an axis: its frame has x along it (curve/fibre.h), both
-  /// sides are one, and paths from lights do not go there, since it is not reciprocal.
+  static constexpr bool kReadsIor = false;      ///< reads the index of refraction
+  static constexpr bool kOnSurface = true;      ///< shades hits; otherwise has an `interact`
+  static constexpr bool kOnSplats = false;      ///< provides the emission of Gaussian splats
+  /// Scatters like a whole fibre around an axis: x of the local frame lies along the fibre
+  /// (curve/fibre.h), and there are no two sides. It is not reciprocal, so light paths exclude it.
   static constexpr bool kOnFibre = false;
 
-  /// What depends on wo alone, as the functions below take it: wo, unless a program says more.
+  /// Values that depend on wo only, as input of the functions below: wo itself by default.
   template <typename Wo>
   static const Wo& view(const Wo& wo) {
     return wo;
   }
-  /// Lanes whose light samples may lie on the other side of the surface. For programs that
-  /// transmit; a variant gives the same lanes as the whole program.
+  /// Lanes whose light samples may lie on the other side of the surface, for programs that
+  /// transmit. A variant returns the same lanes as the full program.
   static bool passes_light() { return true; }
 };
 
-/// f(wo, wi) |cos theta_i| and the solid-angle density with which sample() would have chosen wi.
-/// Delta lobes do not count in either.
+/// f(wo, wi) |cos theta_i|, and the solid-angle density with which sample() would choose wi. Both
+/// exclude delta lobes.
 template <typename F>
 struct BsdfEval {
   Color<F> f_cos;
   F pdf;
 };
 
-/// A sampled direction. weight = f |cos theta_i| / pdf. A lane without a valid sample has weight 0
-/// and pdf 0. For a delta lobe pdf is the probability of having chosen it.
+/// A sampled direction with weight = f |cos theta_i| / pdf. Lanes without a valid sample have
+/// weight 0 and pdf 0. For a delta lobe, pdf is the probability of choosing it.
 template <typename F>
 struct BsdfSample {
   Vec3<F> wi;
   Color<F> weight;
   F pdf;
   Mask<F> is_delta;
-  /// Relative index of refraction across the surface crossed (eta_t / eta_i); 1 for reflection and
-  /// for straight transmission. Throughput carries radiance scaling; roulette undoes it with this.
+  /// Relative index of refraction across the surface (eta_t / eta_i); 1 for reflection and for
+  /// straight transmission. Throughput includes the radiance scaling of refraction, which Russian
+  /// roulette removes by this factor.
   F eta;
-  /// Perceptual roughness of the lobe chosen (diffuse: 1), for the ray cone.
+  /// Perceptual roughness of the chosen lobe (1 for diffuse), for ray cones.
   F roughness;
 };
 
-/// Base of a program whose view is more than wo: its functions of a view, given wo. Programs make
-/// them visible by a using-declaration.
+/// Base class of programs whose view holds more than wo. Adds overloads that take wo and compute
+/// the view; programs import them with using-declarations.
 template <typename Bsdf, typename F>
 struct ViewedBsdf : BsdfTraits {
   F delta_probability(const Vec3<F>& wo) const { return self().delta_probability(self().view(wo)); }
@@ -102,14 +104,14 @@ struct ViewedBsdf : BsdfTraits {
   const Bsdf& self() const { return static_cast<const Bsdf&>(*this); }
 };
 
-/// No sample: weight 0 and pdf 0.
+/// Returns an invalid sample: weight 0 and pdf 0.
 template <typename F>
 inline BsdfSample<F> empty_sample() {
   return {
       Vec3<F>(F(0.f), F(0.f), F(1.f)), Color<F>(F(0.f)), F(0.f), Mask<F>(false), F(1.f), F(1.f)};
 }
 
-/// `a` where `m`, else `b`.
+/// Selects `a` in lanes of `m`, and `b` elsewhere.
 template <typename F>
 inline BsdfSample<F> select_sample(const Mask<F>& m, const BsdfSample<F>& a,
                                    const BsdfSample<F>& b) {
@@ -118,18 +120,18 @@ inline BsdfSample<F> select_sample(const Mask<F>& m, const BsdfSample<F>& a,
           select(m, a.eta, b.eta),  select(m, a.roughness, b.roughness)};
 }
 
-/// Values of all inputs at one hit, as fetch_params gives them.
+/// Values of all inputs at a hit, as returned by fetch_params.
 template <typename F>
 struct ShadingParams {
   Color<F> base_color, specular_color, emission;
   F roughness, metallic, clearcoat, clearcoat_roughness, opacity;
-  Vec3<F> normal;  ///< tangent space, unit
+  Vec3<F> normal;  ///< tangent space, unit length
   F ior;
   Color<F> conductor_eta, conductor_k;
   UInt<F> flags;
 };
 
-/// What a program takes that has parameters to itself (scene/programs.h), in the order of its row.
+/// Inputs plus the program-specific parameters, in the order of their row (scene/programs.h).
 template <typename F>
 struct OwnShadingParams : ShadingParams<F> {
   std::array<F, kMaxProgramParameters> own;

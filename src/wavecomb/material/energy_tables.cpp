@@ -12,10 +12,10 @@
 namespace wavecomb {
 namespace {
 
-using F = FloatP<16>;  // lanes are samples
+using F = FloatP<16>;  // one sample per lane
 constexpr uint32_t kSamples = 1536;
 
-/// Roberts' low-discrepancy sequence R2; half of the azimuths, by symmetry.
+/// Roberts' low-discrepancy sequence R2. By symmetry, u covers half of the azimuths.
 struct Numbers {
   alignas(64) float u[kSamples], v[kSamples];
 
@@ -31,14 +31,15 @@ struct Numbers {
   }
 };
 
-/// A little more than the mean, so that no interpolated value gives energy.
+/// Mean of all samples, raised by 0.3 % so that no interpolated albedo adds energy.
 float mean(const F& lanes) {
   float sum = 0;
   for (size_t i = 0; i < 16; ++i) sum += lane(lanes, i);
   return sum * (1.003f / kSamples);
 }
 
-/// Normals that a viewer sees, their cosines with it, and G2 / G1 of what they reflect.
+/// Sampled visible normals for a viewer, with their cosines to the viewer and G2 / G1 of their
+/// reflections.
 struct Normals {
   Ggx<F> ggx{F(0.f)};
   Vec3<F> wo;
@@ -58,7 +59,7 @@ struct Normals {
     }
   }
 
-  /// What a white mirror reflects.
+  /// Returns the albedo of a white microfacet mirror.
   float white() const {
     F sum(0.f);
     for (uint32_t i = 0; i < kSamples; i += 16) sum += load<F>(up + i);
@@ -68,7 +69,7 @@ struct Normals {
   struct Albedo {
     float reflected, transmitted;
   };
-  /// Of a dielectric of relative index `index`.
+  /// Returns the albedos of a dielectric of relative index `index`.
   Albedo dielectric(float index) const {
     const F eta(index);
     F reflected(0.f), transmitted(0.f);
@@ -142,7 +143,7 @@ void EnergyTables::add_brushed() {
           const Vec3<F> wo(F(s * x), F(s * std::sqrt(1 - x * x)), F(z));
           F white(0.f), reflected(0.f);
           for (uint32_t k = 0; k < kSamples; k += 16) {
-            // All azimuths of normals.
+            // Anisotropic surfaces need all azimuths, hence the factor 2.
             const Vec3<F> h =
                 ggx.sample_visible(wo, F(2.f * load<F>(numbers.u + k)), load<F>(numbers.v + k));
             const F c = clamp(dot(wo, h), F(0.f), F(1.f));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How much a rough interface scatters, in tables: what OpenPBR's layers are scaled by so that no
-/// energy is lost (Turquin, "Practical multiple scattering compensation for microfacet models",
-/// 2019).
+/// Tables of the directional albedo of rough interfaces. OpenPBR layers are scaled by them so that
+/// multiple scattering loses no energy (Turquin, "Practical multiple scattering compensation for
+/// microfacet models", 2019).
 #pragma once
 
 #include <span>
@@ -13,29 +13,30 @@
 
 namespace wavecomb {
 
-/// Directional albedos of GGX for one bounce, by cosine, roughness and index; rules by which any
-/// reflectance is integrated; and albedos of brushed surfaces, by both roughnesses and azimuth.
+/// Directional albedos of GGX for one bounce by cosine, roughness and index; quadrature rules that
+/// integrate any reflectance; and albedos of anisotropic surfaces by both roughnesses and azimuth.
 class EnergyTables {
  public:
-  /// Nodes by sqrt(cosine), by roughness (alpha = roughness^2) and by the root of
-  /// (eta - 1) / (eta + 1): what changes fast is near 0.
+  /// Nodes by sqrt(cosine), by roughness (alpha = roughness^2), and by the square root of (eta - 1)
+  /// / (eta + 1). These spacings are denser near 0, where values change fast.
   static constexpr uint32_t kCosines = 32, kRoughnesses = 24, kIndices = 28;
-  /// The last node of indices: 10, kMaxIor.
+  /// (eta - 1) / (eta + 1) of the last index node, for eta = kMaxIor = 10.
   static constexpr float kLastIndex = 9.f / 11.f;
   static constexpr uint32_t kPlane = kCosines * kRoughnesses, kVolume = kPlane * kIndices;
-  /// Nodes of the rules: two planes for each, the root of the cosine and the weight.
+  /// Number of nodes of a quadrature rule. Each takes two planes: the square root of the cosine,
+  /// and the weight.
   static constexpr uint32_t kRule = 6, kRuleAt = kPlane + 3 * kVolume;
-  /// Of brushed surfaces: nodes by sqrt(cosine), |cos phi|, sqrt(alpha_y / alpha_x) and
+  /// Anisotropic surfaces: nodes by sqrt(cosine), |cos phi|, sqrt(alpha_y / alpha_x) and
   /// sqrt(alpha_x).
   static constexpr uint32_t kAzimuths = 8, kRatios = 8, kAlongs = 16;
   static constexpr uint32_t kBrushed = kCosines * kAzimuths * kRatios * kAlongs;
   static constexpr uint32_t kBrushedAt = kRuleAt + 2 * kRule * kPlane;
   static constexpr uint32_t kSize = kBrushedAt + 2 * kBrushed;
-  /// The index that brushed interfaces are tabulated for.
+  /// Index of refraction for which anisotropic interfaces are tabulated.
   static constexpr float kBrushedIndex = 1.5f;
 
-  /// The tables of this process, worked out at the first call (some 0.1 s), and those of brushed
-  /// surfaces at the first call that asks for them (as long again). Threads may call.
+  /// Returns the tables of this process. They are computed at the first call (about 0.1 s); those
+  /// of anisotropic surfaces at the first call with `brushed` (another 0.1 s). Thread-safe.
   static const EnergyTables& shared(bool brushed = true);
 
   const float* data() const { return values_.data(); }
@@ -46,14 +47,14 @@ class EnergyTables {
   std::vector<float> values_;
 };
 
-/// The tables that these materials read, or nullptr: MaterialView::energy.
+/// Returns the tables that these materials need, or nullptr: MaterialView::energy.
 const float* energy_tables(std::span<const Material> materials);
 
-/// Reads the tables in lanes; `table` is EnergyTables::data().
+/// Interpolated lookup in lanes; `table` is EnergyTables::data().
 template <typename F>
 struct EnergyLookup {
   const float* table;
-  UInt<F> node;  ///< of cosine and roughness
+  UInt<F> node;  ///< index of the node below in cosine and roughness
   F at_cosine, at_roughness;
 
   EnergyLookup(const float* values, const F& cosine, const F& roughness) : table(values) {
@@ -70,18 +71,18 @@ struct EnergyLookup {
     node = j * T::kCosines + i;
   }
 
-  /// A white mirror's.
+  /// Returns the albedo of a white microfacet mirror.
   F white() const { return plane(UInt<F>(0u)); }
-  /// Reflection by a dielectric of index eta >= 1 seen from outside.
+  /// Returns the reflection albedo of a dielectric of index eta >= 1, seen from outside.
   F reflected(const F& eta) const { return volume(0, eta); }
-  /// Reflection and transmission by one of relative index eta, from either side.
+  /// Returns the albedo of reflection plus transmission for a relative index eta, from either side.
   F scattered(const F& eta) const {
     const Mask<F> out = eta >= 1.f;
     return select(out, volume(1, eta), volume(2, F(1.f / eta)));
   }
 
-  /// A cosine c between viewer and normal, and a weight w. Over k < EnergyTables::kRule, the sum of
-  /// w R(c) is what facets of reflectance R reflect.
+  /// Node of a quadrature rule: the cosine c between viewer and microfacet normal, and a weight w.
+  /// The sum of w R(c) over k < EnergyTables::kRule is the albedo of microfacets of reflectance R.
   struct Seen {
     F cosine, weight;
   };
@@ -113,12 +114,13 @@ struct EnergyLookup {
   }
 };
 
-/// Reads the albedos of brushed surfaces: `o` is above, turned along the grain.
+/// Interpolated lookup of the albedos of anisotropic surfaces. `o` is above the surface, in the
+/// frame whose x axis has roughness `ax`.
 template <typename F>
 struct BrushedLookup {
   const float* table;
   UInt<F> node;
-  F at[4];  ///< between nodes: cosine, azimuth, ratio, along
+  F at[4];  ///< fractions between nodes: cosine, azimuth, ratio, alpha_x
 
   BrushedLookup(const float* values, const Vec3<F>& o, const F& ax, const F& ay) : table(values) {
     using T = EnergyTables;
@@ -136,9 +138,9 @@ struct BrushedLookup {
     }
   }
 
-  /// A white mirror's.
+  /// Returns the albedo of a white microfacet mirror.
   F white() const { return value(0); }
-  /// Reflection by a dielectric of index kBrushedIndex seen from outside.
+  /// Returns the reflection albedo of a dielectric of index kBrushedIndex, seen from outside.
   F reflected() const { return value(1); }
 
  private:

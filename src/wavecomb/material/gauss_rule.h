@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Gauss's rule of a measure that is given by points.
+/// Gaussian quadrature for a discrete measure.
 #pragma once
 
 #include <array>
@@ -9,18 +9,19 @@
 
 namespace wavecomb {
 
-/// A mass at x.
+/// Point mass at x.
 struct WeighedPoint {
   double x, weight;
 };
 
-/// The n nodes and weights by which every polynomial up to degree 2 n - 1 has the sum that it has
-/// over `points` (x in [0, 1], weights >= 0): roots of the measure's orthogonal polynomial, whose
-/// recurrence is Stieltjes' (Gautschi, "Orthogonal Polynomials: Computation and Approximation",
-/// 2004, section 2.2.3). Points that all but coincide give their mean n times.
+/// Returns the nodes and weights of Gauss quadrature, which integrates polynomials up to degree 2 n
+/// - 1 over the measure `points` exactly (x in [0, 1], weights >= 0). Nodes are the roots of the
+/// orthogonal polynomial of degree n, built by the Stieltjes procedure (Gautschi, "Orthogonal
+/// Polynomials: Computation and Approximation", 2004, section 2.2.3). If the points nearly
+/// coincide, all n nodes are their mean.
 template <size_t n>
 inline std::array<WeighedPoint, n> gauss_rule(const std::vector<WeighedPoint>& points) {
-  // p_(k+1) = (x - a_k) p_k - b_k p_(k-1); norm_k = sum of weight p_k^2.
+  // Recurrence p_(k+1) = (x - a_k) p_k - b_k p_(k-1), with norm_k = sum of weight p_k^2.
   std::array<double, n> a{}, b{}, norm{};
   std::vector<double> before(points.size(), 0.0), now(points.size(), 1.0);
   std::array<WeighedPoint, n> rule{};
@@ -31,7 +32,8 @@ inline std::array<WeighedPoint, n> gauss_rule(const std::vector<WeighedPoint>& p
       mass += q;
       first += q * points[i].x;
     }
-    // A spread of less than about 1e-5 of the range, to the power of 2 k.
+    // The points spread over less than about 1e-5 of the range; the norm falls with the power 2 k
+    // of it.
     if (k > 0 && mass < norm[0] * std::pow(1e-10, static_cast<double>(k))) {
       rule.fill({a[0], norm[0] / n});
       return rule;
@@ -46,7 +48,8 @@ inline std::array<WeighedPoint, n> gauss_rule(const std::vector<WeighedPoint>& p
       now[i] = next;
     }
   }
-  // Roots by bisection: the signs of the pivots of J - x count those below x (Sturm).
+  // Find roots by bisection: the number of negative pivots of J - x is the number of roots below x
+  // (Sturm).
   const auto roots_below = [&](double x) {
     size_t count = 0;
     double pivot = 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The parameters of program "openpbr" at hits.
+/// Parameters of program "openpbr" at hits.
 #pragma once
 
 #include <algorithm>
@@ -11,22 +11,22 @@
 
 namespace wavecomb {
 
-/// Beside the inputs: base_color, metallic, roughness (specular), specular_color, clearcoat and
-/// clearcoat_roughness (coat), ior. Meanings are those of OpenPbr.
+/// Parameters in addition to the inputs base_color, metallic, roughness (specular), specular_color,
+/// clearcoat and clearcoat_roughness (coat), and ior. OpenPbr explains them.
 template <typename F>
 struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   F thin_walled;        ///< 0 or 1
-  F walks;              ///< WalkKind
+  F walks;              ///< WalkKind of the subsurface random walk
   const float* energy;  ///< EnergyTables
 
-  /// fetch_params for this program.
+  /// Fetches the parameters of this program, see fetch_params.
   template <uint32_t kInputs, bool kGraphs = true, typename MakePoint>
   static OpenPbrParams fetch(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                              const Footprint<F>& footprint, const MakePoint& make_point,
                              const Mask<F>& active);
 
-  /// What a path's light keeps over a length `t` inside of the material; 1 for rays from outside.
-  /// `cos_seen` is the cosine between the normal and the way back: negative inside.
+  /// Transmittance over a distance `t` inside the material; 1 for rays outside. `cos_seen` is the
+  /// cosine between the normal and wo: negative inside.
   Color<F> transmittance(const F& t, const F& cos_seen) const {
     const Mask<F> inside =
         (cos_seen < 0.f) & (this->transmission_weight > 0.f) & (thin_walled < 0.5f);
@@ -37,7 +37,7 @@ struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   }
 };
 
-/// Where the components of GraphParameter are in `p`, in their order.
+/// Pointers to the components of `p` in the order of GraphParameter.
 template <typename F>
 inline std::array<F*, kGraphOutputCount> parameter_places(OpenPbrParams<F>& p) {
   std::array<F*, kGraphOutputCount> all;

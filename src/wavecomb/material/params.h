@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads the parameters of materials at hits: constants from records, textures, or value graphs.
+/// Evaluates material parameters at hits, from constants in records, textures or value graphs.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Index of refraction is kept within [1 / kMaxIor, kMaxIor].
+/// Upper limit of the index of refraction; the lower limit is its inverse.
 inline constexpr float kMaxIor = 10.f;
 
 namespace detail {
@@ -51,9 +51,8 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
 
 }  // namespace detail
 
-/// Puts what graphs drive in the place of the parameters `p` of material `material`: what
-/// evaluate_params leaves to do. `make_point(active)` gives the GraphPoint and is called only where
-/// there is a graph.
+/// Replaces parameters in `p` by the outputs of the material's graph; completes evaluate_params.
+/// `make_point(active)` returns the GraphPoint and is called only if a lane has a graph.
 template <typename F, typename Params, typename MakePoint>
 WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& material,
                                      const MakePoint& make_point, const Mask<F>& active,
@@ -61,7 +60,7 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
   const UInt<F> graph = p.flags & UInt<F>(uint32_t{kHasGraph});
   const Mask<F> driven = active & Mask<F>(graph != UInt<F>(0u));
   if (any(driven)) [[unlikely]] {
-    // Copies, so that what all other materials use may stay in registers.
+    // Copies let the compiler keep the originals in registers for materials without graphs.
     const MaterialView v = view;
     const UInt<F> m = material;
     const Mask<F> on = driven;
@@ -72,11 +71,11 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
   }
 }
 
-/// The parameters of material `material` at `uv`, in sane ranges. Only inputs in `kInputs` read
-/// textures; the others give their constants. `footprint` is the ray's in uv.
-/// Materials without graphs may say so by kGraphs. `opacity` is 1 where it is presence, which
-/// fetch_opacity gives. Inactive lanes hold anything finite. Graphs are given what `make_point`
-/// says.
+/// Evaluates the parameters of `material` at `uv` and clamps them to valid ranges. Inputs in
+/// `kInputs` may read textures, others use their constants. `footprint` is the ray's footprint in
+/// uv. `kGraphs` false skips value graphs; otherwise graphs receive the point that `make_point`
+/// returns. `opacity` is 1 where it means presence, which fetch_opacity returns. Values of inactive
+/// lanes are unspecified but finite.
 template <uint32_t kInputs, typename F, bool kGraphs = true, typename MakePoint>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const Footprint<F>& footprint,
@@ -85,7 +84,7 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
   if constexpr (kGraphs) complete_params<F>(view, material, make_point, active, p);
   return p;
 }
-/// The same where graphs have nothing but uv.
+/// Overload for graphs that read only uv.
 template <uint32_t kInputs, typename F>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const Footprint<F>& footprint,
@@ -95,7 +94,7 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
 }
 
 namespace detail {
-/// The first `kOwn` parameters that programs have to themselves; 0 for the others.
+/// Reads the first `kOwn` program-specific parameters; the rest are 0.
 template <size_t kOwn, typename F>
 WAVECOMB_INLINE std::array<F, kMaxProgramParameters> own_values(const MaterialView& view,
                                                                 const UInt<F>& material,
@@ -119,11 +118,11 @@ struct ParamsOf<Bsdf, F> {
 };
 }  // namespace detail
 
-/// The parameters that program `Bsdf` takes.
+/// Parameter type of program `Bsdf`.
 template <typename Bsdf, typename F>
 using ParamsOf = typename detail::ParamsOf<Bsdf, F>::Type;
 
-/// fetch_params for program `Bsdf`.
+/// Fetches the parameters of program `Bsdf`, see fetch_params.
 template <typename Bsdf, uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
                                             const Vec2<F>& uv, const Footprint<F>& footprint,

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The names of all programs of surfaces, in the order of ProgramId. Who includes this knows that
-/// there are programs, and nothing of what they are: a change in one of them compiles none of his
-/// units.
+/// Forward declarations of all surface programs, in the order of ProgramId. A source file that
+/// includes only this header is not recompiled when a program changes.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +28,7 @@ struct ProgramList {
 };
 
 namespace detail {
-/// The list behind its first entry, which is there for the sake of commas.
+/// Removes the first entry of a list, a placeholder that simplifies commas in the macro below.
 template <typename First, typename... Bsdf>
 ProgramList<Bsdf...> list_behind(ProgramList<First, Bsdf...>);
 }  // namespace detail
@@ -59,11 +58,11 @@ template <typename Last, typename... Bsdf>
 ProgramList<Bsdf..., Last> list_before(ProgramList<Bsdf...>);
 }  // namespace detail
 
-/// `List` with one program more.
+/// `List` with one program appended.
 template <typename List, typename Last>
 using AppendedProgram = decltype(detail::list_before<Last>(List{}));
 
-/// The id of a program: what it says itself where it is none of the list.
+/// Id of a program: its position in the list, or its kProgram if it is not in the list.
 template <typename Bsdf, typename F>
 constexpr size_t id_of() {
   constexpr size_t kPlace = detail::place_of<Bsdf>(Programs<F>{});
@@ -73,7 +72,7 @@ constexpr size_t id_of() {
     return static_cast<size_t>(Bsdf::kProgram);
 }
 
-/// The class of program `kId`.
+/// Class of program `kId`.
 template <ProgramId kId, typename F>
 using Program = decltype(detail::program_at<static_cast<size_t>(kId)>(Programs<F>{}));
 
@@ -94,7 +93,7 @@ auto variant_class() {
 }
 }  // namespace detail
 
-/// The class of a variant.
+/// Class of a kernel variant.
 template <uint32_t kVariant, typename F>
 using VariantBsdf = typename decltype(detail::variant_class<kVariant, F>())::type;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// All programs with all that they are, for tests. Kernels are compiled for one program at a time.
+/// Definitions of all programs, for tests. Kernels are compiled for one program at a time.
 #pragma once
 
 #include "wavecomb/material/program_list.h"

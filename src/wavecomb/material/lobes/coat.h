@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A dielectric coat over a diffuse base: the coat's reflectance and what passes through it.
+/// A dielectric coat over a diffuse base: reflectance of the coat, and transmission to the base.
 #pragma once
 
 #include "wavecomb/material/lobes/fresnel.h"
 
 namespace wavecomb {
 
-/// Index of a coat seen from outside: an index below 1 counts as its inverse, which has the same
-/// reflectance at normal incidence but no total reflection.
+/// Index of refraction of a coat seen from outside. An index below 1 is inverted: its reflectance
+/// at normal incidence is the same, and there is no total reflection.
 template <typename F>
 inline F coat_ior(const F& ior) {
   return max(ior, F(1.f / ior));
 }
 
-/// Mean reflectance 2 int F(c) c dc of a dielectric from outside, eta in [1, 10]. A polynomial in
-/// (eta - 1) / (eta + 1) fitted by least squares to numerical integrals; it lies at most 9e-4 below
-/// them and never above.
+/// Mean reflectance 2 int F(c) c dc of a dielectric from outside, for eta in [1, 10]. Least-squares
+/// polynomial in (eta - 1) / (eta + 1), at most 9e-4 below the numerical integrals and never above.
 template <typename F>
 inline F average_fresnel_dielectric(const F& eta) {
   const F x = F(eta - 1.f) / F(eta + 1.f);
@@ -27,9 +26,8 @@ inline F average_fresnel_dielectric(const F& eta) {
   return clamp(fma(p, x, F(-3.3e-4f)), F(0.f), F(1.f));
 }
 
-/// Reflectance F0 + (1 - F0) w(c) of a coat of an index >= 1, where w is Schlick's (1 - c)^5 or
-/// follows the exact reflectance of the index: w = (F_exact - f) / (1 - f), f = F_exact(1). `exact`
-/// blends: 0 is Schlick's.
+/// Reflectance F0 + (1 - F0) w(c) of a coat with index >= 1. `exact` blends w between Schlick's (1
+/// - c)^5 (0) and the exact Fresnel curve (1): w = (F_exact - f) / (1 - f) with f = F_exact(1).
 template <typename F>
 struct CoatFresnel {
   F ior;
@@ -54,7 +52,7 @@ struct CoatFresnel {
     const F e = clamp(F(F(r - f0_exact) * inverse_rest), F(0.f), F(1.f));
     return clamp(fma(exact, F(e - w), w), F(0.f), F(1.f));
   }
-  /// 2 int w(c) c dc.
+  /// Returns the mean weight, 2 int w(c) c dc.
   F average_weight() const {
     const F w(1.f / 21.f);
     const F e = F(average_fresnel_dielectric(ior) - f0_exact) * inverse_rest;
@@ -70,17 +68,17 @@ struct CoatFresnel {
   }
 };
 
-/// Share of a white diffuse base that is seen through a coat with reflectances f_o towards the
-/// viewer and f_i towards the light: (1 - f_o)(1 - f_i) / (1 - f_avg). The denominator sums the
-/// light that the coat sends back down, so a white base under a lossless coat loses nothing
-/// (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model", 2001, eq.
-/// 6).
+/// Fraction of a white diffuse base that is visible through a coat with reflectances f_o towards
+/// the viewer and f_i towards the light: (1 - f_o)(1 - f_i) / (1 - f_avg). The denominator accounts
+/// for interreflection between coat and base, so a white base under a lossless coat keeps all
+/// energy (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model", 2001,
+/// eq. 6).
 template <typename F>
 inline F seen_through_coat(const F& f_o, const F& f_i, const F& f_avg) {
   return F(1.f - f_o) * F(1.f - f_i) / max(F(1.f - f_avg), F(1e-4f));
 }
 
-/// (1 - f_o) / (1 - f_avg) of it, what does not depend on the light; of a number or a colour.
+/// Factor of seen_through_coat that does not depend on the light: (1 - f_o) / (1 - f_avg).
 template <typename F>
 inline F seen_below_coat(const F& f_o, const F& f_avg) {
   return F(1.f - f_o) / max(F(1.f - f_avg), F(1e-4f));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rough diffuse reflection that preserves energy (Portsmouth, Kutz, Hill, "EON: A Practical
+/// Energy-preserving rough diffuse reflection (Portsmouth, Kutz, Hill, "EON: A Practical
 /// Energy-Preserving Rough Diffuse BRDF", 2024).
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Directions in the frame whose x axis lies under w: (x, y) of v turned by the azimuth of w.
+/// Rotation about z into the frame whose xz plane contains w.
 template <typename F>
 struct AzimuthFrame {
   F c, s;
@@ -28,12 +28,12 @@ struct AzimuthFrame {
   }
 };
 
-/// EON of one roughness in [0, 1], both directions above the surface. Roughness 0 is Lambert's.
-/// Its directional albedo with a white colour is 1: the fit E of the single scattering is used in
-/// both the lobe of multiple scattering and its normalisation, and errs by less than 0.1 %.
+/// EON for a roughness in [0, 1]; both directions above the surface. Roughness 0 is Lambertian.
+/// With a white colour the directional albedo is 1: the fit E of single scattering is used both in
+/// the multiple-scattering lobe and in its normalisation. Its error is below 0.1 %.
 template <typename F>
 struct EonDiffuse {
-  F roughness, a, average;  ///< A of Fujii's model; its mean albedo
+  F roughness, a, average;  ///< A of Fujii's model, and its mean albedo
 
   EonDiffuse() = default;
   explicit EonDiffuse(const F& r) : roughness(r) {
@@ -42,7 +42,7 @@ struct EonDiffuse {
     average = a * fma(r, F(kC2), F(1.f));
   }
 
-  /// Albedo of single scattering by a white surface towards the cosine z (eq. 15 and its fit).
+  /// Single-scattering albedo of a white surface for cosine z (eq. 15 and its fit).
   F single_albedo(const F& z) const {
     const F m = 1.f - z;
     F p = fma(m, F(0.0714429953f), F(-0.332181442f));
@@ -51,7 +51,7 @@ struct EonDiffuse {
     return fma(roughness, F(m * p), F(1.f)) * a;
   }
 
-  /// Colour of the light that leaves after more than one bounce between facets.
+  /// Colour of light that leaves after more than one bounce between microfacets.
   Color<F> multiple(const Color<F>& rho) const {
     const auto one = [this](const F& r) {
       return F(F(r * r * average) / fnma(r, F(1.f - average), F(1.f)));
@@ -59,7 +59,7 @@ struct EonDiffuse {
     return {one(rho.x), one(rho.y), one(rho.z)};
   }
 
-  /// f |cos theta_i| for the colour rho; 0 where either direction is below.
+  /// f |cos theta_i| for the colour rho; 0 if either direction is below the surface.
   Color<F> eval(const Color<F>& rho, const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F s = dot(wo, wi) - F(wo.z * wi.z);
     const F lower = max(max(wo.z, wi.z), F(1e-6f));
@@ -72,13 +72,13 @@ struct EonDiffuse {
     return fma(multiple(rho), again, rho * single) * cosine;
   }
 
-  /// Albedo towards the cosine z.
+  /// Directional albedo for cosine z.
   Color<F> albedo(const Color<F>& rho, const F& z) const {
     const F e = single_albedo(z);
     return fma(multiple(rho), F(1.f - e), rho * e);
   }
 
-  /// Sampling: a clipped linearly transformed cosine, mixed with the uniform hemisphere
+  /// Sampling parameters: a clipped linearly transformed cosine, mixed with the uniform hemisphere
   /// (section 5).
   struct Sampler {
     F a, b, c, d, det, s, uniform;
@@ -115,7 +115,7 @@ struct EonDiffuse {
     return select((wo.z > 0.f) & (wi.z > 0.f), mixed, F(0.f));
   }
 
-  /// A direction from three numbers in [0, 1).
+  /// Samples a direction from three sample values in [0, 1).
   Vec3<F> sample(const Sampler& t, const Vec3<F>& wo, const F& choice, const F& u,
                  const F& v) const {
     const auto [sine, cosine] = sincos_2pi(v);

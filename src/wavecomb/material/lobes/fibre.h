@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light scattered by a fibre of hair: M. Chiang, B. Bitterli, C. Tappan, B. Burley, "A Practical
-/// and Controllable Hair and Fur Model for Production Path Tracing", Eurographics 2016, after
-/// E. d'Eon et al., "An Energy-Conserving Hair Reflectance Model", EGSR 2011.
+/// Scattering by a hair fibre: M. Chiang, B. Bitterli, C. Tappan, B. Burley, "A Practical and
+/// Controllable Hair and Fur Model for Production Path Tracing", Eurographics 2016, after E. d'Eon
+/// et al., "An Energy-Conserving Hair Reflectance Model", EGSR 2011.
 ///
 ///   f(wo, wi) |cos theta_i| = sum over p of  M_p(theta_o, theta_i)  A_p(theta_o, h)  N_p(phi)
 ///
-/// p = 0 is reflected (R), 1 goes through (TT), 2 is reflected inside once (TRT), and 3 is all that
-/// is reflected more often, in one lobe that is alike all around. theta is the angle from the plane
-/// square to the fibre, phi that about it.
+/// p = 0 is reflection (R), 1 transmission (TT), 2 one internal reflection (TRT), and 3 all further
+/// internal reflections, as one lobe that is uniform in azimuth. theta is the inclination to the
+/// plane normal to the fibre, phi the azimuth around it.
 ///
-/// Directions are local: x along the fibre, from root to tip, z the normal of the round fibre where
-/// it is met. So wo says where that is, h = sin gamma_o = wo.y / |(wo.y, wo.z)| of the radius
-/// beside the middle, and nothing else is needed.
+/// Directions are local: x lies along the fibre from root to tip, and z is the normal of the round
+/// fibre at the hit. wo therefore determines the offset of the hit from the fibre's centre line, in
+/// radii: h = sin gamma_o = wo.y / |(wo.y, wo.z)|.
 #pragma once
 
 #include <array>
@@ -22,8 +22,8 @@
 
 namespace wavecomb {
 
-/// e^-x I0(x) for x >= 0, I0 the modified Bessel function (Abramowitz and Stegun, "Handbook of
-/// Mathematical Functions", 9.8.1 and 9.8.2); wrong by less than 5e-7 of it.
+/// e^-x I0(x) for x >= 0, with I0 the modified Bessel function (Abramowitz and Stegun, "Handbook of
+/// Mathematical Functions", 9.8.1 and 9.8.2); relative error below 5e-7.
 template <typename F>
 inline F scaled_bessel_i0(const F& x) {
   const F t = min(sqr(F(x * (1.f / 3.75f))), F(1.f));
@@ -45,11 +45,11 @@ inline F scaled_bessel_i0(const F& x) {
   return select(x < 3.75f, F(near * exp(F(-x))), F(far / sqrt(large)));
 }
 
-/// M_p: how a lobe of variance v spreads along the fibre (d'Eon et al. 2011, eq. 7),
+/// M_p, the longitudinal lobe of variance v (d'Eon et al. 2011, eq. 7),
 ///   M = csch(1 / v) / (2 v)  exp(-sin_i sin_o / v)  I0(cos_i cos_o / v),
-/// as a density over sin theta_i. Here the exponents are put together,
+/// as a density over sin theta_i. The exponents are combined as
 ///   -sin sin + cos cos - 1 = -((cos_i - cos_o)^2 + (sin_i + sin_o)^2) / 2,
-/// so that narrow lobes keep their bits.
+/// which avoids cancellation in narrow lobes.
 template <typename F>
 class AlongFibre {
  public:
@@ -61,8 +61,8 @@ class AlongFibre {
     return exp(F(-0.5f * apart * inverse_)) * scaled_bessel_i0(F(cos_i * cos_o * inverse_)) *
            inverse_ / F(1.f - tail_);
   }
-  /// sin theta_i by two numbers in [0, 1) (d'Eon, "Importance Sampling for Physically-Based Hair
-  /// Fiber Models", SIGGRAPH Asia 2013 technical briefs).
+  /// Samples sin theta_i from two sample values in [0, 1) (d'Eon, "Importance Sampling for
+  /// Physically-Based Hair Fiber Models", SIGGRAPH Asia 2013 technical briefs).
   F sample(const F& sin_o, const F& cos_o, const F& u, const F& turn) const {
     const F below = -v_ * log(max(fma(F(1.f - u), tail_, u), F(1e-30f)));  // 1 - cos
     const F d = clamp(below, F(0.f), F(2.f));
@@ -76,7 +76,8 @@ class AlongFibre {
   F v_, inverse_, tail_;
 };
 
-/// N_p: a logistic density of scale s, cut off at -pi and pi (Chiang et al. 2016, eq. 11 and 12).
+/// N_p, the azimuthal lobe: a logistic density of scale s, truncated to [-pi, pi] (Chiang et al.
+/// 2016, eq. 11 and 12).
 template <typename F>
 class AboutFibre {
  public:
@@ -98,15 +99,15 @@ class AboutFibre {
   F s_, inverse_, tail_;
 };
 
-/// x brought to [-pi, pi] by whole turns.
+/// Wraps the angle x to [-pi, pi].
 template <typename F>
 inline F wrapped_angle(const F& x) {
   const F turns = floor(fma(x, F(kInv2Pi), F(0.5f)));
   return clamp(fma(turns, F(-2.f * kPi), x), F(-kPi), F(kPi));
 }
 
-/// Variance along the fibre of longitudinal roughness r, and scale about it of azimuthal roughness
-/// r (Chiang et al. 2016, eq. 7 and 8).
+/// Longitudinal variance of longitudinal roughness r, and azimuthal scale of azimuthal roughness r
+/// (Chiang et al. 2016, eq. 7 and 8).
 template <typename F>
 inline F fibre_variance(const F& r) {
   const F r2 = r * r, r4 = r2 * r2, r8 = r4 * r4, r20 = r8 * r8 * r4;
@@ -119,7 +120,7 @@ inline F fibre_scale(const F& r) {
   return kRootOfPiOver8 * fma(F(5.372f), r22, fma(F(1.194f), r2, F(0.265f * r)));
 }
 
-/// What the logarithm of a colour of hair is divided by for the root of its absorption, at
+/// Divisor in the conversion of hair colour C to absorption, sigma = (ln C / divisor)^2, for
 /// azimuthal roughness r (Chiang et al. 2016, eq. 9).
 template <typename F>
 inline F fibre_color_divisor(const F& r) {
@@ -130,28 +131,31 @@ inline F fibre_color_divisor(const F& r) {
   return fma(p, r, F(5.969f));
 }
 
-/// What a fibre is made of.
+/// Scattering parameters of a fibre.
 template <typename F>
 struct Fibre {
   F ior;
-  Color<F> absorption;        ///< in one over the radius
-  std::array<F, 3> variance;  ///< along the fibre, of R, TT and TRT and what follows it
-  F scale;                    ///< about it
-  F tilt;                     ///< of its scales towards the root, in turns
-  std::array<F, 3> tint;      ///< of R, TT, and TRT and what follows it
+  Color<F> absorption;        ///< per fibre radius
+  std::array<F, 3> variance;  ///< longitudinal: R, TT, and TRT with all further lobes
+  F scale;                    ///< azimuthal scale
+  F tilt;                     ///< angle of the cuticle scales towards the root, in turns (1 = 360
+                              ///< degrees)
+  std::array<F, 3> tint;      ///< factors of R, TT, and TRT with all further lobes
 
   static constexpr size_t kLobes = 4;
 
-  /// What depends on wo alone.
+  /// Values that depend on wo only.
   struct View {
-    F sin_o, cos_o, y, z;                                 ///< of theta_o; wo about the fibre, unit
-    std::array<F, kLobes> sin_tilted, cos_tilted, share;  ///< share: with which a lobe is sampled
-    std::array<Color<F>, kLobes> passed;                  ///< A_p, tinted
-    std::array<F, 3> turn;                                ///< where N_p is about
+    F sin_o, cos_o, y, z;                                 ///< of theta_o; y and z of the unit
+                                                          ///< azimuthal direction of wo
+    std::array<F, kLobes> sin_tilted, cos_tilted, share;  ///< share: sampling probability of each
+                                                          ///< lobe
+    std::array<Color<F>, kLobes> passed;                  ///< A_p including the tint
+    std::array<F, 3> turn;                                ///< azimuth of the centre of N_p
   };
 
   View view(const Vec3<F>& wo) const;
-  /// f |cos theta_i| and its density.
+  /// Computes f |cos theta_i| and the density of `sample`.
   void eval(const View& v, const Vec3<F>& wi, Color<F>& f_cos, F& pdf) const;
   Vec3<F> sample(const View& v, const F& u_lobe, const F& u, const F& u_turn) const;
 
@@ -160,8 +164,8 @@ struct Fibre {
   void tilt_view(View& v) const;
 };
 
-/// Scales tilted by a towards the root turn R by 2 a, TT by -a and TRT by -4 a (Chiang et al. 2016,
-/// 4.1.2; Marschner et al. 2003).
+/// Rotates the lobes for scales tilted by a towards the root: R by 2 a, TT by -a and TRT by -4 a
+/// (Chiang et al. 2016, 4.1.2; Marschner et al. 2003).
 template <typename F>
 inline void Fibre<F>::tilt_view(View& v) const {
   constexpr float kTurns[3] = {-2.f, 1.f, 4.f};
@@ -174,7 +178,8 @@ inline void Fibre<F>::tilt_view(View& v) const {
   v.cos_tilted[3] = v.cos_o;
 }
 
-/// With F the share that the surface reflects and T what is left after once through,
+/// Computes the attenuations. With F the Fresnel reflectance and T the transmittance of one
+/// crossing of the fibre,
 ///   A_0 = F,  A_1 = (1 - F)^2 T,  A_2 = A_1 F T,  A_3 = A_2 F T / (1 - F T).
 template <typename F>
 inline typename Fibre<F>::View Fibre<F>::view(const Vec3<F>& wo) const {
@@ -231,7 +236,7 @@ inline void Fibre<F>::eval(const View& v, const Vec3<F>& wi, Color<F>& f_cos, F&
   }
 }
 
-/// u_lobe chooses the lobe, and what is left of it, stretched, one of the other numbers.
+/// u_lobe chooses the lobe; its remainder, rescaled to [0, 1), serves as another sample value.
 template <typename F>
 inline Vec3<F> Fibre<F>::sample(const View& v, const F& u_lobe, const F& u, const F& u_turn) const {
   F below(0.f), share = v.share[0], sin_o = v.sin_tilted[0], cos_o = v.cos_tilted[0];

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Fresnel reflectance: exact for dielectrics and conductors, and approximations by Schlick's
-/// formula.
+/// Fresnel reflectance: exact for dielectrics and conductors, and Schlick's approximations.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -29,14 +28,14 @@ inline F f0_from_ior(const F& eta) {
   return sqr(F(F(1.f - eta) / F(1.f + eta)));
 }
 
-/// F0 + (F90 - F0) (1 - c)^5 with F90 = 1 (Schlick, "An Inexpensive BRDF Model for Physically-based
-/// Rendering", 1994, eq. 24).
+/// F0 + (1 - F0) (1 - c)^5 (Schlick, "An Inexpensive BRDF Model for Physically-based Rendering",
+/// 1994, eq. 24).
 template <typename F>
 inline Color<F> fresnel_schlick(const Color<F>& f0, const F& cos_i) {
   return lerp(f0, Color<F>(F(1.f)), schlick_weight(cos_i));
 }
 
-/// Cosine of refraction for cos_i >= 0 (Snell's law); 0 under total internal reflection.
+/// Cosine of the refracted ray for cos_i >= 0 (Snell's law); 0 under total internal reflection.
 template <typename F>
 inline F refracted_cos(const F& cos_i, const F& eta) {
   const F sin2_i = max(fnma(cos_i, cos_i, F(1.f)), F(0.f));
@@ -50,13 +49,13 @@ template <typename F>
 inline F dielectric_reflectance(const F& c, const F& t, const F& eta) {
   const F a = eta * c, b = eta * t;
   const F p = a + t, s = c + b;
-  // At eta = 1 both denominators vanish with c: the reflectance is then 0.
+  // At eta = 1 both denominators vanish at c = 0, where the reflectance is 0.
   const F inverse = 1.f / max(F(p * s), F(1e-30f));
   const F parallel = F(a - t) * s * inverse, perpendicular = F(c - b) * p * inverse;
   return 0.5f * fma(parallel, parallel, sqr(perpendicular));
 }
 
-/// The same for cos_i >= 0; eta = eta_t / eta_i > 0.
+/// Exact reflectance of a dielectric for cos_i >= 0; eta = eta_t / eta_i > 0.
 template <typename F>
 inline DielectricFresnel<F> fresnel_dielectric(const F& cos_i, const F& eta) {
   const F c = clamp(cos_i, F(0.f), F(1.f));
@@ -67,8 +66,8 @@ inline DielectricFresnel<F> fresnel_dielectric(const F& cos_i, const F& eta) {
   return {select(total & (eta < 1.f), F(1.f), min(r, F(1.f))), t};
 }
 
-/// Schlick's approximation for a dielectric, with the cosine on the thinner side so that it agrees
-/// from both sides and meets total internal reflection.
+/// Schlick's approximation for a dielectric. It uses the cosine on the side of the lower index, so
+/// it is symmetric and continuous with total internal reflection.
 template <typename F>
 inline DielectricFresnel<F> fresnel_dielectric_schlick(const F& cos_i, const F& eta) {
   const F c = clamp(cos_i, F(0.f), F(1.f));
@@ -78,14 +77,15 @@ inline DielectricFresnel<F> fresnel_dielectric_schlick(const F& cos_i, const F& 
   return {r, t};
 }
 
-/// Either of the two, by the render setting.
+/// Returns the exact reflectance or Schlick's approximation, as the render setting `schlick`
+/// selects.
 template <typename F>
 inline DielectricFresnel<F> fresnel_dielectric(const F& cos_i, const F& eta, bool schlick) {
   return schlick ? fresnel_dielectric_schlick(cos_i, eta) : fresnel_dielectric(cos_i, eta);
 }
 
-/// Exact reflectance of a conductor of complex index eta + i k, seen from vacuum (Born and
-/// Wolf, 14.2; in the real form of Lagarde, "Memo on Fresnel equations", 2013).
+/// Exact reflectance of a conductor of complex index eta + i k, seen from vacuum (Born and Wolf,
+/// 14.2; real form by Lagarde, "Memo on Fresnel equations", 2013).
 template <typename F>
 inline F fresnel_conductor(const F& cos_i, const F& eta, const F& k) {
   const F c = clamp(cos_i, F(0.f), F(1.f));
@@ -107,8 +107,8 @@ inline Color<F> fresnel_conductor(const F& cos_i, const Color<F>& eta, const Col
           fresnel_conductor(cos_i, eta.z, k.z)};
 }
 
-/// Schlick's formula with a tint near grazing: F(c) = F0 + (1 - F0)(1 - c)^5 - b c (1 - c)^6, where
-/// b makes F(1/7) = tint * Schlick(1/7) at the angle of 82 degrees (Kutz, Hasan, Edmondson, "Novel
+/// Schlick's formula with an edge tint: F(c) = F0 + (1 - F0)(1 - c)^5 - b c (1 - c)^6, where b is
+/// such that F(1/7) = tint * Schlick(1/7), at about 82 degrees (Kutz, Hasan, Edmondson, "Novel
 /// Aspects of the Adobe Standard Material", 2021; Hoffman, "Fresnel Equations Considered Harmful",
 /// 2019).
 template <typename F>
@@ -117,7 +117,7 @@ struct F82Tint {
 
   F82Tint() = default;
   F82Tint(const Color<F>& f0_, const Color<F>& tint) : f0(f0_) {
-    // c (1 - c)^6 at c = 1/7, inverted.
+    // inverse of c (1 - c)^6 at c = 1/7
     constexpr float kInvLazanyi = 17.6513846f;
     const Color<F> at_82 = fresnel_schlick(f0, F(F(1.f / 7.f)));
     b = at_82 * Color<F>(Color<F>(F(1.f)) - tint) * F(kInvLazanyi);

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Fuzz: volumetric fibres as a linearly transformed cosine (Zeltner, Burley, Chiang, "Practical
-/// Multiple-Scattering Sheen Using Linearly Transformed Cosines", SIGGRAPH Talks 2022), with the
-/// rational fits of its tables that MaterialX publishes.
+/// Fuzz: a volumetric layer of fibres, modelled by linearly transformed cosines (Zeltner, Burley,
+/// Chiang, "Practical Multiple-Scattering Sheen Using Linearly Transformed Cosines", SIGGRAPH Talks
+/// 2022), with the rational fits of its tables published in MaterialX.
 #pragma once
 
 #include "wavecomb/material/lobes/eon.h"
 
 namespace wavecomb {
 
-/// f |cos theta_i| = albedo D(wi), where D integrates to 1 and is the density of `sample`. So its
-/// albedo is exactly `albedo`, and a sample's weight is constant. It follows the view direction and
-/// is not reciprocal.
+/// f |cos theta_i| = albedo D(wi), where D integrates to 1 and is the density of `sample`. So the
+/// directional albedo is exactly `albedo`, and sample weights are constant. The lobe depends on the
+/// view direction and is not reciprocal.
 template <typename F>
 struct FuzzLobe {
   F albedo, inv_a, inv_b;
 
   FuzzLobe() = default;
-  /// Towards a viewer of cosine `z`, for a roughness in [0, 1].
+  /// Computes the lobe for a viewer at cosine `z` and a roughness in [0, 1].
   FuzzLobe(const F& z, const F& roughness) {
     const F x = clamp(z, F(0.f), F(1.f)), y = clamp(roughness, F(0.01f), F(1.f));
     const F s = y * fma(y, F(1.58491f), F(0.0206607f)) / fma(F(y + 1.32227f), y, F(0.0379424f));
@@ -35,7 +35,7 @@ struct FuzzLobe {
             fma(fma(F(-1.71506f), y, F(1.71228f)), x, fma(F(1.34174f * y), y, F(2.54053e-5f)));
   }
 
-  /// D of a direction, in any azimuth; 0 below the surface.
+  /// Density D of a direction; 0 below the surface.
   F density(const Vec3<F>& wo, const Vec3<F>& wi_) const {
     const Vec3<F> wi = AzimuthFrame<F>(wo).to(wi_);
     const Vec3<F> h(fma(inv_a, wi.x, F(inv_b * wi.z)), F(inv_a * wi.y), wi.z);

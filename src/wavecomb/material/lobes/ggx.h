@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The isotropic GGX distribution of microfacet normals with Smith's masking and shadowing.
+/// Isotropic GGX distribution of microfacet normals with Smith masking and shadowing.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -7,25 +7,26 @@
 
 namespace wavecomb {
 
-/// Below this alpha a microfacet lobe is a delta lobe, in eval, sample and pdf alike: its width is
-/// then less than float directions resolve well. It is a roughness of 0.0316.
+/// Minimum alpha of a microfacet lobe, a roughness of 0.0316. Lobes with a smaller alpha are delta
+/// lobes in eval, sample and pdf, because floats do not resolve directions finely enough.
 inline constexpr float kDeltaAlpha = 1e-3f;
 
-/// alpha = roughness^2.
+/// Converts perceptual roughness to alpha = roughness^2.
 template <typename F>
 inline F alpha_from_roughness(const F& roughness) {
   return roughness * roughness;
 }
 
-/// All directions are local and unit; masking terms take the side of the surface from |w.z|.
+/// GGX distribution. Directions are local unit vectors; masking terms use |w.z|, so either side of
+/// the surface is allowed.
 template <typename F>
 struct Ggx {
   F alpha;
 
   /// D(h) of Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007,
-  /// eq. 33, in slopes, which stays exact where h.z is near 1.
+  /// eq. 33. Written in slopes, which stays accurate for h.z near 1.
   F d(const Vec3<F>& h) const { return d_along(h, F(1.f)); }
-  /// D(h) of the normal along `sum`, whose squared length is `length2`:
+  /// D(h) for h along the vector `sum` of squared length `length2`:
   ///   (alpha |s|^2 / (alpha^2 s_z^2 + s_x^2 + s_y^2))^2 / pi
   F d_along(const Vec3<F>& sum, const F& length2) const {
     const F r = fma(sum.x, sum.x, F(sum.y * sum.y));
@@ -33,44 +34,44 @@ struct Ggx {
     return sqr(F(F(alpha * length2) / max(q, F(1e-30f)))) * kInvPi;
   }
 
-  /// s(w) = sqrt(z^2 + alpha^2 (x^2 + y^2)) = |z| (1 + 2 Lambda(w)); never 0 for alpha > 0.
+  /// s(w) = sqrt(z^2 + alpha^2 (x^2 + y^2)) = |z| (1 + 2 Lambda(w)); positive for alpha > 0.
   F s(const Vec3<F>& w) const {
     const F r2 = fma(w.x, w.x, F(w.y * w.y));
     return sqrt(fma(F(alpha * alpha), r2, F(w.z * w.z)));
   }
 
-  /// Masking 1 / (1 + Lambda) (Walter et al. 2007, eq. 34).
+  /// Masking G1 = 1 / (1 + Lambda) (Walter et al. 2007, eq. 34).
   F g1(const Vec3<F>& w) const {
     const F z = abs(w.z);
     return F(2.f * z) / F(z + s(w));
   }
 
-  /// Height-correlated masking and shadowing 1 / (1 + Lambda(o) + Lambda(i)) over 4 |z_o z_i|
-  /// (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 99).
+  /// Height-correlated masking and shadowing, divided by 4 |z_o z_i|, with G2 = 1 / (1 + Lambda(o)
+  /// + Lambda(i)) (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 99).
   F g2_over_4cos(const Vec3<F>& wo, const Vec3<F>& wi) const {
     return 0.5f / fma(abs(wo.z), s(wi), F(abs(wi.z) * s(wo)));
   }
 
-  /// G2(wo, wi) / G1(wo): the weight that visible-normal sampling leaves.
+  /// G2(wo, wi) / G1(wo): the weight of visible-normal samples.
   F g2_over_g1(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F zo = abs(wo.z), zi = abs(wi.z);
     const F so = s(wo);
     return F(zi * F(zo + so)) / fma(zo, s(wi), F(zi * so));
   }
 
-  /// Density of sample_visible per unit solid angle of h, divided by the factor (wo . h):
-  /// G1(wo) D(h) / z_o.
+  /// Density of sample_visible over solid angle of h without the factor (wo . h): G1(wo) D(h) /
+  /// z_o.
   F visible_density_over_cos(const Vec3<F>& wo, const Vec3<F>& h) const {
     return F(2.f * d(h)) / F(abs(wo.z) + s(wo));
   }
 
-  /// A normal that wo (z >= 0) sees, in proportion to its visible area: the reflection of the
-  /// stretched wo by it is uniform on a spherical cap (Dupuy and Benyoub, "Sampling Visible GGX
-  /// Normals with Spherical Caps", HPG 2023, listing 3).
+  /// Samples a visible normal for wo (z >= 0). The reflection of the stretched wo by it is uniform
+  /// on a spherical cap (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", HPG
+  /// 2023, listing 3).
   Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {
     const Vec3<F> k = normalize(Vec3<F>(alpha * wo.x, alpha * wo.y, wo.z));
     const auto [sin_phi, cos_phi] = sincos_2pi(u);
-    // The cap's z = (1 - v)(1 + k.z) - k.z, with 1 - z and z + k.z free of cancellation.
+    // z = (1 - v)(1 + k.z) - k.z on the cap, with 1 - z and z + k.z computed without cancellation.
     const F cap = 1.f + k.z;
     const F n_z = F(1.f - v) * cap;
     const F z = n_z - k.z;
@@ -83,7 +84,7 @@ struct Ggx {
   }
 };
 
-/// wo mirrored at the unit vector h.
+/// Reflects wo about the unit vector h.
 template <typename F>
 inline Vec3<F> reflect(const Vec3<F>& wo, const Vec3<F>& h) {
   return fma(h, F(2.f * dot(wo, h)), Vec3<F>(-wo));

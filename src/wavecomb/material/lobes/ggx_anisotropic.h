@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Trowbridge-Reitz ("GGX") with two roughnesses, along x and along y.
+/// Anisotropic GGX distribution of microfacet normals.
 #pragma once
 
 #include "wavecomb/material/lobes/ggx.h"
 
 namespace wavecomb {
 
-/// As Ggx, with alpha_x along x and alpha_y along y; equal ones give its values.
+/// Ggx with roughness alpha_x along x and alpha_y along y; if they are equal, the values are those
+/// of Ggx.
 template <typename F>
 struct AnisotropicGgx {
   F ax, ay;
 
-  /// D(h) (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 85), all
-  /// times a^4, a^2 = ax ay.
+  /// D(h) (Heitz, "Understanding the Masking-Shadowing Function", JCGT 3(2) 2014, eq. 85);
+  /// numerator and denominator are multiplied by a^4, with a^2 = ax ay.
   F d(const Vec3<F>& h) const {
     const F a2 = ax * ay;
     const F q = fma(F(a2 * h.z), F(a2 * h.z), fma(F(h.x * ay), F(h.x * ay), sqr(F(h.y * ax))));
@@ -22,17 +23,17 @@ struct AnisotropicGgx {
   F s(const Vec3<F>& w) const {
     return sqrt(fma(w.z, w.z, fma(F(ax * w.x), F(ax * w.x), sqr(F(ay * w.y)))));
   }
-  /// G2 / (4 |z_o z_i|), height-correlated, where `so` is s(wo).
+  /// G2 / (4 |z_o z_i|), height-correlated; `so` is s(wo).
   F g2_over_4cos(const Vec3<F>& wo, const F& so, const Vec3<F>& wi) const {
     return 0.5f / max(fma(abs(wo.z), s(wi), F(abs(wi.z) * so)), F(1e-20f));
   }
-  /// G2(wo, wi) / G1(wo): the weight that visible-normal sampling leaves.
+  /// G2(wo, wi) / G1(wo): the weight of visible-normal samples.
   F g2_over_g1(const Vec3<F>& wo, const Vec3<F>& wi) const {
     const F zo = abs(wo.z), zi = abs(wi.z), so = s(wo);
     return F(zi * F(zo + so)) / max(fma(zo, s(wi), F(zi * so)), F(1e-20f));
   }
-  /// The alpha of an isotropic surface whose normals a viewer w sees at about the same cosines: the
-  /// root of the mean square at z = 1, that of w's own azimuth at z = 0.
+  /// Alpha of an isotropic surface whose visible normals have about the same cosines to the viewer
+  /// w: the root mean square of both alphas at z = 1, and the alpha along w's azimuth at z = 0.
   F seen_alpha(const Vec3<F>& w) const {
     const F z2 = w.z * w.z;
     const F r2 = max(fma(w.x, w.x, F(w.y * w.y)), F(1e-20f));
@@ -40,8 +41,8 @@ struct AnisotropicGgx {
     const F along = fma(F(ax2 - ay2), x2, ay2), across = F(ax2 + ay2) - along;
     return sqrt(fma(F(across - along), F(0.5f * z2), along));
   }
-  /// A normal that wo (z >= 0) sees, in proportion to its visible area (Dupuy and Benyoub,
-  /// "Sampling Visible GGX Normals with Spherical Caps", HPG 2023).
+  /// Samples a visible normal for wo (z >= 0) (Dupuy and Benyoub, "Sampling Visible GGX Normals
+  /// with Spherical Caps", HPG 2023).
   Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {
     const Vec3<F> k = normalize(Vec3<F>(ax * wo.x, ay * wo.y, max(wo.z, F(1e-7f))));
     const auto [sin_phi, cos_phi] = sincos_2pi(u);

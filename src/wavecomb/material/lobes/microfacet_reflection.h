@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reflection by a GGX surface, without its Fresnel factor.
+/// Microfacet reflection by GGX, without the Fresnel factor.
 #pragma once
 
 #include "wavecomb/material/lobes/ggx.h"
 
 namespace wavecomb {
 
-/// A microfacet configuration that reflects wo to wi, both above the surface.
+/// Terms of a microfacet that reflects wo to wi, both above the surface.
 template <typename F>
 struct MicrofacetEval {
-  F cos_h;  ///< wo . h = wi . h: the argument of Fresnel's formula
-  F f_cos;  ///< D G2 / (4 z_o): f cos without Fresnel
+  F cos_h;  ///< wo . h = wi . h, the cosine for the Fresnel factor
+  F f_cos;  ///< D G2 / (4 z_o): f |cos theta_i| without the Fresnel factor
   F pdf;    ///< D G1 / (4 z_o): density of the visible-normal sampler
 };
 
-/// What masking says of wo alone.
+/// Masking terms that depend on wo only.
 template <typename F>
 struct MaskedView {
   F s;      ///< Ggx::s(wo)
@@ -24,9 +24,9 @@ struct MaskedView {
   MaskedView(const Ggx<F>& ggx, const Vec3<F>& wo) : s(ggx.s(wo)), share(0.5f / F(wo.z + s)) {}
 };
 
-/// Torrance and Sparrow's lobe D G2 / (4 z_o z_i) (Walter et al. 2007, eq. 20); zeros where wi or
-/// wo is not above the surface. Half-vector Jacobian: dh / dwi = 1 / (4 wo . h) (eq. 14). With
-/// unit directions wo . h = |wo + wi| / 2.
+/// Evaluates the Torrance-Sparrow lobe D G2 / (4 z_o z_i) (Walter et al. 2007, eq. 20); 0 if wi or
+/// wo is not above the surface. Half-vector Jacobian: dh / dwi = 1 / (4 wo . h) (eq. 14). With unit
+/// directions wo . h = |wo + wi| / 2.
 template <typename F>
 inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const MaskedView<F>& seen,
                                          const Vec3<F>& wo, const Vec3<F>& wi) {
@@ -43,8 +43,8 @@ inline MicrofacetEval<F> eval_microfacet(const Ggx<F>& ggx, const Vec3<F>& wo, c
   return eval_microfacet(ggx, MaskedView<F>(ggx, wo), wo, wi);
 }
 
-/// A direction reflected by a visible normal; it may lie below the surface, which is no valid
-/// sample.
+/// Reflects wo about a sampled visible normal. The direction may lie below the surface, in which
+/// case the sample is invalid.
 template <typename F>
 inline Vec3<F> sample_microfacet(const Ggx<F>& ggx, const Vec3<F>& wo, const F& u, const F& v) {
   return normalize(reflect(wo, ggx.sample_visible(wo, u, v)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The light that a rough metal scatters between its facets, which single scattering loses.
+/// Multiple scattering between the microfacets of a rough metal, which single scattering omits.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -7,20 +7,22 @@
 
 namespace wavecomb {
 
-/// A diffuse-like lobe f = F_ms L(o) L(i) / (pi L_avg), where L(w) = 1 - E(w) is what a white GGX
-/// surface seen from w loses and L_avg = 2 int L c dc. With F_ms = 1 it gives back L(o), so that a
-/// white metal keeps all energy; it is reciprocal at any roughness (Kulla and Conty, "Revisiting
-/// Physically Based Shading at Imageworks", SIGGRAPH course 2017).
+/// Lobe of multiple scattering, f = F_ms L(o) L(i) / (pi L_avg), where L(w) = 1 - E(w) is the
+/// energy that a white GGX surface loses for direction w, and L_avg = 2 int L c dc. With F_ms = 1
+/// the lobe has the albedo L(o), so a white metal keeps all energy. It is reciprocal for any
+/// roughness (Kulla and Conty, "Revisiting Physically Based Shading at Imageworks", SIGGRAPH course
+/// 2017).
 ///
 /// L is a polynomial in x = z / (z + alpha / 2) and alpha, fitted to integrals of G2 / G1 over
-/// visible normals. It is kept below the true loss: single and multiple scattering of a white metal
-/// together give 0.98 to 1.001 for alpha >= 0.1. L_avg has a floor, so that very grazing light does
-/// not weigh much: for alpha < 0.1 energy is lost at grazing angles (up to 10 %), never gained.
+/// visible normals. It stays below the true loss: the albedo of a white metal, multiple scattering
+/// included, is 0.98 to 1.001 for alpha >= 0.1. L_avg has a lower limit, so that grazing samples do
+/// not get large weights; for alpha < 0.1 this loses up to 10 % of the energy at grazing angles and
+/// never adds any.
 template <typename F>
 struct LostEnergy {
   F half_alpha, c1, c2, c3, c4;
   F mean;     ///< L_avg
-  F average;  ///< L_avg with its floor
+  F average;  ///< L_avg with its lower limit
 
   LostEnergy() = default;
   explicit LostEnergy(const F& alpha) : half_alpha(0.5f * alpha) {
@@ -35,14 +37,14 @@ struct LostEnergy {
     average = max(mean, F(0.02f));
   }
 
-  /// L towards a direction of cosine z >= 0.
+  /// L for a direction of cosine z >= 0.
   F operator()(const F& z) const {
     const F x = z / max(F(z + half_alpha), F(1e-20f));
     const F p = fma(fma(fma(fma(c4, x, c3), x, c2), x, c1), x, F(-0.0085f));
     return clamp(p, F(0.f), F(1.f));
   }
 
-  /// F_ms for a mean reflectance: the geometric series of further bounces, each of which leaves the
+  /// F_ms for a mean reflectance f: geometric series of further bounces, each of which leaves the
   /// surface with probability 1 - L_avg.
   F tint(const F& f) const { return F(F(f * f) * F(1.f - average)) / F(1.f - F(f * average)); }
   Color<F> tint(const Color<F>& f) const { return {tint(f.x), tint(f.y), tint(f.z)}; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// OpenPBR's base interface: one rough surface that is part metal, part dielectric over a diffuse
-/// base and part dielectric that transmits.
+/// OpenPBR's base: one rough interface that mixes metal, a glossy-diffuse dielectric and a
+/// transmissive dielectric.
 #pragma once
 
 #include "wavecomb/material/energy_tables.h"
@@ -13,59 +13,60 @@
 
 namespace wavecomb {
 
-/// What lobes are chosen by: between luminance and the brightest channel, so that no colour makes
-/// weights large.
+/// Importance of a colour in lobe selection: the mean of luminance and maximum component, which
+/// bounds sample weights for saturated colours.
 template <typename F>
 inline F importance(const Color<F>& c) {
   return 0.5f * F(luminance(c) + max_component(c));
 }
 
-/// G2 / G1 of the light that a facet sends up and of that which it sends down; 1 where the two need
-/// not be known.
+/// G2 / G1 for the reflected and the refracted direction of a microfacet; 1 where they are not
+/// needed.
 template <typename F>
 struct FacetWays {
   F up = F(1.f), down = F(1.f);
 };
 
-/// What a facet does with light: colours of reflection and transmission.
+/// Reflection and transmission colours of a microfacet.
 template <typename F>
 struct OpenPbrFacet {
   Color<F> reflect, transmit;
   FacetWays<F> ways;
 
-  /// Probability with which a facet is sampled for reflection.
+  /// Probability of sampling reflection at this microfacet.
   F reflect_share() const {
     const F up = importance(reflect) * ways.up, down = importance(transmit) * ways.down;
     return select(down > 0.f, F(up / max(F(up + down), F(1e-20f))), F(1.f));
   }
 };
 
-/// Sampled by visible normals, then reflection or transmission in proportion to what the facet
-/// does:
-///   reflection    f cos = R(h) D G2 / (4 z_o),                     pdf = p_R D G1 / (4 z_o);
-///   transmission  f cos = T(h) D G2 |wi.h wo.h| / (z_o c^2 eta^2),  pdf = p_T D G1 |wi.h wo.h| /
-///   (z_o c^2), c = wi.h + wo.h / eta (Walter et al. 2007); thin walls: that of reflection,
-///   mirrored.
-/// What single scattering loses is given back by scaling (Turquin 2019): metals by
-/// 1 + F0 (1 - E) / E, transmission by 1 / (E_R + E_T).
+/// Evaluates and samples the base. A visible normal is sampled, then reflection or transmission
+/// with probabilities p_R and p_T in proportion to their colours at the microfacet:
+///   reflection    f cos = R(h) D G2 / (4 z_o),                      pdf = p_R D G1 / (4 z_o);
+///   transmission  f cos = T(h) D G2 |wi.h wo.h| / (z_o c^2 eta^2),
+///                 pdf = p_T D G1 |wi.h wo.h| / (z_o c^2),           c = wi.h + wo.h / eta
+/// (Walter et al. 2007). The transmission of thin walls is the reflection lobe, mirrored.
 ///
-/// No table knows E_R + E_T of a film, of a brushed surface or of an interface whose reflectance is
-/// not that of its index (specular_weight). There, each facet's light is scaled, both ways alike,
-/// by s / (R g_R + (1 - R) g_T), g being G2 / G1 of the two directions that the facet sends light
-/// to: s is the same sum for the bare, unbrushed interface whose E_R + E_T the table has, so that a
-/// film changes how a facet shares its light out and not how much there is; for brushed ones s = 1,
-/// and nothing else is given back.
+/// Multiple scattering is compensated by scaling (Turquin 2019): metals by 1 + F0 (1 - E) / E,
+/// transmission by 1 / (E_R + E_T).
+///
+/// E_R + E_T is not tabulated for thin films, anisotropic surfaces, and interfaces whose
+/// reflectance differs from that of their index (specular_weight). There, reflection and
+/// transmission of each microfacet are scaled by s / (R g_R + (1 - R) g_T), with g = G2 / G1 of the
+/// respective direction. s is the same sum for the bare isotropic interface, whose E_R + E_T is
+/// tabulated. A film therefore changes the ratio of reflection to transmission but not their sum.
+/// For anisotropic surfaces s = 1, without further compensation.
 template <typename F, uint32_t kParts = kAllParts>
 struct OpenPbrBase {
   static constexpr bool kGlass = (kParts & kPasses) != 0, kFilm = (kParts & kFilms) != 0,
                         kBrush = (kParts & kBrushes) != 0;
-  F metal, opaque, glass;  ///< shares; their sum is 1
+  F metal, opaque, glass;  ///< weights; their sum is 1
   F roughness;
   AnisotropicGgx<F> ggx;
   Mask<F> smooth, thin, present;
-  F ior;        ///< that bends
-  F glass_ior;  ///< that reflects, by specular_weight
-  F gloss_ior;  ///< of the interface over the diffuse base, below a coat; >= 1
+  F ior;        ///< index that refracts
+  F glass_ior;  ///< index that determines reflection, by specular_weight
+  F gloss_ior;  ///< index of the interface over the diffuse base, relative to a coat above; >= 1
   F glass_f0, specular_weight;
   Color<F> specular_color, tint;
   F82Tint<F> metal_fresnel;
@@ -80,7 +81,7 @@ struct OpenPbrBase {
       glass = F(1.f - metal) * p.transmission_weight;
       opaque = F(1.f - metal) * F(1.f - p.transmission_weight);
     }
-    // Light that crosses a rough coat meets a rougher base ("Coat roughening").
+    // A rough coat broadens the base's lobe (OpenPBR, "Coat roughening").
     const F r4 = sqr(F(p.roughness * p.roughness));
     roughness = p.roughness;
     if constexpr ((kParts & kCoats) != 0) {
@@ -113,21 +114,22 @@ struct OpenPbrBase {
 
   Color<F> metal_f0() const { return metal_fresnel.f0 * min(specular_weight, F(1.f)); }
 
-  /// What depends on wo alone.
+  /// Values that depend on wo only.
   struct View {
     Mask<F> inside;
-    Mask<F> brushed;   ///< alpha_x is not alpha_y
-    Mask<F> by_facet;  ///< glass that is scaled facet by facet
+    Mask<F> brushed;   ///< anisotropic: alpha_x != alpha_y
+    Mask<F> by_facet;  ///< transmission is compensated per microfacet
     F eta;             ///< relative index across the surface
-    F s, g1;           ///< masking towards the viewer: AnisotropicGgx::s; G1 / (4 z_o)
-    F glass_scale;     ///< compensations
+    F s, g1;           ///< masking of wo: AnisotropicGgx::s, and G1 / (4 z_o)
+    F glass_scale;     ///< multiple-scattering compensation
     F gloss_scale;
     Color<F> metal_scale;
     Color<F> gloss;   ///< albedo of the interface over the diffuse base
-    Color<F> albedo;  ///< estimate, of all that this interface reflects and transmits
+    Color<F> albedo;  ///< estimate of reflection plus transmission
   };
 
-  /// `o` is above the surface as the viewer sees it; `below`: the viewer is on the inner side.
+  /// Computes the view. `o` is wo mirrored above the surface; `below` marks lanes whose viewer is
+  /// on the inner side.
   View view(const Vec3<F>& o, const Mask<F>& below, const float* energy) const {
     View v;
     const F z = o.z;
@@ -148,7 +150,7 @@ struct OpenPbrBase {
     const EnergyLookup<F> look(energy, z, sqrt(alpha));
     F one_bounce = look.white(), glossy = look.reflected(gloss_ior);
     if (kBrush && any(v.brushed)) {
-      // As much more or less as for the index that is tabulated.
+      // Add the difference between anisotropic and isotropic albedo at the tabulated index.
       const BrushedLookup<F> brush(energy, o, ggx.ax, ggx.ay);
       constexpr float kIndex = EnergyTables::kBrushedIndex;
       const F more = brush.reflected() - look.reflected(F(kIndex));
@@ -177,7 +179,7 @@ struct OpenPbrBase {
     return v;
   }
 
-  /// Of a facet seen at the cosine c, with compensations.
+  /// Colours of a microfacet seen at cosine c, including compensation.
   OpenPbrFacet<F> facet(const View& v, const F& c,
                         const FacetWays<F>& ways = FacetWays<F>()) const {
     const Color<F> one(F(1.f));
@@ -197,13 +199,14 @@ struct OpenPbrBase {
       const Mask<F> total = not_(thin) & not_(Mask<F>(bent > 0.f));
       Color<F> g(fresnel_dielectric(outer, glass_ior).reflectance);
       if (kFilm && any(filmed)) {
-        // Never all or nothing, so that each facet has a way for its light.
+        // Keep reflection and transmission above 0, so that each microfacet has a direction to
+        // sample.
         const Color<F> r = film.over_dielectric(outer, glass_ior);
         const Color<F> least(F(1e-3f));
         g = lerp(g, min(max(r, least), Color<F>(one - least)), film.weight);
       }
       g = select<F>(total, one, g);
-      // Both faces of a wall, and what goes to and fro between them.
+      // Sum of the interreflections between the two faces of a thin wall.
       const Color<F> wall(wall_of(g.x), wall_of(g.y), wall_of(g.z));
       g = select<F>(thin, wall, g);
       Color<F> scale(F(glass * v.glass_scale));
@@ -220,7 +223,8 @@ struct OpenPbrBase {
     return f;
   }
 
-  /// Of a facet h, seen at the cosine c, that sends light to `up` and, from glass, to `down`.
+  /// G2 / G1 for a microfacet that reflects wo to `up` and, for transmission, refracts it to
+  /// `down`.
   FacetWays<F> ways_of(const View& v, const Vec3<F>& wo, const Vec3<F>& up,
                        const Vec3<F>& down) const {
     const F g_up = select(up.z > 0.f, ggx.g2_over_g1(wo, up), F(0.f));
@@ -228,7 +232,7 @@ struct OpenPbrBase {
     return {select(v.by_facet, g_up, F(1.f)), select(v.by_facet, g_down, F(1.f))};
   }
 
-  /// Radiance over throughput: 1 / eta^2 where light bends.
+  /// Scaling of radiance across a refracting interface, 1 / eta^2; 1 for thin walls.
   F radiance_scale(const View& v) const { return select(thin, F(1.f), F(1.f / sqr(v.eta))); }
 
   BsdfEval<F> eval(const View& v, const Vec3<F>& wo, const Vec3<F>& wi) const {
@@ -254,7 +258,7 @@ struct OpenPbrBase {
     if (kGlass && any(v.by_facet)) {
       const F t = refracted_cos(oc, v.eta);
       const Vec3<F> other = select<F>(up, refract(wo, h, oc, t, v.eta), reflect(wo, h));
-      // Where nothing goes through, refract is of no use.
+      // refract is undefined under total internal reflection.
       const Vec3<F> none(F(0.f), F(0.f), F(1.f));
       const Vec3<F> down = select<F>(up, select<F>(t > 0.f, other, none), i);
       ways = ways_of(v, wo, select<F>(up, i, other), down);
@@ -265,7 +269,7 @@ struct OpenPbrBase {
     return {color * F(base * g2), F(base * v.g1) * select(up, share, F(1.f - share))};
   }
 
-  /// The same where nothing is transmitted.
+  /// eval for variants without transmission.
   BsdfEval<F> eval_reflection(const View& v, const Vec3<F>& wo, const Vec3<F>& wi) const {
     const Vec3<F> sum = wi + wo;
     const F len2 = length_squared(sum);
@@ -285,7 +289,7 @@ struct OpenPbrBase {
     Vec3<F> wi;
     Mask<F> crosses;
   };
-  /// wi may be on the wrong side of the surface, where eval is 0.
+  /// Samples a direction. It may lie on the wrong side of the surface, where eval returns 0.
   Sample sample(const View& v, const Vec3<F>& wo, const F& choice, const F& u, const F& w) const {
     Vec3<F> h(F(0.f), F(0.f), F(1.f));
     if (!all(smooth)) h = select<F>(smooth, h, ggx.sample_visible(wo, u, w));
@@ -305,7 +309,7 @@ struct OpenPbrBase {
       const Vec3<F> bent = refract(wo, h, c, refracted_cos(c, v.eta), v.eta);
       wi = select<F>(crosses, select<F>(thin, straight, bent), wi);
     }
-    // A facet may reflect to below or refract to above: no sample.
+    // A microfacet may reflect below the surface or refract above it; such samples are invalid.
     const Mask<F> right = (wi.z > 0.f) ^ crosses;
     const F len2 = length_squared(wi);
     const F inv = 1.f / sqrt(select(len2 > 1e-20f, len2, F(1.f)));
@@ -313,7 +317,7 @@ struct OpenPbrBase {
   }
 
  private:
-  /// The index whose F0 is specular_weight times that of `eta`.
+  /// Returns the index whose F0 is specular_weight times that of `eta`.
   F scaled_ior(const F& eta) const {
     const F root = F(eta - 1.f) / F(eta + 1.f);
     const F e = copysign(sqrt(min(F(specular_weight * root * root), F(0.66f))), root);
@@ -322,8 +326,9 @@ struct OpenPbrBase {
   }
   static F wall_of(const F& r) { return F(2.f * r) / F(1.f + r); }
 
-  /// Albedo of the interface over the diffuse base below a film. Rough: that without the film, and
-  /// the rest by a rule over the cosines at which its facets are seen.
+  /// Albedo of the interface over the diffuse base with a thin film. Smooth: the reflectance.
+  /// Rough: the albedo without film, plus the difference integrated over the cosines of the visible
+  /// microfacets.
   Color<F> filmed_gloss(const View& v, const F& z, const EnergyLookup<F>& look) const {
     const Color<F> mirror = film.over_dielectric(z, gloss_ior);
     const Mask<F> rough = (film.weight > 0.f) & (opaque > 0.f) & not_(smooth);

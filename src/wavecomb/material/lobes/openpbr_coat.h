@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The coat of OpenPBR: a dielectric layer that colours and darkens what is below it.
+/// Coat of OpenPBR: a dielectric layer that tints and darkens the layers below.
 #pragma once
 
 #include "wavecomb/material/energy_tables.h"
@@ -13,7 +13,8 @@ namespace wavecomb {
 template <typename F>
 struct OpenPbrCoat {
   F weight, roughness, ior, f0, darkening;
-  Color<F> color, half_log;  ///< half_log: of the colour; light crosses the coat twice
+  Color<F> color, half_log;  ///< half_log: half the logarithm of the colour, as light crosses the
+                             ///< coat twice
   Ggx<F> ggx;
   Mask<F> smooth;
 
@@ -32,12 +33,12 @@ struct OpenPbrCoat {
     half_log = {half(color.x), half(color.y), half(color.z)};
   }
 
-  /// What of a coat of weight 1 depends on the direction to the viewer alone.
+  /// Values of a coat of weight 1 that depend on wo only.
   struct Layer {
-    F compensation;  ///< factor of its reflection, for energy that one bounce loses
-    F albedo;        ///< at most 1
+    F compensation;  ///< scale of its reflection that compensates for multiple scattering
+    F albedo;        ///< directional albedo, at most 1
   };
-  /// Seen at cosine `z`. `energy`: energy_tables.h.
+  /// Computes the layer for a viewer at cosine `z`; `energy` is the table of energy_tables.h.
   Layer layer(const float* energy, const F& z) const {
     const EnergyLookup<F> look(energy, z, roughness);
     const F white = max(look.white(), F(1e-3f));
@@ -47,20 +48,22 @@ struct OpenPbrCoat {
     return {compensation, min(select(smooth, mirror, rough), F(1.f))};
   }
 
-  /// color^(1 / 2 mu), mu the cosine in the coat of a ray whose cosine outside is `z`.
+  /// Transmission colour^(1 / (2 mu)), where mu is the cosine inside the coat for a ray of cosine
+  /// `z` outside.
   Color<F> tint(const F& z) const {
     const F inv = 1.f / max(refracted_cos(abs(z), ior), F(0.05f));
     return {exp(F(half_log.x * inv)), exp(F(half_log.y * inv)), exp(F(half_log.z * inv))};
   }
 
-  /// Fresnel reflectance of a coat of weight `on` at a facet.
+  /// Fresnel reflectance of a microfacet of the coat, for coat weight `on`.
   F reflectance(const F& on, const F& compensation, const F& cos_h) const {
     return on * min(F(fresnel_dielectric(cos_h, ior).reflectance * compensation), F(1.f));
   }
 
-  /// Factor of the base's colour, seen at cosine `z`: the coat sends light back down to the base,
-  /// which absorbs again, (1 - K) / (1 - K E_base) (OpenPBR 1.1, "Coat darkening"). `albedo` is
-  /// E_base, `spread` how diffuse the base is, `inside` where it is seen from within.
+  /// Darkening of the base for a viewer at cosine `z`: (1 - K) / (1 - K E_base), because the coat
+  /// reflects light back to the base (OpenPBR 1.1, "Coat darkening"). `albedo` is E_base, `spread`
+  /// is how diffuse the base is (0 to 1), and `inside` marks lanes seen from within, which are not
+  /// darkened.
   Color<F> darkened(const F& z, const Color<F>& albedo, const F& spread,
                     const Mask<F>& inside) const {
     const F mirror = fresnel_dielectric(z, ior).reflectance;

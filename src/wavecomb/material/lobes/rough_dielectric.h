@@ -9,34 +9,34 @@
 
 namespace wavecomb {
 
-/// True where the interface must be treated as smooth: its reflection is too narrow, or its
-/// refraction is (which is about alpha |eta - 1| wide).
+/// Whether the interface must be treated as smooth, because its reflection lobe (width alpha) or
+/// its refraction lobe (width about alpha |eta - 1|) is too narrow.
 template <typename F>
 inline Mask<F> is_smooth_dielectric(const F& alpha, const F& ior) {
   return (alpha < kDeltaAlpha) | (alpha * abs(F(ior - 1.f)) < 1e-4f);
 }
 
-/// f cos and density of the sampler below. With eta the index relative to the side of wo, and
-/// c = wi . h + (wo . h) / eta:
-///   reflection:   f cos = R D G2 / (4 |z_o|),                         pdf = R D G1 / (4 |z_o|);
-///   transmission: f cos = T D G2 |wi.h wo.h| / (|z_o| c^2 eta^2),      pdf = T D G1 |wi.h wo.h| /
-///   (|z_o| c^2),
-/// eq. 20 and 21 with Jacobians eq. 14 and 17; the 1 / eta^2 scales radiance.
+/// Evaluates f |cos theta_i| and the density of the sampler below. With eta the index relative to
+/// the side of wo, and c = wi . h + (wo . h) / eta:
+///   reflection:   f cos = R D G2 / (4 |z_o|),                      pdf = R D G1 / (4 |z_o|);
+///   transmission: f cos = T D G2 |wi.h wo.h| / (|z_o| c^2 eta^2),
+///                 pdf = T D G1 |wi.h wo.h| / (|z_o| c^2),
+/// eq. 20 and 21 with the Jacobians of eq. 14 and 17. The factor 1 / eta^2 scales radiance.
 template <typename F>
 inline BsdfEval<F> eval_rough_dielectric(const Ggx<F>& ggx, const F& ior, const Color<F>& tint,
                                          bool schlick, const Vec3<F>& wo, const Vec3<F>& wi) {
   const F eta = relative_ior(wo, ior);
   const F side = copysign(F(1.f), wo.z);
   const Mask<F> reflects = F(wi.z * side) > 0.f;
-  // The normal of the facet, on the upper side of the surface as wo sees it.
+  // h: microfacet normal on the side of wo.
   const Vec3<F> sum = fma(wi, select(reflects, F(1.f), eta), wo);
   const F len2 = length_squared(sum);
   const Mask<F> nonzero = (len2 > 1e-20f) & (wi.z != 0.f) & (wo.z != 0.f);
   const F inv_len = 1.f / sqrt(select(nonzero, len2, F(1.f)));
-  const F up = copysign(F(1.f), sum.z) * side;  // h on the side of wo
+  const F up = copysign(F(1.f), sum.z) * side;  // flips h to the side of wo
   const Vec3<F> h = sum * F(inv_len * up);
   const F oh = dot(wo, h), ih = dot(wi, h);
-  // Facets seen from behind do not count; a refracted pair lies on opposite sides of its facet.
+  // Microfacets seen from behind are invalid; refraction has wo and wi on opposite sides of h.
   const Mask<F> valid = nonzero & (oh > 0.f) & (F(h.z * side) > 0.f) &
                         ((reflects & (ih > 0.f)) | (not_(reflects) & (ih < 0.f)));
   const F r = fresnel_dielectric(oh, eta, schlick).reflectance;
@@ -53,8 +53,8 @@ inline BsdfEval<F> eval_rough_dielectric(const Ggx<F>& ggx, const F& ior, const 
   return {color * f_cos, select(valid, F(base * g1), F(0.f))};
 }
 
-/// A visible normal, then reflection with the probability of its Fresnel reflectance; the weight is
-/// G2 / G1, times tint / eta^2 when transmitted.
+/// Samples a visible normal, then reflection with probability R. The weight is G2 / G1, times tint
+/// / eta^2 for transmission.
 template <typename F>
 inline BsdfSample<F> sample_rough_dielectric(const Ggx<F>& ggx, const F& roughness, const F& ior,
                                              const Color<F>& tint, bool schlick, const Vec3<F>& wo,

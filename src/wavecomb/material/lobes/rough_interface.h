@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a rough interface reflects in all directions together, and so leaves for a base below it.
+/// Directional albedo of a rough dielectric interface, which determines the light that reaches a
+/// base below it.
 #pragma once
 
 #include "wavecomb/material/lobes/coat.h"
@@ -7,18 +8,18 @@
 
 namespace wavecomb {
 
-/// Directional albedo of one bounce off a GGX interface whose facets reflect f0 + (1 - f0) w(c),
-/// w as in CoatFresnel:
+/// Directional albedo of one bounce off a GGX interface whose microfacets reflect f0 + (1 - f0)
+/// w(c), w as in CoatFresnel:
 ///   E(z) = f0 (1 - L(z)) + (1 - f0) W(z),   L from LostEnergy,
-///   W(z) = int w(o.h) G2 / G1 over the normals that a viewer of cosine z sees = w(z_e).
-/// Facets are seen less flatly than their surface, so that a rough interface reflects less of
-/// grazing light than a smooth one: 0.16, not 0.34, at z = 0.2, an index of 1.5 and alpha = 0.2.
+///   W(z) = int w(o.h) G2 / G1 over the visible normals for cosine z = w(z_e).
+/// Visible microfacets face the viewer more than the surface does, so a rough interface reflects
+/// less at grazing angles than a smooth one: 0.16 instead of 0.34 at z = 0.2, index 1.5 and alpha =
+/// 0.2.
 ///
 /// The effective cosine z_e = z + alpha P(x, roughness, index), x = z / (z + 0.4 alpha), is a
-/// polynomial fitted to numerical integrals, for the exact reflectance of indices from 1.05 to 3
-/// and for Schlick's. W is rather too large than too small: for alpha >= 0.01 and z >= 0.02 it lies
-/// at most 0.007 below the integrals and 0.012 above them. A smooth interface has z_e = z and
-/// L = 0.
+/// polynomial fitted to numerical integrals for exact reflectances of indices from 1.05 to 3 and
+/// for Schlick's formula. The fit prefers overestimates: for alpha >= 0.01 and z >= 0.02, W lies at
+/// most 0.007 below the integrals and 0.012 above them. A smooth interface has z_e = z and L = 0.
 template <typename F>
 struct RoughInterface {
   RoughInterface() = default;
@@ -38,7 +39,7 @@ struct RoughInterface {
         coefficients_[i] = select(has_schlick, mixed, coefficients_[i]);
       }
     }
-    // 2 int W c dc over that of a smooth one, as 1 / (1 + polynomial)^2.
+    // Ratio of 2 int W c dc to its value for a smooth interface, 1 / (1 + polynomial)^2.
     F growth(0.f);
     for (size_t j = 5; j-- > 0;) {
       const F exact = polynomial(x, kMean[j]);
@@ -51,7 +52,7 @@ struct RoughInterface {
     average_lost_ = select(smooth, F(0.f), lost.mean);
   }
 
-  /// W towards the cosine z.
+  /// W for cosine z.
   F weight(const F& z) const {
     const F x = fma(F(z / max(fma(alpha_, F(0.4f), z), F(1e-20f))), F(2.f), F(-1.f));
     F p = coefficients_[kTerms - 1];
@@ -59,13 +60,13 @@ struct RoughInterface {
     return fresnel_.weight(clamp(fma(alpha_, p, z), F(0.f), F(1.f)));
   }
 
-  /// E towards the cosine z plus `back` L, the share of a lobe of multiple scattering; `lost` is
-  /// L(z), or 0 where the interface is smooth.
+  /// E for cosine z plus `back` L, the contribution of a lobe of multiple scattering. `lost` is
+  /// L(z), or 0 for a smooth interface.
   template <typename C>
   C albedo(const C& f0, const C& back, const F& z, const F& lost) const {
     return clamped(C(mixed(f0, weight(z)) - C(C(f0 - back) * lost)));
   }
-  /// Its mean, 2 int albedo(z) z dz.
+  /// Hemispherical mean of the albedo, 2 int albedo(z) z dz.
   template <typename C>
   C average(const C& f0, const C& back) const {
     return clamped(C(mixed(f0, average_weight_) - C(C(f0 - back) * average_lost_)));
@@ -85,7 +86,7 @@ struct RoughInterface {
     return p;
   }
 
-  /// By powers of 2 x - 1; in each row by powers of 2 roughness - 1.
+  /// Coefficients of P: rows by powers of 2 x - 1, columns by powers of 2 roughness - 1.
   static constexpr size_t kTerms = 6;
   static constexpr float kExact[kTerms][5] = {
       {0.9266076f, -0.9305411f, 0.7977785f, -0.9539034f, 0.4855576f},
@@ -94,7 +95,7 @@ struct RoughInterface {
       {-0.2120435f, -0.7784132f, -2.9654787f, 4.5759976f, 0.8993006f},
       {-0.8520517f, -1.0105389f, 1.3209972f, 4.3170127f, -1.0808269f},
       {-0.6710762f, -0.2721837f, 2.7463521f, -0.2101072f, -0.2753761f}};
-  /// Times polynomial(x, kIndex), x = (ior - 1) / (ior + 1).
+  /// Index-dependent part of P, multiplied by polynomial(x, kIndex) with x = (ior - 1) / (ior + 1).
   static constexpr float kByIndex[kTerms][4] = {{-0.0842379f, 0.0703477f, -0.0585453f, 0.0508931f},
                                                 {0.0151965f, -0.0094389f, -0.1220402f, 0.2354345f},
                                                 {-0.0243655f, -0.0838729f, 0.1612596f, 0.3183360f},
@@ -110,7 +111,7 @@ struct RoughInterface {
       {-0.2659702f, -1.2259614f, -2.6864402f, 7.5538369f, 1.5607988f},
       {-0.9908347f, -0.8050145f, 3.1506614f, 6.0875536f, -1.6948976f},
       {-0.7599088f, 0.1406918f, 3.9129157f, -0.5094173f, -0.4877852f}};
-  /// By powers 1 to 5 of roughness; in each row by powers of x.
+  /// Coefficients of the mean: rows by powers 1 to 5 of roughness, columns by powers of x.
   static constexpr float kMean[5][3] = {{-0.1069247f, 0.8916114f, -1.6011660f},
                                         {0.5794406f, -15.6900399f, 29.0134264f},
                                         {15.3922461f, 1.7815140f, -14.4212302f},

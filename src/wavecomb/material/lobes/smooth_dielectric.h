@@ -13,7 +13,7 @@ inline F relative_ior(const Vec3<F>& wo, const F& ior) {
   return select(wo.z > 0.f, ior, F(1.f / ior));
 }
 
-/// wo refracted at the unit normal h, cos = wo . h > 0 (Walter et al. 2007, eq. 40).
+/// Refracts wo at the unit normal h; cos_o = wo . h > 0 (Walter et al. 2007, eq. 40).
 template <typename F>
 inline Vec3<F> refract(const Vec3<F>& wo, const Vec3<F>& h, const F& cos_o, const F& cos_t,
                        const F& eta) {
@@ -21,8 +21,8 @@ inline Vec3<F> refract(const Vec3<F>& wo, const Vec3<F>& h, const F& cos_o, cons
   return fma(h, fma(cos_o, inv, F(-cos_t)), Vec3<F>(wo * F(-inv)));
 }
 
-/// Chooses reflection with the probability of Fresnel's reflectance. A transmitted sample carries
-/// radiance / eta^2 (Veach, "Robust Monte Carlo Methods", 1997, section 5.2) and `tint`.
+/// Samples reflection with probability R. A transmitted sample has the weight tint / eta^2, as
+/// radiance scales (Veach, "Robust Monte Carlo Methods", 1997, section 5.2).
 template <typename F>
 inline BsdfSample<F> sample_smooth_dielectric(const Vec3<F>& wo, const F& ior, const Color<F>& tint,
                                               bool schlick, const F& u_lobe) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Iridescence: interference in one thin film (Belcour and Barla, "A Practical Extension to
-/// Microfacet Theory for the Modeling of Varying Iridescence", SIGGRAPH 2017).
+/// Thin-film iridescence (Belcour and Barla, "A Practical Extension to Microfacet Theory for the
+/// Modeling of Varying Iridescence", SIGGRAPH 2017).
 #pragma once
 
 #include "wavecomb/material/lobes/fresnel.h"
@@ -8,12 +8,13 @@
 namespace wavecomb {
 namespace detail {
 
-/// Response of the eye to cos(2 pi opd / lambda), the opd in nanometres: the Fourier transform of
-/// Gaussian fits to the colour matching functions, in linear Rec.709 and 1 for an opd of 0.
+/// Sensor response to the interference term cos(2 pi opd / lambda), with the optical path
+/// difference in nanometres: the Fourier transform of Gaussian fits to the colour matching
+/// functions. Linear Rec.709, normalised to 1 for opd = 0.
 template <typename F>
 inline Color<F> film_sensitivity(const F& opd) {
-  // Amplitude, position (1 / m) and variance of x, y, z and the second lobe of x; the amplitudes
-  // are those of the paper's code times sqrt(2 pi variance), over their sum.
+  // Amplitude, position (1 / m) and variance of the lobes of x, y and z, and of the second lobe of
+  // x. The amplitudes are those of the paper's code times sqrt(2 pi variance), normalised.
   const auto lobe = [&opd](float value, float turns_per_nm, float variance) {
     const F phase = opd * (2.f * kPi * 1e-9f);
     return F(value * sincos_2pi(F(opd * (turns_per_nm * 1e-9f))).cos *
@@ -22,7 +23,7 @@ inline Color<F> film_sensitivity(const F& opd) {
   const F x = lobe(0.846590f, 1.6810e6f, 4.3278e9f) + lobe(0.153868f, 2.2399e6f, 4.5282e9f);
   const F y = lobe(1.000222f, 1.7953e6f, 9.3046e9f);
   const F z = lobe(1.001122f, 2.2084e6f, 6.6121e9f);
-  // XYZ to linear Rec.709, each channel over its value for x = y = z = 1.
+  // XYZ to linear Rec.709, with each channel normalised to 1 for x = y = z = 1.
   const Color<F> rgb(fma(F(3.2404542f), x, fma(F(-1.5371385f), y, F(-0.4985314f * z))),
                      fma(F(-0.9692660f), x, fma(F(1.8760108f), y, F(0.0415560f * z))),
                      fma(F(0.0556434f), x, fma(F(-0.2040259f), y, F(1.0572252f * z))));
@@ -31,21 +32,21 @@ inline Color<F> film_sensitivity(const F& opd) {
 
 }  // namespace detail
 
-/// A film of index `ior` and `thickness` (nm), below vacuum. Reflectances are those of Airy's sum
-/// over orders 0 to 3, per channel of three; phases of a reflection are 0 or pi, so metals are
-/// approximated. Absent where weight is 0.
+/// Thin film of index `ior` and `thickness` (nm) in vacuum over a base. Reflectance is the Airy sum
+/// of orders 0 to 3 per RGB channel. Reflection phases are 0 or pi, which approximates metals. A
+/// weight of 0 means: no film.
 template <typename F>
 struct ThinFilm {
   F weight, thickness, ior;
 
-  /// Index of the film; one of no thickness has none of its own.
+  /// Effective index of the film; tends to 1 for thicknesses below 30 nm.
   F index() const {
     const F grown = clamp(F(thickness * (1.f / 30.f)), F(0.f), F(1.f));
     return fma(F(ior - 1.f), F(grown * grown * fma(grown, F(-2.f), F(3.f))), F(1.f));
   }
 
-  /// Reflectance at the cosine c over a base whose amplitudes at the film's lower side are
-  /// base_s and base_p (signed).
+  /// Airy reflectance at cosine c. `base_s` and `base_p` are the signed amplitudes of the base at
+  /// the lower side of the film.
   Color<F> airy(const F& c, const Color<F>& base_s, const Color<F>& base_p) const {
     const F eta = index(), t = refracted_cos(c, eta);
     const F opd = 2.f * eta * thickness * t;
@@ -60,7 +61,7 @@ struct ThinFilm {
     const auto channel = [&](const F& r12, const F& r23, const F& s1, const F& s2, const F& s3) {
       const F top = r12 * r12, bottom = r23 * r23, through = 1.f - top;
       const F rs = through * through * bottom / max(F(1.f - top * bottom), F(1e-6f));
-      const F turn = -r12 * r23;  // r21 r23, a phase of pi as its sign
+      const F turn = -r12 * r23;  // r21 r23, where the sign is a phase of pi
       F term = (rs - through) * turn;
       F r = top + rs + 2.f * term * s1;
       term = term * turn;
@@ -78,7 +79,7 @@ struct ThinFilm {
     return select<F>(total, Color<F>(F(1.f)), sum);
   }
 
-  /// Over a dielectric of index `base`.
+  /// Reflectance over a dielectric of index `base`.
   Color<F> over_dielectric(const F& c, const F& base) const {
     const F eta = index(), t = refracted_cos(c, eta), relative = base / eta;
     const F below = refracted_cos(t, relative);
@@ -88,7 +89,7 @@ struct ThinFilm {
     return airy(c, Color<F>(select(total, F(1.f), s)), Color<F>(select(total, F(1.f), p)));
   }
 
-  /// Over a metal that reflects `f` at this angle.
+  /// Reflectance over a metal that reflects `f` at this angle.
   Color<F> over_metal(const F& c, const Color<F>& f) const {
     const Color<F> root(safe_sqrt(f.x), safe_sqrt(f.y), safe_sqrt(f.z));
     return airy(c, -root, root);

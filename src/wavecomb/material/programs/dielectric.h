@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "dielectric": glass and liquids, smooth or rough. wo.z > 0 is outside; inside, the
-/// relative index is 1 / ior and reflection may be total.
+/// Program "dielectric": glass and liquids, smooth or rough. Outside is wo.z > 0; inside, the
+/// relative index is 1 / ior, and total internal reflection is possible.
 #pragma once
 
 #include "wavecomb/material/lobes/rough_dielectric.h"
 
 namespace wavecomb {
 
-/// base_color tints each crossing.
+/// Dielectric BSDF; base_color tints transmission.
 template <typename F>
 class DielectricBsdf : public BsdfTraits {
  public:
@@ -40,7 +40,7 @@ class DielectricBsdf : public BsdfTraits {
     return {select<F>(smooth_, Color<F>(F(0.f)), e.f_cos), select(smooth_, F(0.f), e.pdf)};
   }
 
-  /// All of it counts as specular.
+  /// The whole BSDF counts as specular.
   Color<F> diffuse_f_cos(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
     return Color<F>(F(0.f));
   }

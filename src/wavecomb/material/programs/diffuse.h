@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "diffuse": a Lambertian surface, alike from both sides.
+/// Program "diffuse": a two-sided Lambertian surface.
 #pragma once
 
 #include "wavecomb/material/bsdf.h"
@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// f = base_color / pi.
+/// Lambertian BSDF, f = base_color / pi.
 template <typename F>
 class DiffuseBsdf : public BsdfTraits {
  public:

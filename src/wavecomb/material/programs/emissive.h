@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "emissive": emits (see fetch_emission) and reflects nothing.
+/// Program "emissive": emission only (fetch_emission), no reflection.
 #pragma once
 
 #include "wavecomb/material/bsdf.h"

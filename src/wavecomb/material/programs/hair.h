@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "hair": fibres of hair and fur (material/lobes/fibre.h), as MaterialX's
-/// `chiang_hair_bsdf` has them (docs/hair.md).
+/// Program "hair": hair and fur fibres (material/lobes/fibre.h), equivalent to MaterialX's
+/// `chiang_hair_bsdf` (docs/hair.md).
 #pragma once
 
 #include <algorithm>
@@ -10,14 +10,14 @@
 
 namespace wavecomb {
 
-/// base_color is what hair of many fibres looks like (Chiang et al. 2016, 4.2), roughness that
-/// along the fibre. What is its own, in the order of its row (scene/programs.h):
-/// azimuthal_roughness, scale_tt, scale_trt (of the longitudinal width of TT and TRT), cuticle_tilt
-/// (degrees, towards the root), tint_r, tint_tt, tint_trt.
+/// Hair BSDF. base_color is the colour of many fibres together (Chiang et al. 2016, 4.2), roughness
+/// the longitudinal roughness. Program-specific parameters, in the order of their row
+/// (scene/programs.h): azimuthal_roughness; scale_tt and scale_trt, factors of the longitudinal
+/// width of TT and TRT; cuticle_tilt in degrees towards the root; tint_r, tint_tt, tint_trt.
 ///
-/// Light goes through: the BSDF is of the whole fibre, and rays that go on meet fibres from outside
-/// alone (accel/presence.h). It has no two sides and no cosine: |cos theta_i| is in it. It is not
-/// reciprocal: where a fibre is met, h, is what wo says.
+/// The BSDF describes the whole fibre, transmission included; continued rays hit only the outside
+/// of fibres (accel/presence.h). There are no two sides, and |cos theta_i| is included in the
+/// model. It is not reciprocal, because wo determines the offset h of the hit.
 template <typename F>
 class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
   using Viewed = ViewedBsdf<HairBsdf<F>, F>;
@@ -58,7 +58,7 @@ class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
     return e;
   }
 
-  /// All of it counts as specular.
+  /// The whole BSDF counts as specular.
   Color<F> diffuse_f_cos(const View& /*view*/, const Vec3<F>& /*wi*/) const {
     return Color<F>(F(0.f));
   }
@@ -77,7 +77,7 @@ class HairBsdf : public ViewedBsdf<HairBsdf<F>, F> {
   using Viewed::delta_probability, Viewed::eval, Viewed::diffuse_f_cos, Viewed::sample;
 
  private:
-  /// Below this, lobes are narrower than what floats tell apart.
+  /// Minimum roughness; lobes below it are too narrow for float precision.
   static constexpr float kLeastRoughness = 0.02f;
   static constexpr float kDarkest = 1e-12f;
   Color<F> base_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "metal": a GGX conductor with multiple scattering, alike from both sides.
+/// Program "metal": a two-sided GGX conductor with multiple scattering.
 #pragma once
 
 #include "wavecomb/material/bsdf.h"
@@ -10,9 +10,9 @@
 
 namespace wavecomb {
 
-/// Reflectance: base_color at normal incidence with a tint at 82 degrees, or the exact conductor of
-/// the measured index where kConductorIndex is set. A black tint (the unset value) counts as white,
-/// which is Schlick's formula.
+/// Metal BSDF. Its reflectance is base_color at normal incidence with a tint at 82 degrees; with
+/// kConductorIndex set, it is that of the measured complex index. A black tint, the default, means
+/// white, which is Schlick's formula.
 template <typename F>
 class MetalBsdf : public BsdfTraits {
  public:
@@ -53,7 +53,7 @@ class MetalBsdf : public BsdfTraits {
     return eval_above(o, mirror_z(wi, side), lost, multiple_probability(lost));
   }
 
-  /// All of it counts as specular.
+  /// The whole BSDF counts as specular.
   Color<F> diffuse_f_cos(const Vec3<F>& /*wo*/, const Vec3<F>& /*wi*/) const {
     return Color<F>(F(0.f));
   }
@@ -88,8 +88,8 @@ class MetalBsdf : public BsdfTraits {
     return f;
   }
 
-  /// Mean over the hemisphere; for a measured index that of the tinted form through its values at 0
-  /// and 82 degrees, which is within a percent or so.
+  /// Hemispherical mean of the reflectance. For a measured index it is the mean of the tinted
+  /// Schlick curve through the values at 0 and 82 degrees, accurate to about one per cent.
   Color<F> mean_reflectance(const Color<F>& f0) const {
     if (none(exact_)) return tinted_.average();
     const F c82(1.f / 7.f);
@@ -101,7 +101,7 @@ class MetalBsdf : public BsdfTraits {
     return select<F>(exact_, F82Tint<F>(f0, tint).average(), tinted_.average());
   }
 
-  /// Share of the lobe of multiple scattering; 0 exactly where it is black.
+  /// Probability of sampling multiple scattering; exactly 0 where that lobe is black.
   F multiple_probability(const F& lost) const {
     return select(smooth_, F(0.f), F(lost * luminance(multiple_)));
   }

@@ -14,18 +14,17 @@
 
 namespace wavecomb {
 
-/// fuzz over coat over { metal, glossy diffuse, transmission }. A layer dims what is below by 1 -
-/// E, its albedo towards the viewer (the specification's albedo scaling): energy is kept exactly,
-/// and the whole is not reciprocal. Each lobe is sampled in proportion to its estimated share; eval
-/// and pdf are those of the mixture.
+/// OpenPBR BSDF: fuzz over coat over { metal, glossy diffuse, transmission }. A layer with
+/// directional albedo E towards the viewer scales the layers below by 1 - E (the specification's
+/// albedo scaling), so energy is conserved, but the BSDF is not reciprocal. Lobes are sampled in
+/// proportion to their estimated contribution; eval and pdf are those of the mixture.
 ///
-/// Opaque and thin-walled surfaces are alike from both sides. A solid that transmits is seen from
-/// inside without fuzz and without the coat's reflection. What is scattered below the surface is
-/// diffuse, or, where light walks there, enters as a diffuse lobe to the other side
-/// (medium/walk.h).
+/// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
+/// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
+/// enters through a diffuse lobe to the other side (medium/walk.h).
 ///
-/// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
-/// show no others.
+/// A variant compiled for some of the features (scene/material_parts.h) gives bitwise equal results
+/// for materials that use no others.
 template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;
@@ -38,12 +37,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kGlows) != 0;
   static constexpr bool kAbsorbs = (kParts & kPasses) != 0;
-  // Not by parts: which lights the tree chooses goes by it.
+  // True for all variants, because light selection in the light tree depends on it.
   static constexpr bool kTransmits = true;
   static constexpr bool kWalks = kBack;
   static constexpr bool kTextured = (kParts & (kVaries | kBrushes)) != 0;
   using Params = OpenPbrParams<F>;
-  /// All, or none: a frame lies along the texture where any of them has one.
+  /// All inputs or none, because one textured input suffices to align the frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -51,7 +50,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
                        input_bit(Input::kClearcoat) | input_bit(Input::kClearcoatRoughness) |
                        input_bit(Input::kNormal) | kNeedsTangent;
 
-  /// Fresnel's formulas are always exact.
+  /// The Fresnel terms are always exact.
   OpenPbrBsdf(const Params& p, bool /*schlick*/)
       : base_(p), eon_(p.diffuse_roughness), energy_(p.energy) {
     if constexpr (kFuzz) {
@@ -60,7 +59,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       fuzz_color_ = p.fuzz_color;
     }
     if constexpr (kCoat) coat_ = OpenPbrCoat<F>(p);
-    // Thin walls let a part of the diffuse light through, and what walks below the surface enters.
+    // Fraction of subsurface light that leaves on the other side: half of it through thin walls,
+    // adjusted by anisotropy, or all of it if a random walk follows.
     const F sub = p.subsurface_weight;
     Color<F> under = p.subsurface_color;
     back_ = seen_back_ = Color<F>(F(0.f));
@@ -95,7 +95,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return any_lobe;
   }
 
-  /// Lanes whose light goes on below the surface, and walks there.
+  /// Lanes whose light enters the surface and continues as a subsurface random walk.
   Mask<F> enters(const Vec3<F>& wo, const Vec3<F>& wi) const {
     if constexpr (!kBack) return Mask<F>(false);
     return walks_ & (wo.z > 0.f) & (wi.z < 0.f);
@@ -109,7 +109,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return passes;
   }
 
-  /// A coat or a fuzz is seen from outside alone.
+  /// Lanes with a coat or fuzz, which exist only on the outside.
   Mask<F> is_layered() const {
     Mask<F> layered(false);
     if constexpr (kFuzz) layered = layered | (fuzz_ > 0.f);
@@ -117,18 +117,19 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return layered;
   }
 
-  /// What depends on wo alone. `o` is above: the frame is mirrored and turned along the grain.
+  /// Values that depend on wo only. `o` is wo mirrored to the upper side and rotated to the axis of
+  /// anisotropy.
   struct View {
     F side;
     Vec3<F> o;
     typename Base::View base;
     typename EonDiffuse<F>::Sampler eon;
     FuzzLobe<F> fuzz;
-    Color<F> glossy;        ///< of the diffuse lobe: what the interface lets pass
+    Color<F> glossy;        ///< transmission of the interface to the diffuse lobe
     F fuzz_on, coat_on;     ///< weights on this side
-    F under_fuzz;           ///< share below the fuzz
-    F coat_compensation;    ///< for energy that one bounce loses
-    Color<F> bare, coated;  ///< share below: bare + coated coat_color^(1 / 2 mu_i)
+    F under_fuzz;           ///< transmission through the fuzz
+    F coat_compensation;    ///< scale of coat reflection for multiple scattering
+    Color<F> bare, coated;  ///< transmission of the layers: bare + coated coat_color^(1 / (2 mu_i))
     F p_diffuse, p_back, p_fuzz, p_coat, p_base;
   };
 
@@ -140,7 +141,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     v.base = base_.view(v.o, wo.z < 0.f, energy_);
     v.eon = eon_.sampler(z);
     v.glossy = (Color<F>(F(1.f)) - v.base.gloss) * base_.opaque;
-    // A solid that transmits has its layers on the outside.
+    // The layers of a transmissive solid are on its outside only.
     const F outside = select(v.base.inside, F(0.f), F(1.f));
     if constexpr (kFuzz) v.fuzz_on = fuzz_ * outside;
     if constexpr (kCoat) v.coat_on = coat_.weight * outside;
@@ -183,7 +184,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   BsdfSample<F> sample(const View& view, const F& u_lobe, const F& u, const F& v) const {
-    // Which lobe, and what is left of the number that chose it.
+    // Choose a lobe; `left` is the remainder of the sample value, rescaled to [0, 1).
     F from = F(0.f), left = F(0.f);
     Mask<F> open = Mask<F>(true);
     const auto choose = [&](const F& p) {
@@ -212,8 +213,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     if (kFuzz && any(is_fuzz)) wi = select<F>(is_fuzz, view.fuzz.sample(o, u, v), wi);
     const Vec3<F> mirror(-o.x, -o.y, o.z);
     if (kCoat && any(is_coat)) {
-      // A facet of the coat may reflect to below, where only what the base transmits has a density:
-      // no sample.
+      // A microfacet of the coat may reflect below the surface, where the coat has no density; such
+      // samples are invalid.
       const Vec3<F> c = sample_microfacet(coat_.ggx, o, u, v);
       const Vec3<F> rough = select<F>(c.z > 0.f, c, Vec3<F>(F(1.f), F(0.f), F(0.f)));
       wi = select<F>(is_coat, select<F>(coat_.smooth, mirror, rough), wi);
@@ -230,7 +231,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     const Mask<F> delta_base = is_base & base_.smooth & above;
     Mask<F> delta_coat(false);
     if constexpr (kCoat) delta_coat = is_coat & coat_.smooth & above;
-    // What is smooth is eval'd as nothing; a mirrored direction may still meet other lobes.
+    // eval excludes smooth lobes; a mirrored direction may still have density in others.
     const Mask<F> delta = delta_base | delta_coat;
     const Mask<F> valid = not_(delta) & (e.pdf > 0.f);
     BsdfSample<F> s = empty_sample<F>();
@@ -253,7 +254,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       s.weight = select<F>(delta, f * F(1.f / p), s.weight);
       s.pdf = select(delta, p, s.pdf);
       s.is_delta = delta;
-      // A facet that reflects all, or light that is as good as absorbed.
+      // A sample that carries no light is invalid, for example after almost complete absorption.
       const Mask<F> nothing = delta & is_black(s.weight);
       s.pdf = select(nothing, F(0.f), s.pdf);
       s.is_delta = s.is_delta & not_(nothing);
@@ -281,7 +282,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
-  /// Along the grain, and back. What is not turned stays as it is, to the sign of a zero.
+  /// Rotates to the axis of anisotropy, and back. Directions stay unchanged, including the sign of
+  /// zeros, where the rotation is 0.
   Vec3<F> turned(const Vec3<F>& w) const {
     if constexpr (!kTurned) return w;
     const Vec3<F> t(fma(turn_cos_, w.x, F(turn_sin_ * w.y)),
@@ -301,7 +303,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   F coat_reflectance(const View& v, const F& cos_h) const {
     return coat_.reflectance(v.coat_on, v.coat_compensation, cos_h);
   }
-  /// Share of the base that is seen through what is above it.
+  /// Transmission of the layers above the base.
   Color<F> below(const View& v, const Vec3<F>& wi) const {
     if (!has_coat()) return v.bare;
     return fma_color(v.coated, coat_.tint(wi.z), v.bare);
@@ -310,7 +312,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     return {fma(a.x, b.x, c.x), fma(a.y, b.y, c.y), fma(a.z, b.z, c.z)};
   }
 
-  /// What the coat's own reflections make of the colour below it.
+  /// Darkening of the base by interreflection with the coat.
   Color<F> darkened(const View& v, const F& z) const {
     const Color<F> albedo = base_.metal_f0() * base_.metal +
                             (diffuse_ + seen_back_) * base_.opaque + Color<F>(base_.glass);
@@ -343,7 +345,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     v.p_base = base * inv;
   }
 
-  /// Of both sides, below the interface.
+  /// Diffuse reflection and transmission below the interface.
   Color<F> diffuse_part(const View& v, const Vec3<F>& wi) const {
     Color<F> f = eon_.eval(diffuse_, v.o, wi);
     if (kBack && any(Mask<F>(v.p_back > 0.f))) f += back_ * back_cos(v.o, wi);
@@ -391,7 +393,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   OpenPbrCoat<F> coat_;
   F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
   Color<F> fuzz_color_, diffuse_, back_;
-  Color<F> seen_back_;  ///< of what is behind `back_`: the colour that comes back
+  Color<F> seen_back_;  ///< colour of the light that returns after it entered through `back_`
   Mask<F> walks_{false};
 };
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "plastic": a diffuse base under a clear dielectric coat, smooth or rough, alike from
-/// both sides.
+/// Program "plastic": a diffuse base under a clear, smooth or rough dielectric coat; two-sided.
 #pragma once
 
 #include "wavecomb/material/bsdf.h"
@@ -11,8 +10,9 @@
 
 namespace wavecomb {
 
-/// f = coat + base_color / pi * seen_through_coat, by the coat's albedos: those of its roughness,
-/// with what is lost between its facets, so that a white base under a lossless coat loses nothing.
+/// Plastic BSDF, f = coat + base_color / pi * seen_through_coat. Uses the albedos of the coat at
+/// its roughness, including multiple scattering, so a white base under a lossless coat keeps all
+/// energy.
 template <typename F>
 class PlasticBsdf : public BsdfTraits {
  public:
@@ -79,21 +79,21 @@ class PlasticBsdf : public BsdfTraits {
  private:
   F reflectance(const F& cos_i) const { return coat_(coat_.f0_exact, cos_i); }
 
-  /// All that the coat reflects towards the cosine z: its reflectance where it is smooth.
+  /// Directional albedo of the coat for cosine z: the Fresnel reflectance if it is smooth.
   F coat_albedo(const F& z) const {
     const F lost = select(smooth_, F(0.f), lost_(z));
     return interface_.albedo(coat_.f0_exact, F(0.f), z, lost);
   }
 
-  /// Probability of sampling the coat: its share of what is reflected, kept away from 0 and 1
-  /// unless the other lobe is black.
+  /// Probability of sampling the coat, in proportion to its contribution. It is clamped to [0.05,
+  /// 0.95] unless the base is black.
   F coat_probability(const F& coat) const {
     const F diffuse = luminance(base_) * F(1.f - coat);
     const F share = coat / max(F(coat + diffuse), F(1e-20f));
     return select(is_black(base_), F(1.f), clamp(share, F(0.05f), F(0.95f)));
   }
 
-  /// The base's f_cos, without its colour.
+  /// f |cos theta_i| of the base without its colour.
   F below_coat(const F& coat_o, const Vec3<F>& wi, const F& cosine) const {
     return seen_through_coat(coat_o, coat_albedo(max(wi.z, F(0.f))), average_) * cosine;
   }

@@ -16,27 +16,26 @@
 namespace wavecomb {
 
 /// Clearcoat over specular reflection over { diffuse, straight transmission } ("UsdPreviewSurface
-/// Specification", OpenUSD), alike from both sides:
-///   specular       GGX, F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or
-///   specular_color
-///                  in the specular workflow; F90 = 1; with multiple scattering, sampled as
-///                  diffuse;
-///   diffuse        base_color (1 - metallic) opacity, seen through the specular interface, by the
-///                  albedos of its roughness (RoughInterface);
-///   transmission   (1 - opacity) times what the interface lets pass, straight on;
-///   clearcoat      GGX of the same index times `clearcoat`; what lies below is dimmed by its
-///                  albedo at the flatter of the two directions, which is reciprocal and never
-///                  gains energy.
+/// Specification", OpenUSD); two-sided:
+///   specular       GGX with multiple scattering, which is sampled as diffuse. F90 = 1, and
+///                  F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or specular_color
+///                  in the specular workflow;
+///   diffuse        base_color (1 - metallic) opacity, times the transmission of the specular
+///                  interface by its rough albedo (RoughInterface);
+///   transmission   (1 - opacity) times the transmission of the interface, straight through;
+///   clearcoat      GGX of the same index times `clearcoat`. It dims the layers below by its albedo
+///                  at the more grazing of the two directions, which is reciprocal and adds no
+///                  energy.
 /// docs/decisions/preview-surface.md compares it with the specification and other renderers.
 ///
-/// A variant with some parts only (scene/material_parts.h) gives the same bits for materials that
-/// show no others.
+/// A variant compiled for some of the features (scene/material_parts.h) gives bitwise equal results
+/// for materials that use no others.
 template <typename F, uint32_t kParts>
 class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;
   static constexpr bool kMetal = (kParts & kMetals) != 0, kCoat = (kParts & kCoats) != 0,
                         kStraight = (kParts & kPasses) != 0;
-  /// What is reflected: without metal it has no colour.
+  /// Specular reflectance: scalar in variants without metal, where it has no colour.
   using Tint = std::conditional_t<kMetal, Color<F>, F>;
 
  public:
@@ -44,7 +43,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kGlows) != 0;
   static constexpr bool kTextured = (kParts & kVaries) != 0;
-  /// All, or none: a frame lies along the texture where any of them has one.
+  /// All inputs or none, because one textured input suffices to align the frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -64,7 +63,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
       metallic = select(specular_workflow, F(0.f), params.metallic);
       f0_ = lerp(f0_, params.base_color, metallic);
       f0_ = select<F>(specular_workflow, params.specular_color, f0_);
-      // Metals and the specular workflow follow Schlick's formula, dielectrics the exact one.
+      // Metals and the specular workflow use Schlick's formula, dielectrics the exact one.
       if (!schlick) exact = select(specular_workflow, F(0.f), F(1.f - metallic));
     }
     if constexpr (kMetal || kStraight)
@@ -80,7 +79,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
       multiple_ = select<F>(smooth_, Color<F>(F(0.f)), multiple_);
     else
       multiple_ = select(smooth_, F(0.f), multiple_);
-    // In its place: it is large.
+    // Constructed in place because it is large.
     std::construct_at(&rough_, interface_, roughness_, ggx_.alpha, lost_, smooth_);
     average_ = rough_.average(f0_, multiple_);
     if constexpr (!kCoat) return;
@@ -104,15 +103,15 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     return any_lobe;
   }
 
-  /// What depends on wo alone: albedos towards it, which are the reflectances of what is smooth,
-  /// and the probabilities of the lobes. `o` is wo, above the surface.
+  /// Values that depend on wo only: directional albedos, which are Fresnel reflectances for smooth
+  /// lobes, and sampling probabilities. `o` is wo mirrored to the upper side.
   struct View {
     F side;
     Vec3<F> o;
     F coat, lost;
-    F lost_share;      ///< of multiple scattering: lost over its mean
-    Tint specular;     ///< albedo
-    Color<F> diffuse;  ///< the diffuse base as it is seen, without what the light has to pass
+    F lost_share;      ///< multiple scattering: lost / mean
+    Tint specular;     ///< directional albedo
+    Color<F> diffuse;  ///< diffuse colour times transmission towards the viewer
     Color<F> straight;
     MaskedView<F> masked;
     F p_diffuse, p_specular, p_coat, p_straight;
@@ -134,7 +133,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     const Color<F> passed = Color<F>(F(1.f)) - Color<F>(v.specular);
     v.straight = Color<F>(F(0.f));
     if constexpr (kStraight) v.straight = passed * F(below * transparency_);
-    // Estimated contributions; a lobe that can contribute gets at least 2 % before normalisation.
+    // Probabilities are estimated contributions; a lobe that can contribute gets at least 0.02
+    // before normalisation.
     const F floor(0.02f);
     const F multiple = F(below * v.lost) * luminance(Color<F>(multiple_));
     const F diffuse = select(is_black(diffuse_), multiple,
@@ -229,12 +229,12 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   }
 
  private:
-  /// What the clearcoat leaves of the light below it.
+  /// Transmission of the clearcoat for light of the layers below.
   F below_coat(const Vec3<F>& wo, const Vec3<F>& wi) const {
     return F(1.f - coat_albedo(max(min(wo.z, abs(wi.z)), F(0.f))));
   }
 
-  /// Whether a lane has a clearcoat.
+  /// Whether any lane has a clearcoat.
   bool has_coat() const {
     if constexpr (kCoat) return any(Mask<F>(clearcoat_ > 0.f));
     return false;
@@ -248,7 +248,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   Tint specular_albedo(const F& z) const {
     return rough_.albedo(f0_, multiple_, z, select(smooth_, F(0.f), lost_(z)));
   }
-  /// What the specular interface lets pass of light of cosine z.
+  /// Transmission of the specular interface for cosine z.
   Tint passing(const F& z) const { return Tint(F(1.f)) - specular_albedo(z); }
 
   BsdfEval<F> eval_above(const Vec3<F>& wo, const Vec3<F>& wi, const View& view) const {
