@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tests of programs and lobes: directions, a chart of them for chi_square.h, numbers, furnaces,
-/// parameters. Double precision around the float code under test.
+/// Helpers for tests of programs and lobes: directions and their charts for chi_square.h, sample
+/// points, white furnaces, and parameters. The helpers use double precision, the code under test
+/// floats.
 #pragma once
 
 #include <cmath>
@@ -21,8 +22,9 @@ inline Vec3<float> direction(double cos_theta, double phi) {
           static_cast<float>(cos_theta)};
 }
 
-/// Directions as places: chart 0 above, chart 1 below, each (1 - |cos theta|, azimuth), dw being
-/// the product of their differentials. No precision is lost at the poles.
+/// Charts of directions: chart 0 is the upper hemisphere, chart 1 the lower. The coordinates are (1
+/// - |cos theta|, azimuth), so dw is the product of their differentials, and no precision is lost
+/// at the poles.
 inline std::vector<chi_square::Chart> direction_charts() {
   return {{0, 1, -kPiD, kPiD}, {0, 1, -kPiD, kPiD}};
 }
@@ -37,7 +39,7 @@ inline Vec3<float> direction_at(const chi_square::Place& p) {
           static_cast<float>(p.chart ? -z : z)};
 }
 
-/// Points of a low-discrepancy sequence in the unit cube (Roberts' R3), in [0, 1).
+/// Points of a low-discrepancy sequence in the unit cube (Roberts' R3).
 struct Point3 {
   float x, y, z;
 };
@@ -51,8 +53,8 @@ inline Point3 kronecker(uint32_t i) {
   return {p[0], p[1], p[2]};
 }
 
-/// Light seen on a surface in a uniform white surrounding: the mean weight in the brightest
-/// channel, radiance scaling undone.
+/// Returns the radiance reflected in a white furnace: the mean sample weight of the brightest
+/// channel, without radiance scaling.
 template <typename Bsdf>
 double furnace(const Bsdf& bsdf, const Vec3<float>& wo, uint32_t samples = 40000) {
   double sum[3] = {0, 0, 0};
@@ -67,7 +69,7 @@ double furnace(const Bsdf& bsdf, const Vec3<float>& wo, uint32_t samples = 40000
   return std::max({sum[0], sum[1], sum[2]}) / samples;
 }
 
-/// Parameters at their defaults, with a colour.
+/// Returns default parameters with a colour.
 inline OpenPbrParams<float> plain_params() {
   const Vec3<float> black(0.f), white(1.f);
   OpenPbrParams<float> p{};
@@ -90,7 +92,8 @@ inline OpenPbrParams<float> plain_params() {
   return p;
 }
 
-/// `p` as program `Bsdf` takes it. What it has to itself is `own` of the way from least to most.
+/// Converts `p` to the parameter type of program `Bsdf`. Program-specific parameters are set to the
+/// fraction `own` of their range.
 template <typename Bsdf, typename F>
 ParamsOf<Bsdf, F> params_for(const OpenPbrParams<F>& p, float own = 0.5f) {
   constexpr const ProgramInfo& kInfo = info_of(Bsdf::kProgram);

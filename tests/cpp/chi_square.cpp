@@ -25,14 +25,14 @@ constexpr size_t kShortSamples = 20000;
 #endif
 constexpr size_t kLongSamples = 1000000;
 
-constexpr size_t kFineSamples = 800;  ///< that a fine cell expects at the least
+constexpr size_t kFineSamples = 800;  ///< minimum expected count of a fine cell
 constexpr size_t kMostFine = 1024, kLeastFine = 16, kCoarse = 32;
-/// Leaves of a cell, where samples are many and where they are few.
+/// Leaves per cell for many samples and for few.
 constexpr size_t kManyLeaves = 8, kFewLeaves = 3;
-/// Batteries of the whole program: the correction is for as many.
+/// Number of batteries in the whole program, for Sidak's correction.
 constexpr size_t kBatteries = 25;
 
-/// Cells that all count the same: what falls in them, and what should.
+/// Observed and expected counts of cells of about equal mass.
 struct Counts {
   std::vector<double> observed, expected;
   void add(double o, double e) {
@@ -41,8 +41,8 @@ struct Counts {
   }
 };
 
-/// Leaves that follow each other, put together until a cell expects `least`; where nothing is
-/// expected, they are one cell, the last.
+/// Groups consecutive leaves into cells until each expects at least `least` samples. Leaves where
+/// nothing is expected form one last cell.
 struct Cells {
   Counts counts;
   std::vector<size_t> first_leaf;
@@ -71,7 +71,7 @@ Cells gather_cells(const Counts& leaves, double least) {
   return cells;
 }
 
-/// Of a draw's atom: two that look alike but have other probabilities are two.
+/// Identifies an atom. Draws with the same id but different probabilities are different atoms.
 using AtomKey = std::pair<uint64_t, double>;
 
 std::string describe(const Leaves::Leaf& leaf, double observed, double expected) {
@@ -210,7 +210,8 @@ Result compare(const Case& c, uint32_t seed, size_t samples) {
   result.nothing = static_cast<double>(nothing) / n;
   result.disagreeing = static_cast<double>(disagreeing) / static_cast<double>(checked);
 
-  // Nothing expects what is left of 1; what integrals err by does not speak against a sampler.
+  // The remainder to 1 is the probability of no sample. It is widened by the integration error,
+  // which is not the sampler's fault.
   result.slack = std::max(c.slack, 60 / n);
   const double left = std::max(0.0, 1 - result.mass - result.atoms) * n;
   const double beyond =
@@ -251,7 +252,7 @@ void Battery::run(const Case& c) {
                 *std::min_element(result.p_values.begin(), result.p_values.end()));
     std::fflush(stdout);
   }
-  // Closures may refer to what ends with the case.
+  // Drop the case's closures: they may refer to objects that no longer exist when judge() runs.
   entries_.push_back({{c.name, {}, {}, {}, c.odd}, result});
 }
 

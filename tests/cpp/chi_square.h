@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Chi-square tests of samplers over cells of equal mass.
+/// Chi-square tests of samplers with cells of equal mass.
 ///
-/// A sampler draws places, from a domain that rectangles ("charts") cover, or atoms, which are
-/// drawn with a probability of their own (delta lobes, point lights), or nothing. Pilot samples cut
-/// the charts at medians (a k-d tree) until each leaf has a few of them, so that a lobe of a
-/// thousandth of a radian has as many leaves as one that fills the hemisphere. The density is
-/// integrated over each leaf, adaptively; leaves that follow each other make cells of equal mass.
-/// Another set of samples is counted in them. Each atom is a cell, and so is nothing, which expects
-/// what is left of 1.
+/// A sampler draws a point of a domain, which is covered by rectangles ("charts"), or an atom,
+/// which has a probability (delta lobes, point lights), or nothing. A k-d tree splits the charts at
+/// medians of pilot samples until each leaf has a few of them, so a lobe of a thousandth of a
+/// radian gets as many leaves as one that fills the hemisphere. The density is integrated
+/// adaptively over each leaf, and consecutive leaves form cells of equal mass. A separate set of
+/// samples is then counted in the cells. Each atom is a cell; so is "no sample", which expects the
+/// remainder to 1.
 ///
-/// It is done with fine cells (of some 1000 samples), which see what is narrow, and with 32 coarse
-/// ones, which see small faults of a whole lobe. `WAVECOMB_LONG=1` draws a million samples,
-/// `make test` fewer.
+/// The test uses fine cells of about 1000 samples, which detect narrow faults, and 32 coarse cells,
+/// which detect small faults of whole lobes. `WAVECOMB_LONG=1` draws a million samples, `make test`
+/// fewer.
 #pragma once
 
 #include <cstdint>
@@ -28,14 +28,14 @@ struct Place {
   double x = 0, y = 0;
 };
 
-/// A rectangle [x0, x1] x [y0, y1]. Where so many equal columns and rows meet, the density may
-/// jump.
+/// The rectangle [x0, x1] x [y0, y1]. The density may jump at the boundaries of a regular grid of
+/// columns and rows.
 struct Chart {
   double x0 = 0, x1 = 1, y0 = 0, y1 = 1;
   uint32_t columns = 1, rows = 1;
 };
 
-/// Numbers in [0, 1), multiples of 2^-24, alike with every standard library.
+/// Random multiples of 2^-24 in [0, 1), equal with every standard library.
 class Random {
  public:
   explicit Random(uint32_t seed) : rng_(seed) {}
@@ -46,14 +46,14 @@ class Random {
   std::mt19937 rng_;
 };
 
-/// What a sampler drew.
+/// Result of a draw.
 struct Draw {
   enum class Kind : uint8_t { kNothing, kPlace, kAtom };
   Kind kind = Kind::kNothing;
   Place place;
-  uint64_t atom = 0;       ///< which
-  double probability = 0;  ///< of the atom, as the sampler says
-  bool agrees = true;      ///< density and weight of the sample are those of its place
+  uint64_t atom = 0;       ///< id of the atom
+  double probability = 0;  ///< probability of the atom, reported by the sampler
+  bool agrees = true;      ///< density and weight agree with the evaluation at the sampled point
 
   static Draw nothing() { return {}; }
   static Draw at(const Place& place, bool agrees = true) {
@@ -64,40 +64,40 @@ struct Draw {
   }
 };
 
-/// A sampler and what it should follow.
+/// A sampler and the density that it should follow.
 struct Case {
   std::string name;
   std::vector<Chart> charts;
   std::function<double(const Place&)> density;  ///< per dx dy
-  /// `check`: say whether it agrees.
+  /// Draws a sample; `check` asks for Draw::agrees.
   std::function<Draw(Random&, bool check)> draw;
-  /// Share of the samples that need not agree: rounding carries them over an edge.
+  /// Allowed fraction of samples that do not agree, because rounding moves them across an edge.
   double odd = 1e-3;
-  /// What the integral of the density, which is of floats, may be off by; more where samples are so
+  /// Tolerance of the integral of the density, which uses floats. It is larger where samples are so
   /// few that leaves are large.
   double slack = 5e-4;
-  /// Whether the density is smooth, with lobes that are seen from afar by their tails, or else has
-  /// jumps.
+  /// True for smooth densities, whose lobes have tails that reveal them from a distance; false for
+  /// densities with jumps.
   bool is_smooth = true;
-  /// Along each axis of a chart, boxes over which it is integrated at the least: many where it
-  /// jumps along curves.
+  /// Minimum number of integration boxes along each axis of a chart; large for densities that jump
+  /// along curves.
   double boxes = 12;
 };
 
 struct Result {
-  std::vector<double> p_values;  ///< of fine cells, then of coarse ones
+  std::vector<double> p_values;  ///< fine cells, then coarse cells
   double mass = 0;               ///< integral of the density
-  double slack = 0;              ///< that it was given
-  double atoms = 0;              ///< probability of atoms
-  double nothing = 0;            ///< share of the samples
-  double disagreeing = 0;        ///< share of the samples
-  std::string worst;             ///< the fine cell that speaks most against the sampler
+  double slack = 0;              ///< tolerance of `mass`
+  double atoms = 0;              ///< total probability of the atoms
+  double nothing = 0;            ///< fraction of draws without a sample
+  double disagreeing = 0;        ///< fraction of samples that do not agree
+  std::string worst;             ///< fine cell with the largest deviation
 
-  /// What is wrong at a level for each p-value; empty: nothing.
+  /// Describes what is wrong at the given level for each p-value; empty if nothing is.
   std::string fault(const Case& c, double level) const;
 };
 
-/// Samples of a test: 10^6 where WAVECOMB_LONG is set, fewer in `make test`, fewer still under
+/// Number of samples of a test: 10^6 with WAVECOMB_LONG, fewer in `make test`, and fewest under
 /// sanitizers.
 size_t usual_samples();
 
@@ -107,25 +107,25 @@ Result compare(const Case& c, uint32_t seed, size_t samples = usual_samples());
 /// Probability that a chi-square variable of `dof` degrees of freedom exceeds x.
 double chi_square_p(double x, double dof);
 
-/// p-value of counts against what is expected; cells that expect fewer than 5 are put together. 0
-/// where these expect fewer than 5 and have 25 more.
+/// Returns the p-value of observed counts. Cells that expect fewer than 5 are merged. Returns 0 if
+/// the merged cells expect fewer than 5 but observe 25 more than that.
 double p_of_counts(const std::vector<double>& observed, const std::vector<double>& expected);
 
-/// Level of each of `tests` independent tests that together err with probability `level` (Z. Sidak,
-/// "Rectangular Confidence Regions for the Means of Multivariate Normal Distributions", 1967).
+/// Level of each of `tests` independent tests so that the probability of any false alarm is `level`
+/// (Z. Sidak, "Rectangular Confidence Regions for the Means of Multivariate Normal Distributions",
+/// 1967).
 double sidak(double level, size_t tests);
 
-/// The cases of one test. Each battery of the program errs at the level that Sidak's correction
-/// leaves of 1 % for all of them, each p-value at what it leaves of that: a right program passes
-/// with a probability of 99 % whatever its seeds.
+/// The cases of one test. By Sidak's correction, first over all batteries and then over the
+/// p-values of this one, a correct program passes with a probability of 99 %, whatever its seeds.
 class Battery {
  public:
   explicit Battery(std::string name);
-  /// Compares a case; the seed is its number.
+  /// Compares a case, with its index as seed.
   void run(const Case& c);
-  /// Takes the p-value of a comparison made elsewhere.
+  /// Adds a p-value that was computed elsewhere.
   void add(const std::string& name, double p_value);
-  /// Expects all to be well, and prints how many cases there were and the least p-value.
+  /// Expects all cases to pass, and prints their number and the lowest p-value.
   void judge() const;
 
  private:

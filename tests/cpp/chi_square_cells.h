@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What chi_square.cpp is made of: integrals over boxes of a chart, and boxes with as many samples
-/// each.
+/// Building blocks of chi_square.cpp: integrals over boxes of a chart, and boxes with equal numbers
+/// of samples.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +21,14 @@ struct Box {
 using Point = std::array<double, 2>;
 using Points = std::vector<Point>::iterator;
 
-/// Share of the box that the points spread over.
+/// Extent of the points relative to the box.
 inline double spread(const Box& box, Points first, Points last, size_t axis) {
   const auto [low, high] = std::minmax_element(
       first, last, [axis](const Point& a, const Point& b) { return a[axis] < b[axis]; });
   return ((*high)[axis] - (*low)[axis]) / box.extent(axis);
 }
 
-/// Integrals of a density over boxes.
+/// Adaptive integration of a density over boxes.
 class Integral {
  public:
   Integral(const Case& c, uint32_t chart, const std::vector<Place>& pilot)
@@ -41,9 +41,9 @@ class Integral {
       if (pilot[i].chart == chart) highest_ = std::max(highest_, 2 * c.density(pilot[i]));
   }
 
-  /// The pilot samples in the box say where lobes are: it is halved until they fill it, so that
-  /// what is empty lies as far from them as it is wide. Each part is then halved until that changes
-  /// its integral little, and by less than `tolerance`, of which each half has 0.7.
+  /// Integrates the density over a box. Pilot samples indicate where lobes are: a box is halved
+  /// until they fill it. Each half is then split until the result changes by little, and by less
+  /// than `tolerance`; each half gets 0.7 of the tolerance.
   double over(const Box& box, Points first, Points last, double tolerance, int depth = 60) const {
     if (depth > 0 && last - first > 2) {
       const double fill[2] = {spread(box, first, last, 0), spread(box, first, last, 1)};
@@ -62,7 +62,7 @@ class Integral {
   }
 
  private:
-  /// Where to cut a box: in the middle, or at the border of a column or row next to it.
+  /// Position of a split: the middle of the box, or the boundary of a column or row close to it.
   struct Cut {
     double at;
     bool is_border;
@@ -81,7 +81,7 @@ class Integral {
     std::array<double, 2> bend;  ///< second differences along each axis
   };
 
-  /// Product of two Gauss rules of 3 points.
+  /// Integrates a box by the product of two 3-point Gauss rules.
   Estimate gauss(const Box& b) const {
     constexpr double kNode = 0.7745966692414834;
     constexpr double kX[3] = {0.5 - 0.5 * kNode, 0.5, 0.5 + 0.5 * kNode};
@@ -101,10 +101,10 @@ class Integral {
     return e;
   }
 
-  /// Whether to take `sum`, of the halves, for the integral over a box, for which one rule over the
-  /// whole gave `whole`. A lobe between the nodes may hide from both, or be seen by both as alike
-  /// small, but hardly by a third rule and by the pilot samples, too; unless the box is so small
-  /// that all of it could be as high as the density is anywhere.
+  /// Whether `sum`, the integral over both halves of a box, is accurate enough, given `whole`, one
+  /// rule over the entire box. A lobe between the nodes may hide from both rules or look equally
+  /// small to both, but hardly from a third rule and the pilot samples as well. A box is also
+  /// accepted if it is so small that even the highest density in the chart would contribute little.
   bool is_good(const Box& box, double whole, double sum, Points first, Points last,
                double tolerance) const {
     const double area = box.extent(0) * box.extent(1), change = std::abs(sum - whole);
@@ -147,12 +147,12 @@ class Integral {
 
   const Case& case_;
   uint32_t chart_;
-  std::array<double, 2> widest_;        ///< that a box may be along each axis
-  std::array<double, 2> first_, step_;  ///< of columns and rows
-  double highest_ = 0;                  ///< that the density is in the chart, about
+  std::array<double, 2> widest_;        ///< maximum extent of a box along each axis
+  std::array<double, 2> first_, step_;  ///< start and width of columns and rows
+  double highest_ = 0;                  ///< estimate of the highest density in the chart
 };
 
-/// Boxes with about as many pilot samples each: a k-d tree for each chart, cut at medians.
+/// Boxes with about equal numbers of pilot samples: one k-d tree per chart, split at medians.
 class Leaves {
  public:
   Leaves(const Case& c, const std::vector<Place>& pilot, size_t points_of_leaf)
@@ -170,7 +170,7 @@ class Leaves {
   struct Leaf {
     uint32_t chart;
     Box box;
-    Points first, last;  ///< pilot samples in it
+    Points first, last;  ///< pilot samples inside
   };
   const std::vector<Leaf>& all() const { return leaves_; }
 
@@ -188,7 +188,7 @@ class Leaves {
   struct Node {
     size_t axis;
     double at;
-    int low, high;  ///< a node, or -1 - leaf
+    int low, high;  ///< index of a node, or -1 - index of a leaf
   };
 
   int split(const Box& box, Points first, Points last, size_t next = 0) {
@@ -198,7 +198,7 @@ class Leaves {
     bool can_split = false;
     if (count >= 2 * points_of_leaf_) {
       const double x = spread(box, first, last, 0), y = spread(box, first, last, 1);
-      // By turns, unless the points fill the box along one axis only.
+      // Alternate axes, unless the points are spread along one axis only.
       axis = x < 0.3 * y ? 1 : y < 0.3 * x ? 0 : next;
       for (int attempt = 0; attempt < 2 && !can_split; ++attempt) {
         if (attempt > 0) axis = 1 - axis;
@@ -206,7 +206,8 @@ class Leaves {
         std::nth_element(first, half, last,
                          [axis](const Point& a, const Point& b) { return a[axis] < b[axis]; });
         at = (*half)[axis];
-        can_split = at > box.low[axis] && at < box.high[axis];  // else half of them coincide
+        can_split = at > box.low[axis] && at < box.high[axis];  // false if half of the points
+                                                                // coincide
       }
     }
     if (!can_split) {
@@ -227,7 +228,7 @@ class Leaves {
 
   size_t points_of_leaf_;
   uint32_t chart_ = 0;
-  std::vector<std::vector<Point>> points_;  ///< of each chart
+  std::vector<std::vector<Point>> points_;  ///< per chart
   std::vector<Leaf> leaves_;
   std::vector<Node> nodes_;
   std::vector<int> roots_;

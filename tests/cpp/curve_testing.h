@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Curves, points and splats for tests.
+/// Curves, points and Gaussian splats for tests.
 #pragma once
 
 #include "scene_testing.h"
@@ -10,7 +10,7 @@ namespace wavecomb::curve_testing {
 
 using namespace scene_testing;
 
-/// Arrays of a mesh of curves or points.
+/// Arrays of a curve or point mesh.
 struct CurveData {
   Primitive primitive = Primitive::kCubicTube;
   std::vector<float> positions, radii, normals, uvs;
@@ -23,7 +23,7 @@ struct CurveData {
   }
 };
 
-/// A mesh that owns its arrays.
+/// Makes a mesh that owns its arrays.
 inline Mesh make_curves(CurveData data, uint32_t material = kInheritMaterial,
                         std::string name = "/World/curves") {
   const auto owner = std::make_shared<const CurveData>(std::move(data));
@@ -42,8 +42,8 @@ inline Mesh make_curves(CurveData data, uint32_t material = kInheritMaterial,
   return mesh;
 }
 
-/// `n` wavy curves of `segments` segments from points of a ball of radius `size` outwards, or as
-/// many spheres as they would have control points.
+/// Makes `n` wavy curves of `segments` segments that start inside a ball of radius `size` and grow
+/// outwards. For point primitives, makes as many spheres as the curves would have control points.
 inline CurveData strands(Primitive primitive, uint32_t n, uint32_t segments, float size,
                          float radius, uint32_t seed) {
   CurveData data;
@@ -60,7 +60,7 @@ inline CurveData strands(Primitive primitive, uint32_t n, uint32_t segments, flo
     for (uint32_t k = 0; k < points; ++k) {
       data.point(at, radius * (1.2f - static_cast<float>(k) / static_cast<float>(points)),
                  Vec3<float>(0, 0, 1) + random() * 0.3f);
-      // Smooth at the joints of cubics: the step before and after such a point is the same.
+      // Cubics are smooth at joints: the steps before and after a joint are equal.
       if (!cubic || k % 3 != 2)
         turn = along + random() * (0.6f * size / static_cast<float>(points));
       if (cubic && k % 3 == 0 && k > 0)
@@ -91,7 +91,7 @@ struct SplatData {
   uint32_t degree = 0;
 };
 
-/// A mesh that owns them, with rows made.
+/// Makes a mesh that owns the arrays, including the packed splat rows.
 inline Mesh make_splats(SplatData data, uint32_t material, std::string name = "/World/splats") {
   data.rows = splat_rows(data.scales, data.orientations, data.opacities, "splats");
   data.radii = splat_radii(data.rows);
@@ -109,7 +109,7 @@ inline Mesh make_splats(SplatData data, uint32_t material, std::string name = "/
   return mesh;
 }
 
-/// `n` splats in a ball of radius `size`, of scales up to `scale`.
+/// Makes `n` random splats in a ball of radius `size`, with scales up to `scale`.
 inline SplatData random_splats(uint32_t n, float size, float scale, uint32_t degree,
                                uint32_t seed) {
   SplatData data;
@@ -129,8 +129,8 @@ inline SplatData random_splats(uint32_t n, float size, float scale, uint32_t deg
   return data;
 }
 
-/// Curves, points and splats of every kind, of every program, with textures, presence and instances
-/// (mirrored, stretched), beside triangles.
+/// A scene with curves, points and splats of every kind and program, with textures, presence and
+/// instances (mirrored, stretched), and triangles.
 inline ScenePtr hairy() {
   SceneBuilder b;
   const uint32_t picture = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));

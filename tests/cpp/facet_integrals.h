@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Integrals over the microfacets of a rough surface, in double precision and by a rule with fixed
-/// points: what the tests of energy compare programs with. Written for themselves: nothing here is
-/// shared with the code under test.
+/// Integrals over the microfacets of a rough surface, in double precision with fixed quadrature
+/// points, as references for energy tests. This code is independent: it shares nothing with the
+/// code under test.
 #pragma once
 
 #include <algorithm>
@@ -11,11 +11,11 @@
 
 namespace wavecomb::facet_integrals {
 
-/// A reflectance and the cosine beyond the interface; 1 and 0 where all is reflected.
+/// Reflectance, and cosine of the refracted ray; 1 and 0 under total internal reflection.
 struct Crossing {
   double reflectance, cos_t;
 };
-/// Fresnel's, at the cosine c of a dielectric of relative index eta (Born and Wolf, 1.5.2).
+/// Fresnel reflectance at cosine c for a dielectric of relative index eta (Born and Wolf, 1.5.2).
 inline Crossing fresnel(double c, double eta) {
   const double t2 = 1 - (1 - c * c) / (eta * eta);
   if (t2 <= 0) return {eta < 1 ? 1.0 : 0.0, 0};
@@ -25,7 +25,7 @@ inline Crossing fresnel(double c, double eta) {
   return {0.5 * (p * p + s * s), t};
 }
 
-/// 2 int F(c) c dc from outside.
+/// Mean Fresnel reflectance from outside, 2 int F(c) c dc.
 inline double mean_fresnel(double eta) {
   constexpr int kSteps = 4000;
   double sum = 0;
@@ -36,9 +36,9 @@ inline double mean_fresnel(double eta) {
   return sum / kSteps;
 }
 
-/// The normals of a GGX surface that a viewer of cosine `z` and azimuth `phi` sees, in equal shares
-/// (midpoints of Dupuy and Benyoub's map, "Sampling Visible GGX Normals with Spherical Caps",
-/// 2023), each with G2 / G1 of the light it sends up and of that which it sends down.
+/// Visible GGX normals for a viewer of cosine `z` and azimuth `phi`, each with equal weight
+/// (midpoints of the map of Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps",
+/// 2023). Each has G2 / G1 of its reflected and its refracted direction.
 class SeenFacets {
  public:
   SeenFacets(double z, double phi, double ax, double ay, double eta, int steps = 96) {
@@ -73,12 +73,12 @@ class SeenFacets {
       }
   }
 
-  /// Mean of what `reflectance`, of the cosine between normal and viewer, sends up.
+  /// Mean reflection for `reflectance`, a function of the cosine between normal and viewer.
   template <typename Reflectance>
   double up(Reflectance reflectance) const {
     return mean([&](const Facet& f) { return reflectance(f.cosine) * f.up; });
   }
-  /// Mean of what `transmittance` sends down.
+  /// Mean transmission for `transmittance`, a function of the same cosine.
   template <typename Transmittance>
   double down(Transmittance transmittance) const {
     return mean([&](const Facet& f) { return transmittance(f.cosine) * f.down; });
@@ -87,7 +87,7 @@ class SeenFacets {
   struct Facet {
     double cosine, up, down;
   };
-  /// Mean of a function of facets.
+  /// Mean of a function of microfacets.
   template <typename Function>
   double mean(Function function) const {
     double sum = 0;

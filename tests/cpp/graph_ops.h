@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Operations of value graphs, written by hand.
+/// Hand-written operations of value graphs.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ inline GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_l
   return o;
 }
 
-/// The number of a parameter, or of one component of it.
+/// Index of a parameter, or of one of its components.
 inline uint16_t output(const char* name, uint32_t component = 0) {
   return static_cast<uint16_t>(graph_parameter(name) + component);
 }

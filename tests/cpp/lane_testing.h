@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What tests of lane kernels share: every width, and comparison of bits.
+/// Shared helpers for tests of lane kernels: loops over lane widths, and bitwise comparison.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,8 @@
 
 #include "wavecomb/core/lanes.h"
 #include "wavecomb/core/vec.h"
-// The library has kernels of its own lane widths alone; tests instantiate them at every width.
+// The library contains kernels only for the lane widths of the build; tests instantiate them at
+// every width.
 #include "wavecomb/graph/hit_point.inl"
 #include "wavecomb/graph/run.inl"
 #include "wavecomb/learn/guide.inl"
@@ -25,8 +26,8 @@ namespace wavecomb::lane_testing {
 inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 inline constexpr float kInf = std::numeric_limits<float>::infinity();
 
-/// Calls f.operator()<F>() for each packet type; with sanitizers for those alone that have kernels,
-/// since the others would take as long to compile and show nothing else.
+/// Calls f.operator()<F>() for each packet type. Under sanitizers only for types with kernels,
+/// because others would double the compile time without finding more.
 template <typename Function>
 void for_each_packet(const Function& f) {
 #if !defined(__SANITIZE_ADDRESS__) || defined(WAVECOMB_HAS_LANES_4)
@@ -39,7 +40,7 @@ void for_each_packet(const Function& f) {
   f.template operator()<FloatP<16>>();
 #endif
 }
-/// The same with `float` first.
+/// Calls f.operator()<F>() for float, then for each packet type.
 template <typename Function>
 void for_each_lane_type(const Function& f) {
   f.template operator()<float>();
@@ -57,7 +58,8 @@ inline Mask<F> make_mask(uint32_t bits) {
   }
 }
 
-/// Bit patterns to try as masks of W lanes: all of them up to 8 lanes, a spread of them at 16.
+/// Returns bit patterns to test as masks of W lanes: all patterns for up to 8 lanes, a selection
+/// for 16.
 template <typename F>
 inline std::vector<uint32_t> mask_patterns() {
   constexpr uint32_t kAll = (1u << kWidth<F>)-1u;
@@ -77,7 +79,8 @@ inline bool same_bits(float a, float b) {
   return std::bit_cast<uint32_t>(a) == std::bit_cast<uint32_t>(b) || (a != a && b != b);
 }
 
-/// Numbers that go wrong first: zeros, denormals, bounds, infinities, NaN, and some in between.
+/// Returns floats that are likely to cause errors: zeros, denormals, bounds, infinities, NaN, and
+/// values in between.
 inline std::vector<float> awkward_floats() {
   std::vector<float> all = {0.f,        0x1p-149f,
                             0x1p-130f,  0x1p-126f,
@@ -94,7 +97,7 @@ inline std::vector<float> awkward_floats() {
   return all;
 }
 
-/// `values` with n random floats between lo and hi behind them, made a multiple of 16 long.
+/// Appends n random floats between lo and hi to `values` and pads the length to a multiple of 16.
 inline std::vector<float> padded(std::vector<float> values, size_t n, float lo, float hi,
                                  uint32_t seed = 1) {
   std::mt19937 rng(seed);
@@ -104,7 +107,7 @@ inline std::vector<float> padded(std::vector<float> values, size_t n, float lo, 
   return values;
 }
 
-/// Applies a function of one lane value to all of x at lane type F.
+/// Applies a function of one lane value to all of x with lane type F.
 template <typename F, typename Function>
 std::vector<float> map(const std::vector<float>& x, const Function& f) {
   std::vector<float> y(x.size());
@@ -130,7 +133,7 @@ inline void expect_same(const std::vector<float>& a, const std::vector<float>& b
   }
 }
 
-/// Expects that f gives the same bits for float and for packets of 4, 8 and 16.
+/// Expects bitwise equal results of f for float and for packets of 4, 8 and 16.
 template <typename Function>
 void expect_lanes_agree(const std::vector<float>& x, const Function& f, const char* what) {
   const auto scalar = map<float>(x, f);
@@ -143,7 +146,7 @@ void expect_lanes_agree(const std::vector<float>& x, const std::vector<float>& y
   for_each_packet([&]<typename F>() { expect_same(scalar, map<F>(x, y, f), what); });
 }
 
-/// All pairs out of `values`, as two columns of a length that is a multiple of 16.
+/// Returns all pairs of `values` as two columns, padded to a multiple of 16.
 inline std::array<std::vector<float>, 2> all_pairs(const std::vector<float>& values) {
   std::array<std::vector<float>, 2> pairs;
   for (const float a : values)
@@ -156,7 +159,7 @@ inline std::array<std::vector<float>, 2> all_pairs(const std::vector<float>& val
   return pairs;
 }
 
-/// Error of y in units in the last place of the float nearest to `exact`.
+/// Error of y in units in the last place of the float closest to `exact`.
 inline double ulps(float y, double exact) {
   const float nearest = static_cast<float>(exact);
   if (y == nearest) return 0;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights as a point sees them, as charts for chi_square.h: one for each light, on its own surface,
-/// so that what is a thousandth of a degree wide is as large as what fills the sky, and edges of
-/// lights are edges of charts. All of it is worked out anew, in double precision.
+/// Charts of lights as seen from a point, for chi_square.h. Each light has a chart on its surface,
+/// so narrow and wide lights are resolved equally well, and edges of lights are edges of charts.
+/// All quantities are computed independently, in double precision.
 ///
-///   rect      shares of its edges
-///   disk      square of the distance from its centre, azimuth
-///   triangle  (b1 + b2)^2, b2 / (b1 + b2)
-///   sphere    1 - cos of the angle about its centre, azimuth, both as shares of what is seen
-///   cylinder  angle across, as the share of what is seen; share of the axis
-///   distant   as sphere
-///   dome      x and y of its image, y down; what is seen through portals has charts of theirs,
-///             behind those of all lights, the first portal's where there are several
-/// Points and distant lights of angle 0 have charts where nothing is.
+///    rect      fractions of its edges
+///    disk      squared distance from its centre, azimuth
+///    triangle  (b1 + b2)^2, b2 / (b1 + b2)
+///    sphere    1 - cos of the angle to its centre, azimuth, both relative to the visible cone
+///    cylinder  angle across, relative to the visible range; fraction of the axis
+///    distant   as sphere
+///    dome      x and y of its image, y down; portals have separate charts, after those of
+///              all lights; where several overlap, the chart of the first one
+/// Points and distant lights of angle 0 have empty charts.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +52,7 @@ inline D3 unit(const D3& a) {
 
 class LightCharts {
  public:
-  /// `view` and what it points to must stay.
+  /// The view and the arrays that it points to must outlive this object.
   LightCharts(const LightView& view, const Vec3<float>& from) : view_(view), from_(from) {
     for (uint32_t i = 0; i < view.count; ++i) seen_.push_back(see(i));
     for (uint32_t i = 0; i < view.infinite_count; ++i) {
@@ -71,7 +71,7 @@ class LightCharts {
       }
     }
   }
-  /// The light of a chart.
+  /// Returns the light that a chart belongs to.
   uint32_t light(uint32_t chart) const { return seen_[chart].light; }
 
   std::vector<chi_square::Chart> charts() const {
@@ -85,24 +85,23 @@ class LightCharts {
     return charts;
   }
 
-  /// From the point to a place.
+  /// Ray from the receiver to a point of a chart.
   struct Ray {
     D3 dir;
     double distance = 0;
-    double solid_angle = 0;  ///< per dx dy; 0: it cannot be seen
+    double solid_angle = 0;  ///< per dx dy; 0 if not visible
   };
   Ray ray(const chi_square::Place& p) const {
     Ray r = any_ray(p);
     const uint32_t of = seen_[p.chart].light;
-    // Where another chart has it.
+    // The chart of a portal covers this direction.
     if (r.solid_angle > 0 && seen_[of].portals > 0 && portal(of, r.dir) != p.chart)
       r.solid_angle = 0;
     if (seen_[p.chart].light != p.chart) r.distance = double{kFarAway};
     return r;
   }
 
-  /// Where on `light` a direction of unit length meets it; the nearest place where rounding makes
-  /// it pass by.
+  /// Returns where a unit direction hits `light`, or the nearest point if rounding makes it miss.
   chi_square::Place place(uint32_t light, const Vec3<float>& direction) const {
     const D3 w(direction);
     const uint32_t chart = seen_[light].portals > 0 ? portal(light, w) : light;
@@ -115,14 +114,16 @@ class LightCharts {
     LightKind kind = LightKind::kRect;
     uint32_t light = 0, first_portal = 0, portals = 0;
     bool is_seen = true;
-    D3 p, u, v, n;                           ///< flat: p from the point; cones: v, n across u
-    double area = 0;                         ///< flat: per dx dy
-    double size = 0;                         ///< cones: 1 - cos; cylinder: most angle across
-    double distance = 0;                     ///< to the centre; cylinder: across
-    double radius = 0, begin = 0, axis = 0;  ///< cylinder: along its axis
+    D3 p, u, v, n;                           ///< flat: p relative to the receiver; cones: v, n
+                                             ///< perpendicular to u
+    double area = 0;                         ///< flat: area per dx dy
+    double size = 0;                         ///< cones: 1 - cos; cylinder: maximum angle across
+    double distance = 0;                     ///< to the centre; cylinder: perpendicular to its axis
+    double radius = 0, begin = 0, axis = 0;  ///< cylinder: extent along its axis
   };
 
-  /// The chart of the first portal of dome `light` that a direction goes through; else the dome's.
+  /// Returns the chart of the first portal of dome `light` that a direction passes through, or else
+  /// the chart of the dome.
   uint32_t portal(uint32_t light, const D3& w) const {
     for (uint32_t k = 0; k < seen_[light].portals; ++k) {
       const uint32_t chart = seen_[light].first_portal + k;
@@ -226,7 +227,7 @@ class LightCharts {
         s.n = D3(r.n);
         break;
       case LightKind::kTriangle:
-        break;  // has no record
+        break;  // no packed record
     }
     return s;
   }
@@ -291,7 +292,7 @@ class LightCharts {
     return {h / s.size, turn < 0 ? turn + 1 : turn};
   }
 
-  /// Across, to the near side, at an angle.
+  /// Distance across to the near side, at an angle.
   static double across(const Seen& s, double angle) {
     const double off = s.distance * std::sin(angle);
     return s.distance * std::cos(angle) - std::sqrt(std::max(0.0, s.radius * s.radius - off * off));
@@ -300,7 +301,7 @@ class LightCharts {
     const double angle = (2 * p.x - 1) * s.size, flat = across(s, angle);
     const double z = s.begin + p.y * s.axis, t = std::hypot(flat, z);
     const D3 w = (s.v * (flat * std::cos(angle)) + s.n * (flat * std::sin(angle)) + s.u * z);
-    // dw = d(angle) d(sin gamma), sin gamma = z / t.
+    // dw = d(angle) d(sin gamma), with sin gamma = z / t.
     return {w * (1 / t), t, 2 * s.size * s.axis * flat * flat / (t * t * t)};
   }
   static std::array<double, 2> cylinder_place(const Seen& s, const D3& w) {
@@ -315,11 +316,12 @@ class LightCharts {
   std::vector<Seen> seen_;
 };
 
-/// All lights of a view as `to` sees them, sampled by sample_light: the choice of the light and the
-/// place on it together. Lights of no size are atoms.
+/// Tests sample_light with all lights of a view and receiver `to`: the choice of a light together
+/// with the point on it. Lights without extent are atoms.
 ///
-/// The density is what the other technique is told (light_hit, triangle_light_pdf, the infinite
-/// lights' own), 0 where no light comes from. A sample agrees where that is its density and weight.
+/// The density is the one that MIS uses for hits (light_hit, triangle_light_pdf, and the densities
+/// of infinite lights); it is 0 where no light arrives. A sample agrees if its density and weight
+/// match that evaluation.
 inline chi_square::Case light_case(std::string name, const LightView& view,
                                    const LightReceiver<float>& receiver) {
   struct Seen {
@@ -335,7 +337,8 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
         const bool is_dome = r.kind == static_cast<uint32_t>(LightKind::kDome);
         h.pdf = is_dome ? detail::hit_dome_from<float>(view, r, to.p, dir, true).pdf
                         : detail::hit_distant<float>(detail::LightReader<float>(r, true), dir).pdf;
-        h.pdf *= view.by_tree ? view.tree.infinite_pdf[light] : r.pick_pdf;  // not weighed anew
+        // light weights do not change it
+        h.pdf *= view.by_tree ? view.tree.infinite_pdf[light] : r.pick_pdf;
         h.radiance = infinite_light_radiance<float>(view, light, to.p, dir, 0.f, true, true);
       } else if (light < view.first_triangle) {
         h = light_hit<float>(view, light, to, dir, distance, true);
@@ -351,7 +354,7 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
   c.name = std::move(name);
   c.charts = seen->charts.charts();
   c.is_smooth = false;
-  // Cones, profiles and portals cut charts.
+  // Shaping cones, IES profiles and portals cause jumps inside charts.
   const bool is_cut = view.shapings || view.portals;
   if (is_cut && c.charts.size() < 8) c.boxes = is_long() ? 256 : 32;
   c.density = [seen](const chi_square::Place& p) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights for tests: short ways to make them, and a tracer of single lights in double precision.
+/// Short ways to make lights for tests, and a double-precision ray tracer for single lights.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@ namespace wavecomb::light_testing {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
-/// A light set with the textures that it needs.
+/// A light set with its textures.
 struct Lights {
   std::vector<TexturePtr> textures;
   std::vector<TextureView> views;
@@ -32,7 +32,7 @@ struct Lights {
     views.push_back(textures.back()->view());
     return static_cast<uint32_t>(textures.size() - 1);
   }
-  /// A material whose emission is a texture.
+  /// Adds a material whose emission is a texture.
   uint32_t add_material(uint32_t texture, std::array<float, 4> scale = {1, 1, 1, 1}) {
     const auto id = static_cast<uint32_t>(records.size());
     records.emplace_back().textured_inputs = input_bit(Input::kEmission);
@@ -66,7 +66,7 @@ inline Affine translate(float x, float y, float z) {
 inline Affine scale(float x, float y, float z) {
   return {{{x, 0, 0}, {0, y, 0}, {0, 0, z}}, {0, 0, 0}};
 }
-/// Rotation by `degrees` about the x axis, then about the y axis.
+/// Rotates by `degrees` about the x axis, then about the y axis.
 inline Affine rotate(double x_degrees, double y_degrees) {
   const double a = x_degrees * kPiD / 180, b = y_degrees * kPiD / 180;
   const auto f = [](double v) { return static_cast<float>(v); };
@@ -94,8 +94,8 @@ inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b
   return t;
 }
 
-/// Distance along dir to the geometry of the first light: a rect, disk, sphere, cylinder or
-/// triangle.
+/// Returns the distance along dir to the geometry of the first light: a rect, disk, sphere,
+/// cylinder or triangle.
 inline std::optional<float> trace(const LightView& view, const Vec3<float>& origin,
                                   const Vec3<float>& dir) {
   LightRecord r{};
@@ -144,7 +144,7 @@ inline std::optional<float> trace(const LightView& view, const Vec3<float>& orig
                        u[0] * v[1] - u[1] * v[0]};
   const double t = -dot(o, m) / dot(d, m);
   if (!(t > 0) || !std::isfinite(t)) return std::nullopt;
-  // h = a u + b v + (no part along m)
+  // h = a u + b v, without a component along m
   const double h[3] = {o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]};
   const double hv[3] = {h[1] * v[2] - h[2] * v[1], h[2] * v[0] - h[0] * v[2],
                         h[0] * v[1] - h[1] * v[0]};

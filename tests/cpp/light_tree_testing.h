@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Many lights, and the choice among them, for tests.
+/// Random lights, and light selection, for tests.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace wavecomb::light_testing {
 
-/// Random numbers by hand: those of the standard library differ between libraries.
+/// Portable random numbers; the distributions of standard libraries differ.
 struct Numbers {
   std::mt19937 rng;
   explicit Numbers(uint32_t seed) : rng(seed) {}
@@ -24,7 +24,8 @@ struct Numbers {
   Vec3<float> direction() { return square_to_sphere<float>((*this)(), (*this)()); }
 };
 
-/// `n` lights of all finite kinds, dark ones and points among them, and `infinite` others.
+/// Makes `n` finite lights of all kinds, including black ones and points, and `infinite` infinite
+/// ones.
 inline Lights random_lights(size_t n, uint32_t seed, size_t infinite = 0) {
   Numbers number(seed);
   std::vector<Light> lights;

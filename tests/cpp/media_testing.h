@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A medium for tests: fog that fills all space. What media need of the integrators is what it
-/// uses.
+/// A test medium: homogeneous fog that fills all space. It uses all hooks that integrators offer to
+/// media.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -13,7 +13,8 @@
 
 namespace wavecomb::media_testing {
 
-/// Scatters evenly. It stands in for the program "principled", whose base colour is the albedo.
+/// Isotropic phase function. It replaces the program "principled", whose base colour becomes the
+/// albedo.
 template <typename F>
 class FogPhase : public BsdfTraits {
  public:
@@ -35,7 +36,7 @@ class FogPhase : public BsdfTraits {
     return {square_to_sphere(u, v), albedo_, F(kDensity), Mask<F>(false), F(1.f), F(1.f)};
   }
 
-  /// A point of the fog, in place of a surface (integrate/steps/interact.h).
+  /// Interaction with the fog, in place of a surface (integrate/steps/interact.h).
   struct Interaction {
     FogPhase bsdf;
     Color<F> throughput;
@@ -64,20 +65,20 @@ class FogPhase : public BsdfTraits {
   Color<F> albedo_;
 };
 
-/// What integrate/media.h asks for.
+/// Medium interface as integrate/media.h requires it.
 struct Fog {
   static constexpr bool kAny = true, kShines = false, kStreams = false;
   template <typename F>
   using Programs = ProgramList<DiffuseBsdf<F>, EmissiveBsdf<F>, FogPhase<F>>;
 
-  Vec3<float> extinction;     ///< per unit of length; none is 0
-  uint32_t material;          ///< a principled one
-  bool tracks_ratio = false;  ///< transmittance of shadow rays by ratio tracking, not by exp
+  Vec3<float> extinction;     ///< per unit of length; no channel is 0
+  uint32_t material;          ///< a material of program "principled"
+  bool tracks_ratio = false;  ///< shadow ray transmittance by ratio tracking instead of exp
 
-  /// A distance by the extinction of a channel, each with probability 1/3, weighted against all
-  /// three:
-  ///   stopped at x:  sigma exp(-sigma x) / mean_c(sigma_c exp(-sigma_c x))
-  ///   not before t:  exp(-sigma t) / mean_c(exp(-sigma_c t))
+  /// Samples a distance by the extinction of a random channel, each with probability 1/3, weighted
+  /// by the densities of all three:
+  ///    stopped at x:  sigma exp(-sigma x) / mean_c(sigma_c exp(-sigma_c x))
+  ///    not before t:  exp(-sigma t) / mean_c(exp(-sigma_c t))
   template <typename F>
   Flight<F> fly(const Passage<F>& p, const Color<F>& /*throughput*/,
                 const Mask<F>& /*active*/) const {
@@ -97,7 +98,8 @@ struct Fog {
   template <typename F>
   Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
     if (!tracks_ratio) return exp_of<F>(p.t);
-    // Novak et al., "Residual Ratio Tracking", 2014, eq. 9, with a majorant of 2 max sigma.
+    // Ratio tracking (Novak et al., "Residual Ratio Tracking", 2014, eq. 9) with a majorant of 2
+    // max sigma.
     const float majorant = 2 * std::max({extinction.x, extinction.y, extinction.z});
     const Color<F> kept{F(1.f - extinction.x / majorant), F(1.f - extinction.y / majorant),
                         F(1.f - extinction.z / majorant)};
@@ -109,7 +111,8 @@ struct Fog {
     for (uint32_t step = 0; any(on); ++step) {
       const F u = unit_float<F>(hash_u32<UInt<F>>(seed, UInt<F>(step)));
       x = select(on, F(x - log(F(1.f - u)) * (1.f / majorant)), x);
-      on = on & (x < p.t) & (max_component(product) > 1e-20f);  // the way to a dome has no end
+      on = on & (x < p.t) & (max_component(product) > 1e-20f);  // rays to a dome are infinitely
+                                                                // long
       product = select<F>(on, product * kept, product);
     }
     return product;

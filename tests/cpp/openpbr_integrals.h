@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What OpenPBR's own formulas give back of a white surrounding, by integration in double
-/// precision: facet_integrals.h for all that is rough, nothing of the tables, fits and samplers of
-/// the program. Colours are three numbers.
+/// White furnace of OpenPBR by numerical integration of the model's formulas in double precision.
+/// Rough interfaces use facet_integrals.h; none of the tables, fits and samplers of the program are
+/// used. Colours are three numbers.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ namespace wavecomb::facet_integrals {
 
 using Rgb = std::array<double, 3>;
 
-/// Response to cos(2 pi opd / lambda) in linear Rec.709, 1 for an opd of 0; nanometres (Belcour and
-/// Barla 2017, the code beside the paper).
+/// Sensor response to cos(2 pi opd / lambda) in linear Rec.709, 1 for an opd of 0; opd in
+/// nanometres (Belcour and Barla 2017, code that accompanies the paper).
 inline Rgb film_response(double opd) {
   constexpr double kTau = 2 * std::numbers::pi;
   const auto raw = [](double nm) {
@@ -35,11 +35,11 @@ inline Rgb film_response(double opd) {
   return {at[0] / still[0], at[1] / still[1], at[2] / still[2]};
 }
 
-/// A thin film: Airy's sum over orders 0 to 3.
+/// A thin film: Airy sum over orders 0 to 3.
 struct Film {
   double thickness, ior;
 
-  /// At the cosine c, over a base with these amplitudes of reflection inside of the film.
+  /// Reflectance at cosine c over a base with these amplitudes of reflection inside the film.
   Rgb over(double c, const Rgb& base_s, const Rgb& base_p) const {
     const double grown = std::clamp(thickness / 30, 0.0, 1.0);
     const double eta = 1 + (ior - 1) * grown * grown * (3 - 2 * grown);
@@ -78,7 +78,7 @@ struct Film {
   }
 };
 
-/// A function of the cosine with three values, in a table of 1025.
+/// A function of the cosine with three values, tabulated at 1025 points.
 class Curve {
  public:
   template <typename Function>
@@ -98,8 +98,8 @@ class Curve {
   std::vector<Rgb> values_;
 };
 
-/// OpenPBR as docs/openpbr.md has it. The coat and the colour of the specular lobe are white, the
-/// diffuse lobe is not rough.
+/// OpenPBR as docs/openpbr.md defines it, with a white coat, a white specular lobe and a smooth
+/// diffuse lobe.
 class OpenPbrModel {
  public:
   explicit OpenPbrModel(const OpenPbrParams<float>& p)
@@ -141,7 +141,8 @@ class OpenPbrModel {
     }
   }
 
-  /// Of a white surrounding, towards the cosine z and the azimuth phi; below: from inside.
+  /// Radiance reflected in a white furnace towards cosine z and azimuth phi; `below` means from
+  /// inside.
   Rgb seen(double z, double phi, bool below) const {
     const bool inside = below && glass_ > 0 && !thin_;
     const double eta = inside ? 1 / ior_ : ior_;
@@ -155,10 +156,10 @@ class OpenPbrModel {
       const auto filmed = [&](const std::unique_ptr<Curve>& film, double c, double bare) {
         return film ? bare + film_on_ * (film->at(c, k) - bare) : bare;
       };
-      // Metal.
+      // Metal lobe.
       double base = metal_ * std::min(weight_, 1.0) * (1 + base_[k] * lost) *
                     facets.up([&](double c) { return filmed(over_metal_, c, metal(c)[k]); });
-      // Interface over a diffuse base, which has what is left.
+      // Interface over a diffuse base, which receives the rest.
       const double f0 = fresnel(1, gloss_ior_).reflectance;
       const double gloss = (1 + f0 * lost) * facets.up([&](double c) {
         return filmed(over_gloss_, c, fresnel(c, gloss_ior_).reflectance);
@@ -173,7 +174,7 @@ class OpenPbrModel {
   }
 
  private:
-  /// SeenFacets, or one where the surface is smooth.
+  /// SeenFacets, or a single facet if the surface is smooth.
   class Seen {
    public:
     Seen(double z, double phi, double ax, double ay, double eta) : z_(z), eta_(eta) {
@@ -198,7 +199,7 @@ class OpenPbrModel {
     Rgb f;
     for (size_t k = 0; k < 3; ++k) {
       const double f0 = base_[k], schlick = std::pow(1 - c, 5);
-      // Kutz et al. 2021: edge_ times Schlick's at a cosine of 1 / 7.
+      // Edge tint: edge_ times Schlick's value at cosine 1 / 7 (Kutz et al. 2021).
       const double at = f0 + (1 - f0) * std::pow(6.0 / 7, 5);
       const double b = at * (1 - edge_[k]) / (1.0 / 7 * std::pow(6.0 / 7, 6));
       f[k] = std::clamp(f0 + (1 - f0) * schlick - b * c * schlick * (1 - c), 0.0, 1.0);
@@ -206,8 +207,8 @@ class OpenPbrModel {
     return f;
   }
 
-  /// Reflected and transmitted by glass, over that of a white one without film; of brushed glass,
-  /// facet by facet.
+  /// Reflection plus transmission of glass, relative to white glass without a film; per microfacet
+  /// for anisotropic glass.
   double through(const Seen& facets, double eta, bool inside, double white, size_t k) const {
     const auto reflectance = [&](double c, double index) {
       const double t = fresnel(c, eta).cos_t;
@@ -247,7 +248,7 @@ class OpenPbrModel {
            facets.up([&](double c) { return fresnel(c, coat_ior_).reflectance; });
   }
 
-  /// (1 - K) / (1 - K E) ("Coat darkening").
+  /// Darkening by the coat, (1 - K) / (1 - K E) (OpenPBR, "Coat darkening").
   double darkened(double z, size_t k) const {
     const double smooth = fresnel(z, coat_ior_).reflectance;
     const double rough = 1 - (1 - mean_fresnel(coat_ior_)) / (coat_ior_ * coat_ior_);
@@ -258,7 +259,7 @@ class OpenPbrModel {
     return (1 - up) / (1 - up * e);
   }
 
-  /// Zeltner, Burley, Chiang 2022: MaterialX's fit.
+  /// MaterialX's fit of Zeltner, Burley, Chiang 2022.
   double fuzz_albedo(double x) const {
     const double y = std::clamp(fuzz_roughness_, 0.01, 1.0);
     const double s = y * (0.0206607 + 1.58491 * y) / (0.0379424 + y * (1.32227 + y));

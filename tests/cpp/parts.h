@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a test needs: without it the test is skipped, or fails where every part has to be (CI,
-/// WAVECOMB_STRICT=1). What takes minutes runs where WAVECOMB_LONG=1, as `make test-long` sets it.
+/// Optional requirements of tests. A test whose requirement is missing is skipped, or fails with
+/// WAVECOMB_STRICT=1 or in CI. Tests that take minutes run with WAVECOMB_LONG=1, which `make
+/// test-long` sets.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -11,7 +12,8 @@
 
 namespace wavecomb {
 
-/// Whether an environment variable is set to anything but 0, false, no, off or nothing.
+/// Whether an environment variable is set to something other than 0, false, no, off or an empty
+/// string.
 inline bool is_on(const char* name) {
   const char* given = std::getenv(name);
   std::string value = given ? given : "";
@@ -20,20 +22,21 @@ inline bool is_on(const char* name) {
   return !(value.empty() || value == "0" || value == "false" || value == "no" || value == "off");
 }
 
-/// Whether a missing part is a failure: as WAVECOMB_STRICT says, or else in CI.
+/// Whether a missing requirement is a failure: WAVECOMB_STRICT if it is set, else whether this is
+/// CI.
 inline bool is_strict() {
   return is_on(std::getenv("WAVECOMB_STRICT") ? "WAVECOMB_STRICT" : "CI");
 }
 
-/// Whether tests take as long as they need.
+/// Whether long tests run.
 inline bool is_long() {
   return is_on("WAVECOMB_LONG");
 }
 
 }  // namespace wavecomb
 
-/// Ends a test, or its SetUp, that lacks a part; `why_not` is a std::string, empty where it is
-/// there.
+/// Skips or fails a test, or its SetUp, if a requirement is missing. `why_not` is a std::string
+/// with the reason, empty if the requirement is met.
 #define WAVECOMB_NEEDS(part, why_not)                                                            \
   do {                                                                                           \
     const std::string wavecomb_reason = (why_not);                                               \
@@ -45,6 +48,6 @@ inline bool is_long() {
     }                                                                                            \
   } while (false)
 
-/// Ends a test that is too long for `make test`.
+/// Skips a test that takes too long for `make test`.
 #define WAVECOMB_LONG() \
   if (!::wavecomb::is_long()) GTEST_SKIP() << "long: make test-long runs it"

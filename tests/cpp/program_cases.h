@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The materials that tests of all programs go through: one table.
+/// Table of materials with which all programs are tested.
 #pragma once
 
 #include <functional>
@@ -14,7 +14,7 @@ namespace wavecomb::program_cases {
 
 using P = OpenPbrParams<float>;
 
-/// A material as a program sees it.
+/// A program and its parameters.
 struct Case {
   std::string name;
   ProgramId program;
@@ -24,9 +24,10 @@ struct Case {
     const bool clear = params.transmission_weight > 0 && params.thin_walled == 0;
     return program != ProgramId::kDielectric && !(program == ProgramId::kOpenPbr && clear);
   }
-  /// Whether light that crosses the surface bends. All but thin walls.
+  /// Whether transmission refracts; false for thin walls.
   bool bends() const { return program != ProgramId::kOpenPbr || params.thin_walled == 0; }
-  /// OpenPBR scales what lies below a layer by what the viewer's side loses.
+  /// OpenPBR scales lower layers by the viewer's side only, so most of its materials are not
+  /// reciprocal.
   bool reciprocal() const {
     return program != ProgramId::kOpenPbr || name.find("reciprocal") != std::string::npos;
   }
@@ -40,11 +41,11 @@ Case make_case(std::string name, ProgramId program, Edit edit, bool schlick = fa
   return c;
 }
 
-/// A row of the table: a material for any roughness of its main lobe.
+/// Row of the table: a material that can be made for any roughness of its main lobe.
 struct Row {
   std::string name;
   ProgramId program;
-  std::vector<float> usual;  ///< roughnesses that most tests take
+  std::vector<float> usual;  ///< roughnesses that most tests use
   std::function<void(P&, float roughness)> edit;
   bool schlick = false;
 
@@ -59,7 +60,7 @@ struct Row {
   }
 };
 
-/// OpenPBR lobe by lobe, and all of them.
+/// Adds OpenPBR materials: each lobe alone, and all lobes together.
 inline void add_openpbr(std::vector<Row>& all) {
   using Vec = Vec3<float>;
   const auto add = [&](std::string name, std::vector<float> usual, auto edit) {
@@ -81,7 +82,7 @@ inline void add_openpbr(std::vector<Row>& all) {
     p.roughness = 0.5f;
     p.clearcoat = 0.8f, p.clearcoat_roughness = r, p.coat_color = Vec(1, 0.6f, 0.3f);
   });
-  // Facets of this coat often reflect to below, where the base transmits.
+  // Microfacets of this coat often reflect below the surface, where the base transmits.
   add("coated glass", {1.f}, [](P& p, float r) {
     p.roughness = 0.2f;
     p.transmission_weight = 1, p.clearcoat = 1, p.clearcoat_roughness = r;
@@ -109,7 +110,7 @@ inline void add_openpbr(std::vector<Row>& all) {
   });
 }
 
-/// The table. What has no roughness, or only another lobe's, is there, too.
+/// Returns the table. It includes materials without a roughness or with a fixed one.
 inline std::vector<Row> table() {
   using Vec = Vec3<float>;
   std::vector<Row> all;
@@ -152,7 +153,7 @@ inline std::vector<Row> table() {
   return all;
 }
 
-/// Each material at its usual roughnesses.
+/// Returns each material at its usual roughnesses.
 inline std::vector<Case> usual_cases() {
   std::vector<Case> cases;
   for (const Row& m : table())
@@ -168,7 +169,8 @@ void with_bsdf(const Case& c, Function f) {
   });
 }
 
-/// Directions from which a case is seen, at these cosines; from both sides where they differ.
+/// Returns viewing directions at these cosines, from both sides for materials that are not
+/// two-sided.
 inline std::vector<Vec3<float>> views(const Case& c,
                                       const std::vector<double>& cosines = {0.02, 0.25, 0.6, 1.0}) {
   std::vector<Vec3<float>> all;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures and graphs of known ranges, and the variant that a material gets with them.
+/// Textures and graphs of known ranges, and the kernel variants that materials get with them.
 #pragma once
 
 #include "graph_ops.h"
@@ -32,8 +32,8 @@ inline std::string variant_of(const Material& m, std::span<const TexturePtr> tex
   return kVariants[least_variant(m.program, parts_of(shaded, graphs, textures))].name;
 }
 
-/// Texture 0: 0 all over. 1: 1. 2: from 0 to 1. 3: from -1 to -0.5. 4: 2 to 3, NaN among them
-/// where `bad`. 5: colours (0.2, 0.4, 0.6). 6: from 0.5 to 1, and 0 at one texel.
+/// Makes textures with these values: 0: constant 0. 1: constant 1. 2: 0 to 1. 3: -1 to -0.5. 4: 2
+/// to 3, and NaN if `bad`. 5: colour (0.2, 0.4, 0.6). 6: 0.5 to 1, with one texel of 0.
 inline std::vector<TexturePtr> make_textures(bool bad = false) {
   std::vector<float> large(16, 2.f);
   large[3] = 3.f;
@@ -55,7 +55,7 @@ inline std::vector<TexturePtr> make_textures(bool bad = false) {
 
 inline constexpr uint16_t kConstant = kGraphConstant;
 
-/// A graph that drives `parameter` by image `image`, and all components of it.
+/// Makes a graph that drives all components of `parameter` by image `image`.
 inline Graph image_graph(const char* parameter, uint32_t image) {
   Graph g;
   g.ops = {op(GraphCode::kInput, 2, 0, {}, 0, static_cast<uint16_t>(GraphInput::kUv)),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Small scenes for tests, and statistics of pictures.
+/// Small scenes for tests, and statistics of rendered images.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ inline constexpr bool kSanitized = true;
 #else
 inline constexpr bool kSanitized = false;
 #endif
-/// `n`, or less under sanitizers, where everything takes some twenty times longer.
+/// Returns `n`, or n / divisor under sanitizers, which slow tests down about twenty times.
 inline constexpr uint32_t size_for_build(uint32_t n, uint32_t divisor = 8) {
   return kSanitized ? std::max(1u, n / divisor) : n;
 }
@@ -48,7 +48,7 @@ inline Affine translate(float x, float y, float z) {
 inline Affine scale(float x, float y, float z) {
   return {{{x, 0, 0}, {0, y, 0}, {0, 0, z}}, {0, 0, 0}};
 }
-/// Rotation by `degrees` about x (0), y (1) or z (2).
+/// Rotates by `degrees` about x (0), y (1) or z (2).
 inline Affine rotate(int axis, double degrees) {
   const auto c = static_cast<float>(std::cos(degrees * kPiD / 180));
   const auto s = static_cast<float>(std::sin(degrees * kPiD / 180));
@@ -56,8 +56,8 @@ inline Affine rotate(int axis, double degrees) {
   if (axis == 1) return {{{c, 0, s}, {0, 1, 0}, {-s, 0, c}}, {0, 0, 0}};
   return {{{c, -s, 0}, {s, c, 0}, {0, 0, 1}}, {0, 0, 0}};
 }
-/// A camera at `eye` that looks at `at`; its y axis points up, or along -z when it looks straight
-/// down.
+/// Returns the transform of a camera at `eye` that looks at `at`. Its y axis points up, or along -z
+/// if it looks straight down.
 inline Affine look_at(const std::array<double, 3>& eye, const std::array<double, 3>& at) {
   using V = std::array<double, 3>;
   const auto cross = [](const V& a, const V& b) {
@@ -74,7 +74,7 @@ inline Affine look_at(const std::array<double, 3>& eye, const std::array<double,
   return {{{f(x[0]), f(y[0]), f(z[0])}, {f(x[1]), f(y[1]), f(z[1])}, {f(x[2]), f(y[2]), f(z[2])}},
           {f(eye[0]), f(eye[1]), f(eye[2])}};
 }
-/// A camera whose window at z = -1 is `size` wide and high.
+/// Makes a camera whose window at z = -1 is `size` wide and high.
 inline Camera make_camera(const std::array<double, 3>& eye, const std::array<double, 3>& at,
                           float size = 1) {
   Camera camera;
@@ -96,7 +96,7 @@ struct MeshData {
     return static_cast<uint32_t>(positions.size() / 3 - 1);
   }
   void triangle(uint32_t a, uint32_t b, uint32_t c) { indices.insert(indices.end(), {a, b, c}); }
-  /// Moves all points.
+  /// Transforms all points.
   MeshData& transform(const Affine& m) {
     for (size_t i = 0; i < positions.size(); i += 3) {
       const Vec3<float> p = m.point({positions[i], positions[i + 1], positions[i + 2]});
@@ -108,7 +108,7 @@ struct MeshData {
   }
 };
 
-/// A Mesh that owns its arrays.
+/// Makes a Mesh that owns its arrays.
 inline Mesh make_mesh(MeshData data, uint32_t material = kInheritMaterial,
                       std::string name = "/World/mesh") {
   const auto owner = std::make_shared<const MeshData>(std::move(data));
@@ -126,7 +126,7 @@ inline Mesh make_mesh(MeshData data, uint32_t material = kInheritMaterial,
   return mesh;
 }
 
-/// A parallelogram, counter-clockwise as seen from where u x v points.
+/// Makes a parallelogram, counter-clockwise seen from the side that u x v points to.
 inline MeshData quad(const Vec3<float>& p, const Vec3<float>& u, const Vec3<float>& v) {
   MeshData m;
   m.vertex(p.x, p.y, p.z);
@@ -139,12 +139,13 @@ inline MeshData quad(const Vec3<float>& p, const Vec3<float>& u, const Vec3<floa
   m.uvs_at = Attribute::kVertex;
   return m;
 }
-/// A square of the plane y = `y`, facing up.
+/// Makes a square in the plane y = `y` that faces up.
 inline MeshData ground(float half, float y = 0) {
   return quad({-half, y, half}, {2 * half, 0, 0}, {0, 0, -2 * half});
 }
 
-/// A closed box, outside by winding; 12 triangles, two a side in the order -x +x -y +y -z +z.
+/// Makes a closed box of 12 triangles with outward winding, two per side in the order -x +x -y +y
+/// -z +z.
 inline MeshData box(const Vec3<float>& lo, const Vec3<float>& hi) {
   MeshData m;
   for (int i = 0; i < 8; ++i)
@@ -158,8 +159,8 @@ inline MeshData box(const Vec3<float>& lo, const Vec3<float>& hi) {
   return m;
 }
 
-/// A closed unit sphere of n x 2n quads, n > 1, with the poles on the y axis, flat or with vertex
-/// normals.
+/// Makes a closed unit sphere of n x 2n quads, n > 1, with its poles on the y axis, with or without
+/// vertex normals.
 inline MeshData sphere(uint32_t n, bool smooth) {
   MeshData m;
   for (uint32_t j = 0; j <= n; ++j)
@@ -184,7 +185,7 @@ inline MeshData sphere(uint32_t n, bool smooth) {
   return m;
 }
 
-/// `n` random triangles in [-1, 1]^3, of edge about `size`.
+/// Makes `n` random triangles in [-1, 1]^3 with edges of about length `size`.
 inline MeshData soup(uint32_t n, uint32_t seed, float size = 0.4f) {
   MeshData m;
   std::mt19937 rng(seed);
@@ -200,7 +201,7 @@ inline MeshData soup(uint32_t n, uint32_t seed, float size = 0.4f) {
   return m;
 }
 
-/// n x n quads over [0, n]^2, bumpy along y, with shared vertices.
+/// Makes n x n quads over [0, n]^2 with shared vertices and random heights along y.
 inline MeshData grid(uint32_t n, float bump, uint32_t seed) {
   MeshData m;
   std::mt19937 rng(seed);
@@ -228,7 +229,7 @@ inline Material make_material(ProgramId program, const Vec3<float>& color = {0.5
   m.roughness = roughness;
   return m;
 }
-/// Emits and reflects like Lambert: a principled surface whose interface has index 1.
+/// Makes a material that emits and reflects like Lambert: a principled surface with index 1.
 inline Material glowing(float albedo, float radiance) {
   Material m = make_material(ProgramId::kPrincipled, Vec3<float>(albedo), 1);
   m.emission = Vec3<float>(radiance);
@@ -266,7 +267,7 @@ inline std::vector<float> random_texels(size_t n, float lo, float hi, uint32_t s
 
 using ScenePtr = std::shared_ptr<const Scene>;
 
-/// An open box of diffuse walls, two boxes in it, a rect light below the ceiling.
+/// An open box of diffuse walls with two boxes inside and a rect light below the ceiling.
 inline ScenePtr cornell() {
   SceneBuilder b;
   const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.7f, 0.7f, 0.7f}));
@@ -290,7 +291,8 @@ inline ScenePtr cornell() {
   return b.build();
 }
 
-/// All six programs, textures, instances (mirrored and stretched too), every kind of light.
+/// A scene with all six programs, textures, instances (also mirrored and stretched) and every kind
+/// of light.
 inline ScenePtr mixed() {
   SceneBuilder b;
   const uint32_t picture = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
@@ -386,7 +388,7 @@ inline ScenePtr mixed() {
   return b.build();
 }
 
-/// Meshes that emit (constant, textured, instanced) and nothing else that shines.
+/// A scene lit only by emissive meshes: constant, textured and instanced.
 inline ScenePtr emissive_meshes() {
   SceneBuilder b;
   const uint32_t picture = add_texture(b, 4, 4, 3, random_texels(48, 0.f, 8.f, 5));
@@ -415,7 +417,7 @@ inline ScenePtr emissive_meshes() {
   return b.build();
 }
 
-/// Layers of cut-out leaves before a wall: opacity by number, texture and threshold.
+/// Layers of cut-out leaves before a wall, with opacity from a constant, a texture and a threshold.
 inline ScenePtr presence() {
   SceneBuilder b;
   const uint32_t mask = add_texture(b, 8, 8, 1, random_texels(64, -0.2f, 1.2f, 6));
@@ -454,7 +456,7 @@ inline ScenePtr presence() {
   return b.build();
 }
 
-// ---- pictures ---------------------------------------------------------------------------------
+// ---- images -----------------------------------------------------------------------------------
 
 inline void expect_same_bits(const std::vector<float>& a, const std::vector<float>& b,
                              const std::string& what) {
@@ -483,7 +485,7 @@ inline void expect_same_picture(const Picture& a, const Picture& b, const std::s
   }
 }
 
-/// The layer of that name, which must be there.
+/// Returns the AOV layer of that name, which must exist.
 inline const AovLayer& layer(const Picture& picture, const std::string& name) {
   const auto at = std::find_if(picture.aovs.begin(), picture.aovs.end(),
                                [&](const AovLayer& one) { return one.name == name; });
@@ -491,8 +493,7 @@ inline const AovLayer& layer(const Picture& picture, const std::string& name) {
   return *at;
 }
 
-/// Mean over all pixels' red values (or green, blue) and its standard error; pixels are
-/// independent.
+/// Mean of one channel over all pixels and its standard error, for independent pixels.
 struct Mean {
   double mean = 0, error = 0;
 };
@@ -510,7 +511,7 @@ inline Mean mean_of(const Picture& picture, size_t channel = 0) {
   for (size_t i = channel; i < picture.beauty.size(); i += 3) values.push_back(picture.beauty[i]);
   return mean_of(values);
 }
-/// Of the differences, pixel by pixel: for two estimates of one picture.
+/// Mean of the pixel differences of two images.
 inline Mean mean_difference(const Picture& a, const Picture& b, size_t channel = 0) {
   std::vector<double> values;
   for (size_t i = channel; i < a.beauty.size(); i += 3)

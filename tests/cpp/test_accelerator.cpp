@@ -14,7 +14,7 @@ namespace {
 
 using namespace scene_testing;
 
-/// Columns of rays, padded for packets.
+/// Rays in columns, padded for packets.
 struct Rays {
   std::vector<float> ox, oy, oz, dx, dy, dz, tfar;
   std::vector<uint32_t> slot;
@@ -28,7 +28,7 @@ struct Rays {
     slot.resize(n + 16, 0);
     std::iota(slot.begin(), slot.begin() + static_cast<long>(n), 0u);
   }
-  /// A ray from `o` towards `to`.
+  /// Points ray i from `o` to `to`.
   void aim(size_t i, const std::array<double, 3>& o, const std::array<double, 3>& to) {
     const double d[3] = {to[0] - o[0], to[1] - o[1], to[2] - o[2]};
     const double l = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -39,7 +39,7 @@ struct Rays {
       *dir[c] = static_cast<float>(d[c] / l);
     }
   }
-  /// Ray order[i] in place i, with its slot.
+  /// Returns the rays in the given order, with their slots.
   Rays in_order(const std::vector<uint32_t>& order) const {
     Rays moved(size);
     const auto move = [&](const auto& from, auto& to) {
@@ -75,7 +75,7 @@ struct Hits {
   }
 };
 
-/// Keys of presence for n slots.
+/// Presence keys for n slots.
 struct Keys {
   std::vector<uint32_t> pixel_hash, sample;
   explicit Keys(size_t n) : pixel_hash(n + 16), sample(n + 16) {
@@ -86,7 +86,7 @@ struct Keys {
   PresenceKeys keys(uint32_t salt = 0) const { return {pixel_hash.data(), sample.data(), 1, salt}; }
 };
 
-/// Traces in calls of at most `chunk` rays.
+/// Traces the rays in calls of at most `chunk` rays.
 Hits trace(const EmbreeAccelerator& accel, const Rays& rays, uint32_t width, bool coherent,
            const PresenceKeys& keys, bool limited = false, size_t chunk = 1u << 30) {
   Hits hits(rays.size);
@@ -129,8 +129,8 @@ void expect_same_occlusion(const std::vector<uint32_t>& a, const std::vector<uin
   EXPECT_EQ(differing, 0u) << what << ", occlusion";
 }
 
-/// Expects the same hits and the same occlusion, bit for bit, for every width, tails, coherent
-/// traversal or not, and order of the rays.
+/// Expects bitwise equal hits and occlusion for every packet width, partial packets, coherent or
+/// incoherent traversal, and order of rays.
 void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const Rays& rays,
                                           bool coherent_too = true) {
   const DenormalsOff denormals_off;
@@ -147,7 +147,7 @@ void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const 
   for (const bool coherent : {false, true}) {
     if (coherent && !coherent_too) continue;
     for (const uint32_t width : {1u, 4u, 8u, 16u}) expect_same(width, coherent, rays.size);
-    // All lanes but one, and seven: tails.
+    // Partial packets: all lanes but one, and seven lanes.
     for (const uint32_t width : {4u, 8u, 16u}) expect_same(width, coherent, width - 1);
     expect_same(16, coherent, 7);
   }
@@ -170,7 +170,7 @@ void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const 
   }
 }
 
-/// Rays between random points of a cube.
+/// Makes rays between random points of a cube.
 Rays random_rays(size_t n, float half, uint32_t seed) {
   Rays rays(n);
   std::mt19937 rng(seed);
@@ -195,7 +195,7 @@ const std::vector<Affine>& transforms() {
       scale(-0.3f, -0.3f, -0.3f)};
   return all;
 }
-/// A soup in the world and instances of a group of two more.
+/// A random triangle soup in the world, and instances of a group of two more.
 std::shared_ptr<const Scene> soup_scene(uint32_t triangles) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(soup(triangles, 1))));
@@ -208,12 +208,12 @@ std::shared_ptr<const Scene> soup_scene(uint32_t triangles) {
 }
 
 struct ExactHit {
-  double t, u, v, edge;  ///< edge: how far from the triangle's edge, in barycentrics
+  double t, u, v, edge;  ///< edge: distance from the triangle's edge, in barycentrics
   uint32_t prim, geom, inst;
 };
 
-/// All hits of a ray by double-precision arithmetic (Moeller and Trumbore), nearest first. `slack`
-/// widens triangles by that much in barycentrics.
+/// Finds all hits of a ray in double precision (Moeller and Trumbore), nearest first. `slack`
+/// enlarges triangles by that much in barycentrics.
 class BruteForce {
  public:
   explicit BruteForce(const Scene& scene) {
@@ -286,7 +286,8 @@ class BruteForce {
   std::vector<Triangle> triangles_;
 };
 
-/// Of `triangles`, by a list or by the hierarchy; of the rays one in `one_in` hits something.
+/// Compares hits with brute force for `triangles` triangles, by a triangle list or the BVH. At
+/// least one ray in `one_in` must hit.
 void expect_brute_force(uint32_t triangles, HitRule rule, size_t one_in) {
   const auto scene = soup_scene(triangles);
   const EmbreeAccelerator accel(scene, 2, rule);
@@ -296,7 +297,7 @@ void expect_brute_force(uint32_t triangles, HitRule rule, size_t one_in) {
   const Hits hits = trace(accel, rays, 16, false, Keys(n).keys());
   size_t hit_count = 0, clear_count = 0;
   for (size_t i = 0; i < n; ++i) {
-    // The hit found is one of the exact ones, and no clear one lies before it.
+    // The reported hit is one of the exact hits, and no unambiguous hit lies before it.
     const std::vector<ExactHit> all = exact.hits(rays, i, 1e-4);
     const bool found = hits.inst[i] != kNoHit;
     hit_count += found;
@@ -324,7 +325,7 @@ TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
   expect_brute_force(60, HitRule::kCanonical, 2);
 }
 
-/// Scenes that are small enough for a list, by the list and by the hierarchy.
+/// Scenes small enough for a triangle list, traced by the list and by the BVH.
 class SmallScene : public testing::TestWithParam<HitRule> {};
 INSTANTIATE_TEST_SUITE_P(Accelerator, SmallScene,
                          testing::Values(HitRule::kList, HitRule::kCanonical),
@@ -340,7 +341,7 @@ TEST_P(SmallScene, IsTracedAsAsked) {
   EXPECT_FALSE(EmbreeAccelerator(curve_testing::hairy(), 1, GetParam()).has_list());
 }
 
-// As where the near plane of a camera lies on one.
+// Rays that start exactly on a surface, as when a camera's near plane lies on one.
 TEST_P(SmallScene, RaysThatStartOnASurfaceMeetItThere) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}))));
@@ -383,8 +384,9 @@ TEST(Accelerator, CurvesAndPointsDoNotDependOnPackets) {
 }
 
 TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
-  // Bundles from one point, which is what the coherent flag is for, and from a lens: those graze
-  // edges of the Cornell box from many points, where coherent packets differ (see below).
+  // Bundles of rays from one point, for which the coherent flag is meant, and from a lens. Lens
+  // rays graze the edges of the Cornell box from many points, where coherent packets differ (see
+  // below).
   for (const auto& scene : {mixed(), cornell(), emissive_meshes()}) {
     const EmbreeAccelerator accel(scene, 2);
     for (const double radius : {0.0, 0.05, 0.5}) {
@@ -403,11 +405,11 @@ TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
   }
 }
 
-/// Where the rays of a bundle come from.
+/// Origin of the rays of a bundle.
 enum class From { kAnywhere, kPoint, kLens };
 
-/// Rays at the vertices, the middles of edges and other points of edges of a mesh: from anywhere,
-/// or like a camera's from one point or a lens.
+/// Makes rays to vertices, edge midpoints and other edge points of a mesh, with origins anywhere,
+/// at one point or on a lens.
 Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed, From where) {
   Rays rays(n);
   std::mt19937 rng(seed);
@@ -437,7 +439,8 @@ Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed, F
   return rays;
 }
 
-/// Expects that coherent packets find nearly what single rays find, on rays chosen to disagree.
+/// Expects that coherent packets find nearly the same hits as single rays, on rays chosen to
+/// disagree.
 void expect_coherent_differs_seldom(const EmbreeAccelerator& accel, const Rays& rays) {
   const DenormalsOff denormals_off;
   const Keys keys(rays.size);
@@ -475,8 +478,8 @@ TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
       SCOPED_TRACE(testing::Message() << "bump " << bump << (instanced ? ", instanced" : ""));
       const Rays rays = rays_at_edges(mesh, m, size_for_build(50000), 21, From::kAnywhere);
       expect_hits_do_not_depend_on_packets(accel, rays, false);
-      // Embree's coherent traversal tests boxes of a whole packet, and thereby some triangles that
-      // a ray alone passes at a rounding's distance. It is for rays from one point.
+      // Embree's coherent traversal tests boxes against a whole packet, and thereby finds triangles
+      // that a single ray misses by a rounding error. It is meant for rays from one point.
       expect_coherent_differs_seldom(accel, rays);
       expect_hits_do_not_depend_on_packets(
           accel, rays_at_edges(mesh, m, size_for_build(50000), 22, From::kPoint));
@@ -484,7 +487,7 @@ TEST(Accelerator, RaysAtSharedEdgesAndVerticesDoNotDependOnPackets) {
       expect_hits_do_not_depend_on_packets(accel, lens, false);
       expect_coherent_differs_seldom(accel, lens);
       if (bump > 0) continue;
-      // And none slips through: the grid has no holes. (At its rim a ray may pass.)
+      // No ray passes through: the grid has no holes, except that rays may pass at its border.
       const Hits hits = trace(accel, rays, 16, false, Keys(rays.size).keys());
       size_t missed = 0;
       for (size_t i = 0; i < rays.size; ++i) missed += hits.inst[i] == kNoHit;
@@ -510,7 +513,7 @@ TEST(Accelerator, ClosedMeshesHaveNoHoles) {
     const Hits hits = trace(accel, rays, width, false, Keys(n).keys());
     size_t missed = 0;
     for (size_t i = 0; i < n; ++i) missed += hits.inst[i] == kNoHit;
-    // Rays aim at vertices exactly; robust traversal lets one in some ten thousand through.
+    // Rays aim exactly at vertices; robust traversal misses about one in ten thousand.
     EXPECT_LE(missed, n / 10000 + 1) << width;
     const auto shadow = blocked(accel, rays, width, false, Keys(n).keys());
     EXPECT_GE(std::count(shadow.begin(), shadow.end(), 1u) + static_cast<long>(n / 10000 + 1),
@@ -519,7 +522,7 @@ TEST(Accelerator, ClosedMeshesHaveNoHoles) {
   }
 }
 
-/// A closed tube of `n` sides along an axis that no coordinate axis is parallel to.
+/// Makes a closed tube of `n` sides whose axis is not parallel to a coordinate axis.
 std::shared_ptr<const Scene> turned_tube(uint32_t n, float half_length) {
   MeshData m;
   const Affine turn = rotate(0, 37) * rotate(1, 23) * rotate(2, 51);
@@ -546,7 +549,7 @@ std::shared_ptr<const Scene> turned_tube(uint32_t n, float half_length) {
   return b.build();
 }
 
-// Rays from inside closed rooms, at points of their surfaces, at their edges and at their vertices.
+// Rays from inside closed rooms to points on their surfaces, edges and vertices.
 TEST(Accelerator, ListsHaveNoHoles) {
   for (const float half_length : {1.f, 30.f, 500.f}) {
     const auto scene = turned_tube(20, half_length);
@@ -583,8 +586,7 @@ TEST(Accelerator, ListsHaveNoHoles) {
   }
 }
 
-// Two triangles in the very same place: which of them is reported is a matter of ids, not of
-// packets.
+// Two coincident triangles: which one is reported depends on ids, not on packets.
 TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(grid(8, 0.3f, 1))));
@@ -596,8 +598,8 @@ TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
   expect_hits_do_not_depend_on_packets(accel, rays);
 }
 
-// Rays from all over onto surfaces that cross one another many times, some in the same plane, with
-// instances in the very same place; in any order, and in order of direction.
+// Rays onto surfaces that intersect many times, partly coplanar, with coincident instances. The
+// rays are in random order and sorted by direction.
 TEST(Accelerator, IncoherentRaysAtCrossingSurfacesDoNotDependOnPackets) {
   SceneBuilder b;
   const uint32_t group = b.add_group("crossing");
@@ -629,7 +631,8 @@ TEST(Accelerator, IncoherentRaysAtCrossingSurfacesDoNotDependOnPackets) {
   expect_hits_do_not_depend_on_packets(accel, rays.in_order(order));
 }
 
-/// Of `triangles`, by a list or by the hierarchy; of the rays one in `one_in` is blocked.
+/// Compares occlusion with hits for `triangles` triangles, by a triangle list or the BVH. At least
+/// one ray in `one_in` must be blocked.
 void expect_occlusion_agrees(uint32_t triangles, HitRule rule, size_t one_in) {
   const auto scene = soup_scene(triangles);
   const EmbreeAccelerator accel(scene, 2, rule);
@@ -641,7 +644,7 @@ void expect_occlusion_agrees(uint32_t triangles, HitRule rule, size_t one_in) {
   const std::vector<uint32_t> shadow = blocked(accel, rays, 16, false, keys.keys());
   size_t count = 0;
   for (size_t i = 0; i < n; ++i) {
-    // tfar cuts off what lies behind it, and nothing else.
+    // tfar excludes hits behind it and nothing else.
     const bool expected = all.inst[i] != kNoHit && all.t[i] <= rays.tfar[i];
     EXPECT_EQ(near.inst[i] != kNoHit, expected) << i;
     if (expected) {
@@ -665,7 +668,7 @@ TEST_P(SmallScene, OcclusionAgreesWithIntersection) {
 TEST_P(SmallScene, LightShapesAreFoundByTheirRecord) {
   SceneBuilder b;
   b.add_light(make_light(LightKind::kSphere, {1, 1, 1}, translate(4, 0, 0)));
-  b.add_light(make_light(LightKind::kDome, {1, 1, 1}));  // comes first among the records
+  b.add_light(make_light(LightKind::kDome, {1, 1, 1}));  // first among the light records
   b.add_light(make_light(LightKind::kDisk, {1, 1, 1}, translate(0, 4, 0) * rotate(0, -90)));
   b.add_light(make_light(LightKind::kRect, {1, 1, 1},
                          translate(0, 0, -4) * rotate(1, 180) * scale(-2, 0.5f, 1)));
@@ -688,7 +691,7 @@ TEST_P(SmallScene, LightShapesAreFoundByTheirRecord) {
   from_centre(5, 0.9, 0.3, -4);
   from_centre(6, -4, 0, 0);  // a point light has no shape
   from_centre(7, 1, 1, 1);
-  rays.aim(8, {0, 0, -8}, {0, 0.1, 0});  // the rect from behind
+  rays.aim(8, {0, 0, -8}, {0, 0.1, 0});  // the back side of the rect
   const Keys keys(9);
   for (const uint32_t width : {1u, 4u, 8u, 16u}) {
     const Hits hits = trace(accel, rays, width, false, keys.keys());
@@ -717,10 +720,10 @@ TEST_P(SmallScene, CylinderLightsAreOpenAtTheirEnds) {
   const EmbreeAccelerator accel(b.build(), 1, GetParam());
   Rays rays(5);
   rays.aim(0, {0, 0, 0}, {1.9, 0, 3});
-  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});   // beside its end
-  rays.aim(2, {-5, 0, 3}, {5, 0, 3});      // along its axis, through it
-  rays.aim(3, {-3, 0, 3}, {-2, 0.25, 3});  // in at an end, to its inside
-  rays.aim(4, {0, 0, 3}, {0, 1, 3});       // from within
+  rays.aim(1, {2.1, 0, 0}, {2.1, 0, 3});   // beside the end of the tube
+  rays.aim(2, {-5, 0, 3}, {5, 0, 3});      // along the axis, through the tube
+  rays.aim(3, {-3, 0, 3}, {-2, 0.25, 3});  // in at one end, to the inner side
+  rays.aim(4, {0, 0, 3}, {0, 1, 3});       // from inside
   const Keys keys(5);
   const Hits hits = trace(accel, rays, 4, false, keys.keys());
   const double s = std::sqrt(1.9 * 1.9 + 9);
@@ -748,7 +751,7 @@ TEST(Accelerator, LightShapesDoNotDependOnPackets) {
   expect_hits_do_not_depend_on_packets(accel, random_rays(size_for_build(30000), 3, 8));
 }
 
-/// A stack of `n` partly present squares, z = 0, -1 .. , and one opaque behind them.
+/// A stack of `n` partly transparent squares at z = 0, -1 and so on, with an opaque square behind.
 std::shared_ptr<const Scene> leaves(int n, float opacity, float threshold, bool textured,
                                     bool instanced) {
   SceneBuilder b;
@@ -802,10 +805,10 @@ TEST_P(SmallScene, PresenceIsAProbability) {
         const double p = left * (layer < 3 ? opacity : 1);
         expected = p * static_cast<double>(n);
         left -= p;
-        // 16 comparisons: 4.5 sigma is 1e-4 in all.
+        // 16 comparisons: 4.5 sigma gives a false alarm rate of 1e-4 in total.
         EXPECT_NEAR(count[layer], expected, 4.5 * std::sqrt(expected * (1 - p)) + 1e-9) << layer;
       }
-      // Another salt is another draw.
+      // A different salt gives different random decisions.
       const Hits again = trace(accel, rays, 16, false, keys.keys(1));
       size_t same = 0;
       for (size_t i = 0; i < n; ++i) same += hits.t[i] == again.t[i];
@@ -819,7 +822,7 @@ TEST_P(SmallScene, PresenceIsAProbability) {
 }
 
 TEST_P(SmallScene, PresenceKeysMayStandInRows) {
-  // As in the path pool: both words of a key inside a row of 16.
+  // The layout of the path pool: both words of a key are inside a row of 16.
   const size_t n = 2000, words = 16;
   Rays rays(n);
   for (size_t i = 0; i < n; ++i) {
@@ -858,7 +861,7 @@ TEST_P(SmallScene, PresenceByTextureAndThreshold) {
       expect_hits_do_not_depend_on_packets(accel, rays);
       const Hits hits = trace(accel, rays, 16, false, keys.keys());
       for (size_t i = 0; i < n; ++i) {
-        // Opacity goes from 0 at u = 1/4 to 1 at u = 3/4.
+        // Opacity rises from 0 at u = 1/4 to 1 at u = 3/4.
         const double opacity = std::clamp(rays.ox[i] + 0.5, 0.0, 1.0);
         const bool present = hits.t[i] < 10;
         if (std::abs(opacity - threshold) < 1e-3) continue;
@@ -878,7 +881,7 @@ TEST(Accelerator, PresenceByItself) {
   const Keys keys(1);
   for (int i = 0; i < 100; ++i) {
     const float u = (static_cast<float>(i) + 0.5f) / 100;
-    // Triangle 0 is (0, 0), (1, 0), (1, 1) in uv: u = b1 + b2, v = b2.
+    // Triangle 0 has uv (0, 0), (1, 0), (1, 1), so u = b1 + b2 and v = b2.
     EXPECT_EQ(is_present(scene->view(), 0, mesh, 0, u, 0, 0, keys.keys()), u > 0.5f) << u;
   }
 }

@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Adds samples to a pixel of a film, as waves do.
+/// Adds samples to a pixel of a film, the way waves do.
 void add_samples(Film& film, uint32_t x, uint32_t y, uint32_t n, const auto& sample) {
   Film::Pixel& p = film.pixel(x, y);
   for (uint32_t i = 0; i < n; ++i) {
@@ -40,7 +40,7 @@ TEST(ErrorSums, VarianceIsTheTwoPassOne) {
   std::exponential_distribution<float> light(0.5f);
   std::vector<double> seen;
   add_samples(film, 0, 0, 1000, [&](float* rgb) {
-    rgb[0] = 1e4f + light(rng);  // far from 0, where naive sums fail
+    rgb[0] = 1e4f + light(rng);  // far from 0, where naive sums lose precision
     rgb[1] = rgb[2] = 2;
     seen.push_back(rgb[0]);
   });
@@ -58,8 +58,8 @@ TEST(ErrorSums, NoVarianceBelowTwoSamples) {
   EXPECT_TRUE(Film(1, 1, {AovSet{0}}).variance().empty());
 }
 
-/// A film of `size` x `size` pixels that are 1 on average, with noise of deviation `sigma(x, y)` a
-/// sample (Gamma distributed: not below 0, and skewed as light is).
+/// Makes a film of `size` x `size` pixels with mean 1 and noise of standard deviation `sigma(x, y)`
+/// per sample. The samples are Gamma distributed: not negative, and skewed as light is.
 Film noisy_film(uint32_t size, uint32_t samples, const auto& sigma, uint32_t seed = 1) {
   Film film(size, size, {AovSet{0}}, true);
   std::mt19937 rng(seed);
@@ -75,8 +75,8 @@ Film noisy_film(uint32_t size, uint32_t samples, const auto& sigma, uint32_t see
 }
 
 TEST(ErrorMap, IsTheTrueErrorOnAverage) {
-  // The mean of |I - A| meets that of |I - truth|, and e is as its definition says.
-  for (const uint32_t samples : {16u, 40u, 256u}) {  // 40: halves of 24 and 16
+  // The mean of |I - A| agrees with that of |I - truth|, and e agrees with its definition.
+  for (const uint32_t samples : {16u, 40u, 256u}) {  // 40 splits into halves of 24 and 16
     const Film film = noisy_film(64, samples, [](uint32_t, uint32_t) { return 0.5f; });
     const std::vector<float> beauty = film.beauty();
     double truth = 0, e = 0;
@@ -108,13 +108,13 @@ TEST(ErrorMap, IsUnknownBelowTwoBlocks) {
 TEST(ErrorMap, FollowsTheNoise) {
   const Film film = noisy_film(64, 64, [](uint32_t x, uint32_t) { return x < 32 ? 0.1f : 0.8f; });
   const ErrorMap map = measure_error(film);
-  const auto expected = [](double sigma) {  // of |normal|, sqrt(2 / pi) sigma
+  const auto expected = [](double sigma) {  // mean of |normal|: sqrt(2 / pi) sigma
     return 3 * 0.7979 * sigma / std::sqrt(64.0) / std::sqrt(3.0);
   };
   uint32_t off = 0;
   for (uint32_t y = 0; y < 64; ++y)
     for (uint32_t x = 0; x < 64; ++x) {
-      if (x >= 30 && x < 34) continue;  // windows over the edge
+      if (x >= 30 && x < 34) continue;  // windows that overlap the boundary
       const double ratio = map.error[y * 64 + x] / expected(x < 32 ? 0.1 : 0.8);
       off += ratio < 0.6 || ratio > 1.6;
     }
@@ -155,7 +155,7 @@ TEST(Adaptive, NoisyPixelsAndTheirNeighboursGoOn) {
     }
   EXPECT_EQ(c.active_count, (2 * reach + 1) * (2 * reach + 1));
   EXPECT_GT(c.expected_samples, 32u * 32 * 64);
-  // At the most samples a pixel is done, however noisy.
+  // A pixel with the maximum number of samples is finished, however noisy it is.
   film.pixel(16, 16).samples = 1024;
   EXPECT_EQ(check(film, settings).active[16 * 32 + 16], 0);
 }
@@ -183,7 +183,7 @@ TEST(Adaptive, NoiseTargetEndsByTheMean) {
   const AdaptiveCheck c = check(film, settings);
   EXPECT_GT(c.active_count, 32u * 13);
   EXPECT_LT(c.active_count, 32u * 24) << "the quiet half does not go on";
-  // A picture twice as bright of the same relative noise has the same pixels to go on with.
+  // An image twice as bright with the same relative noise has the same active pixels.
   Film bright(32, 32, {AovSet{0}}, true);
   for (uint32_t y = 0; y < 32; ++y)
     for (uint32_t x = 0; x < 32; ++x) {
@@ -196,8 +196,8 @@ TEST(Adaptive, NoiseTargetEndsByTheMean) {
 }
 
 TEST(Adaptive, NoiseTargetIsMetByPicturesOfFewBrightPixels) {
-  // Stars in the dark: a window spreads a star's error over 25 pixels, so each is within the share
-  // that evenly spread noise would give it long before the picture is.
+  // Isolated bright pixels: the window spreads the error of each over 25 pixels, so these fall
+  // below the threshold long before the whole image does.
   const auto is_star = [](uint32_t x, uint32_t y) { return x % 16 == 8 && y % 16 == 8; };
   std::mt19937 rng(7);
   Film film(32, 32, {AovSet{0}}, true);
@@ -219,8 +219,8 @@ TEST(Adaptive, NoiseTargetIsMetByPicturesOfFewBrightPixels) {
   EXPECT_LT(c.active_count, 4u * 81 + 1) << "stars and their windows only";
 }
 
-/// A film whose pixels' own samples say nothing of noise, and whose light comes of splats: the
-/// error is theirs, of halves of their own.
+/// Pixels whose camera samples have no noise but which receive light splats: the error comes from
+/// the half buffers of the splats.
 TEST(ErrorMap, SeesTheNoiseOfSplats) {
   constexpr uint32_t kSize = 24, kSamples = 64, kPaths = kSize * kSize;
   std::mt19937 rng(7);
@@ -257,17 +257,17 @@ TEST(ErrorMap, SeesTheNoiseOfSplats) {
 }
 
 TEST(Adaptive, LightPathsGoOnAsFarAsTheirNoiseDecides) {
-  // As noisy by splats as by samples, n = m = 16, all pixels active: as many of both.
+  // Equal noise of splats and samples, n = m = 16, all pixels active: equal numbers of both.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0), 64u);
-  // A sixteenth of the pixels active: a sample of light paths costs 16 times as much.
+  // With a sixteenth of the pixels active, a sample of light paths costs 16 times as much.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0 / 16), 16u);
   EXPECT_EQ(light_samples_after({1, 4}, 16, 16, 64, 64, 1.0 / 16), 32u);
-  // Never more than the share, never fewer than there are.
+  // The number stays between the current count and the limit.
   EXPECT_EQ(light_samples_after({1, 100}, 16, 16, 64, 64, 1.0), 64u);
   EXPECT_EQ(light_samples_after({100, 1}, 16, 16, 64, 64, 1e-3), 16u);
   EXPECT_EQ(light_samples_after({0, 0}, 16, 16, 64, 64, 1.0), 16u);
   EXPECT_EQ(light_samples_after({0, 1}, 16, 16, 64, 64, 1.0), 64u);
-  // Nothing is known of halves that are not there.
+  // Without half buffers, the noise is unknown.
   EXPECT_EQ(light_samples_after({1, 0}, 1, 4, 16, 4, 1.0), 4u);
 }
 

@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// `count` places around one, each of `worth`.
+/// Adds `count` random positions around (x, 0, 0), each with contribution `worth`.
 void add_places(std::vector<AimLesson>& lessons, int count, float x, float spread, float worth) {
   std::mt19937 random(static_cast<uint32_t>(lessons.size()) + 1);
   std::uniform_real_distribution<float> off(-spread, spread);

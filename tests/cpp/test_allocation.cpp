@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A wave allocates nothing while it runs.
+// Waves do not allocate memory while they run.
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
@@ -11,11 +11,11 @@
 #define WAVECOMB_COUNTS_ALLOCATIONS 1
 
 namespace {
-/// Allocations of this thread, by whatever way: operator new ends in malloc.
+/// Number of allocations of this thread; operator new also ends in malloc.
 thread_local uint64_t allocations = 0;
 }  // namespace
 
-// glibc's own functions under the names that ours take over for the whole program.
+// glibc's functions behind the names that this program overrides.
 extern "C" {
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);
@@ -63,7 +63,7 @@ using namespace wave_testing;
 #if defined(WAVECOMB_COUNTS_ALLOCATIONS)
 
 TEST(Allocation, IsCounted) {
-  // Called by its name: compilers may leave out what a new-expression or a container allocates.
+  // Called by name, because compilers may omit allocations of new-expressions and containers.
   const uint64_t before = allocations;
   void* volatile made = ::operator new(400);
   EXPECT_GE(allocations, before + 1);
@@ -73,13 +73,13 @@ TEST(Allocation, IsCounted) {
   ::operator delete(made);
 }
 
-/// Expects that a wave that has run once allocates nothing the second time.
+/// Expects that a wave which has run once does not allocate in its second run.
 void expect_no_allocation(const ScenePtr& scene, WaveCase c, const std::string& what,
                           HistoryReader* histories = nullptr) {
   c.settings.width = c.settings.height = 16;
   c.settings.spp = 4;
   WaveRun run(scene, c, nullptr, histories);
-  run.all(1024);  // warm
+  run.all(1024);  // warm-up
   const uint64_t before = allocations;
   run.all(1024);
   EXPECT_EQ(allocations - before, 0u) << c.lanes << " lanes, " << what;

@@ -19,7 +19,7 @@ Settings allotted(uint32_t size, uint32_t spp, Allocate how = Allocate::kError) 
   return s;
 }
 
-/// Adds `n` samples of `sample()` to a pixel, and `cost` each where the film keeps costs.
+/// Adds `n` samples of `sample()` to a pixel, and `cost` for each if the film stores costs.
 void add(Film& film, uint32_t x, uint32_t y, uint32_t n, float cost, const auto& sample) {
   Film::Pixel& p = film.pixel(x, y);
   for (uint32_t i = 0; i < n; ++i) {
@@ -58,7 +58,7 @@ TEST(Allotment, GivesOutTheBudgetExactly) {
       EXPECT_EQ(total(a), uint64_t{spp} * size * size) << spp << " " << size;
       EXPECT_GE(facts.least, facts.pilot);
       EXPECT_EQ(facts.most, *std::max_element(a.counts.begin(), a.counts.end()));
-      // What passes give on the way grows and ends there.
+      // Counts of intermediate passes never decrease, and end at these values.
       for (size_t i = 0; i < a.counts.size(); ++i) {
         EXPECT_EQ(a.at(i, a.spp), a.counts[i]);
         EXPECT_EQ(a.at(i, a.pilot), a.pilot);
@@ -69,7 +69,7 @@ TEST(Allotment, GivesOutTheBudgetExactly) {
 }
 
 TEST(Allotment, FollowsErrorAndCost) {
-  // Bands of 16 columns: quiet, noisy, noisy and 16 times as dear, quiet.
+  // Bands of 16 columns: quiet, noisy, noisy and 16 times as expensive, quiet.
   const auto counts = [](Allocate how) {
     const Settings s = allotted(64, 256, how);
     Film film = film_of(s);
@@ -108,8 +108,8 @@ TEST(Allotment, BlackAndBrokenPixelsAreAsOthers) {
   EXPECT_GE(facts.least, 32u);
 }
 
-/// How far, in standard errors, the mean of pictures is from the truth, where pixels bring 20 with
-/// probability 1/20; by counts of `counts(film, settings)`.
+/// Returns the bias of the mean image in standard errors, for pixels that are 20 with probability
+/// 1/20 and otherwise 0. `counts(film, settings)` decides the number of samples.
 double bias_z(const auto& counts) {
   constexpr uint32_t kSize = 24, kRounds = 300;
   std::mt19937 rng(11);
@@ -141,7 +141,7 @@ TEST(Allotment, IsUnbiasedWhereSamplesAreSkewed) {
               return allot(film, s, facts).counts;
             })),
             3.5);
-  // The same test finds counts that follow a pixel's own samples.
+  // The test detects bias: counts that follow a pixel's own samples fail it.
   EXPECT_LT(bias_z([](Film& film, const Settings& s) {
               std::vector<uint32_t> n(film.pixel_count());
               for (size_t i = 0; i < n.size(); ++i) n[i] = film.pixel(i).r > 0 ? s.spp : 12;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// AOVs: names, Cryptomatte's ids and bounded ranks, names of objects, memory of the film.
+// AOVs: names, Cryptomatte ids and ranks, object names, and memory of the film.
 #include <bit>
 #include <map>
 
@@ -25,7 +25,7 @@ TEST(AovSet, NamesThereAndBack) {
   EXPECT_THROW(AovSet::parse("albdo"), Error);
 }
 
-// Verification values of MurmurHash3_x86_32 as published with SMHasher and in common use.
+// Verification values of MurmurHash3_x86_32, as published with SMHasher and in common use.
 TEST(Cryptomatte, MurmurHash3) {
   EXPECT_EQ(murmur3_32("", 0), 0u);
   EXPECT_EQ(murmur3_32("", 1), 0x514e28b7u);
@@ -38,7 +38,7 @@ TEST(Cryptomatte, MurmurHash3) {
 }
 
 TEST(Cryptomatte, IdsAreUsualFloats) {
-  // Names whose hashes have exponents 0 and 255 are rare: they are looked for.
+  // Names whose hashes have exponents 0 and 255 are rare, so search for some.
   uint32_t zero = 0, full = 0;
   for (uint32_t i = 0; i < 4000; ++i) {
     const std::string name = numbered("n", i);
@@ -69,7 +69,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
     std::map<uint32_t, uint32_t> exact;
     constexpr uint32_t kSamples = 4096;
     for (uint32_t i = 0; i < kSamples; ++i) {
-      // Ids of falling frequency: a few large ones and a long tail.
+      // Ids of decreasing frequency: a few frequent ones and a long tail.
       const double u = std::uniform_real_distribution<double>(0, 1)(rng);
       const auto id = static_cast<uint32_t>(300 * u * u * u * u * u) + 1;
       p.add(id);
@@ -90,7 +90,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
   }
 }
 
-// The figures of docs/aovs.md.
+// The numbers in docs/aovs.md.
 TEST(AovFilm, MemoryOfEveryAov) {
   const AovLayout all{AovSet{AovSet::kAll}, 4};
   const Film film(16, 9, all);
@@ -125,11 +125,11 @@ TEST(AovFilm, NearestSampleWinsAndTheFirstOfEquals) {
   ASSERT_EQ(layers.size(), 7u);
   EXPECT_EQ(layers[0].values, (std::vector<float>{7, 0, 0}));
   EXPECT_EQ(layers[1].values, (std::vector<float>{0.25f, 0.5f}));
-  EXPECT_EQ(layers[2].values, (std::vector<float>{5}));  // counted from 1
+  EXPECT_EQ(layers[2].values, (std::vector<float>{5}));  // ids count from 1
   EXPECT_EQ(layers[3].values, (std::vector<float>{0}));
 }
 
-// What a row says is what the film keeps, and the layers come in the order of the rows.
+// The film stores what each row declares, and layers are in the order of the rows.
 TEST(AovFilm, EveryRowHasItsLayer) {
   const AovLayout layout{AovSet{AovSet::kAll}, 2};
   const std::vector<std::string> groups{"key", "sky"};
@@ -180,7 +180,7 @@ TEST(ObjectNames, SeenThroughInstances) {
   };
   b.add_to_group(0, mesh("/World/Set/Floor"));
   b.add_to_group(0, mesh("/World/Chairs/Red/Seat", 17));
-  // A tree, placed twice by prims of their own; a nest in it that is a model.
+  // A tree that two prims instance; a nest inside the tree is a model.
   const uint32_t tree = b.add_group("tree", "/World/Tree_1");
   b.add_to_group(tree, mesh("/World/Tree_1/Leaves"));
   b.add_to_group(tree, mesh("/World/Tree_1/Top/Nest/Egg", 22));
@@ -188,7 +188,7 @@ TEST(ObjectNames, SeenThroughInstances) {
   const uint32_t second = b.add_placement_name("/World/Tree_2", 0);
   b.add_instance(0, tree, translate(1, 0, 0), kInheritMaterial, first);
   b.add_instance(0, tree, translate(2, 0, 0), kInheritMaterial, second);
-  // A point instancer in a prototype: its numbers follow its name.
+  // A point instancer inside a prototype: instance numbers follow its name.
   const uint32_t leaf = b.add_group("leaf", "/Protos/Leaf");
   b.add_to_group(leaf, mesh("/Protos/Leaf"));
   const uint32_t bush = b.add_group("bush", "/World/Bush_1");
@@ -217,7 +217,7 @@ TEST(ObjectNames, SeenThroughInstances) {
     EXPECT_EQ(names.asset(i), expected[i].second);
   }
   EXPECT_EQ(names.first_object(), (std::vector<uint32_t>{0, 2, 4, 6}));
-  // The manifest holds what is in the picture only.
+  // The manifest contains only names that occur in the image.
   const std::vector<uint32_t> there{crypto_id("/World/Tree_2/Leaves")};
   const auto manifest = crypto_manifest(*scene, Aov::kCryptoObject, there);
   ASSERT_EQ(manifest.size(), 1u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Attributes of meshes: every rate, lanes of several meshes, and what is not there.
+/// Mesh attributes: every interpolation, lanes of different meshes, and missing attributes.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -14,7 +14,8 @@ namespace {
 
 constexpr uint32_t kTint = 0, kDepth = 1, kOther = 2;
 
-/// A quad of two triangles with attributes of every rate, a curve, and a mesh with none.
+/// A quad of two triangles with attributes of every interpolation, a curve, and a mesh without
+/// attributes.
 struct AttributeScene {
   std::vector<float> positions = std::vector<float>(12, 0.f);
   std::vector<uint32_t> indices{0, 1, 2, 0, 2, 3};
@@ -45,7 +46,7 @@ struct AttributeScene {
     add({{kDepth, AttributeRate::kEnd, 1, ends}}, Primitive::kLinearTube);
     make_attribute_records(geometry);
   }
-  /// One component where there is one, else -99.
+  /// Returns one component of the attribute, or -99 if it does not exist.
   float at(uint32_t id, uint32_t mesh, uint32_t prim, float u, float v, uint32_t width = 1,
            uint32_t component = 0) const {
     float out[4] = {-99, -99, -99, -99};

@@ -13,14 +13,14 @@ using lane_testing::for_each_packet;
 using lane_testing::same_bits;
 using namespace scene_testing;
 
-/// Ray for numbers r of pixel (x, y), box filter of one pixel.
+/// Returns the ray for sample r of pixel (x, y) with a box filter of one pixel.
 CameraRay<float> ray_at(const Camera& camera, uint32_t width, uint32_t height, float x, float y,
                         const Sample4<float>& r) {
   const FilterTable table(FilterKind::kBox, 1);
   const CameraSetup setup(camera, width, height, table);
   return camera_ray<float>(setup, x, y, r, true);
 }
-/// The window coordinates that a ray of a camera without a transform goes through.
+/// Returns the window coordinates that a ray passes through, for a camera without a transform.
 std::array<double, 2> on_window(const CameraRay<float>& ray) {
   return {-static_cast<double>(ray.d.x) / ray.d.z, -static_cast<double>(ray.d.y) / ray.d.z};
 }
@@ -37,7 +37,7 @@ TEST(CameraRay, PinholeAtCornersAndCentre) {
   camera.window[1] = 0.6f;
   camera.window[2] = -0.2f;
   camera.window[3] = 0.3f;
-  // 4 x 2 pixels of 0.25 x 0.25; y goes down.
+  // 4 x 2 pixels of 0.25 x 0.25; y points down.
   expect_window(ray_at(camera, 4, 2, 0, 0, kCentre), -0.4 + 0.125, 0.3 - 0.125);
   expect_window(ray_at(camera, 4, 2, 3, 1, kCentre), 0.6 - 0.125, -0.2 + 0.125);
   expect_window(ray_at(camera, 4, 2, 0, 0, {0, 0, 0, 0}), -0.4, 0.3);
@@ -58,7 +58,7 @@ TEST(CameraRay, WindowIsWidenedToThePicture) {
   Camera camera;  // 1 x 1
   expect_window(ray_at(camera, 200, 100, 0, 0, {0, 0, 0, 0}), -1, 0.5);
   expect_window(ray_at(camera, 100, 200, 0, 0, {0, 0, 0, 0}), -0.5, 1);
-  camera.window[0] = 0;  // shifted: stays about its middle
+  camera.window[0] = 0;  // shifted: the window keeps its centre
   camera.window[1] = 2;
   expect_window(ray_at(camera, 100, 100, 0, 0, {0, 0, 0, 0}), 0, 1);
   expect_window(ray_at(camera, 100, 100, 99, 99, kCentre), 2 - 0.01, -1 + 0.01);
@@ -71,10 +71,10 @@ TEST(CameraRay, TransformsToTheWorld) {
   EXPECT_NEAR(ray.o.y, 2, 1e-6);
   EXPECT_NEAR(ray.o.z, 3, 1e-6);
   EXPECT_NEAR(ray.d.x, 1, 1e-6);
-  // Left in the picture is -z here, up is +y.
+  // Left in the image is -z here, up is +y.
   EXPECT_LT(ray_at(camera, 2, 2, 0, 0, kCentre).d.z, 0);
   EXPECT_GT(ray_at(camera, 2, 2, 0, 0, kCentre).d.y, 0);
-  // A scaled camera still gives unit directions.
+  // A scaled camera still has unit directions.
   camera.to_world = camera.to_world * scale(3, 3, 3);
   EXPECT_NEAR(length(ray_at(camera, 2, 2, 0, 0, kCentre).d), 1, 1e-6);
 }
@@ -98,7 +98,7 @@ TEST(CameraRay, ThinLensKeepsTheFocalPlaneSharp) {
     mean[0] += ray.o.x / kRays;
     mean[1] += ray.o.y / kRays;
     square += r * r / kRays;
-    // All rays of a place on the film meet at distance 7: window (-0.5 + 2.25 / 8, 0.5 - 5.75 / 8).
+    // All rays of a point on the film meet at distance 7: window (-0.5 + 2.25 / 8, 0.5 - 5.75 / 8).
     const double t = -7 / static_cast<double>(ray.d.z);
     EXPECT_NEAR(ray.o.x + t * ray.d.x, 7 * (-0.5 + 2.25 / 8), 5e-6);
     EXPECT_NEAR(ray.o.y + t * ray.d.y, 7 * (0.5 - 5.75 / 8), 5e-6);
@@ -119,7 +119,7 @@ TEST(CameraRay, NearAndFar) {
     camera.focus_distance = 4;
     for (float x = 0; x < 4; ++x) {
       const CameraRay<float> ray = ray_at(camera, 4, 4, x, 1, {0.3f, 0.9f, 0.2f, 0.6f});
-      EXPECT_NEAR(ray.o.z, -2, 1e-6);  // planes, not spheres
+      EXPECT_NEAR(ray.o.z, -2, 1e-6);  // a plane, not a sphere
       EXPECT_NEAR(ray.o.z + ray.tfar * ray.d.z, -10, 1e-5);
     }
   }
@@ -131,7 +131,7 @@ TEST(CameraRay, NearAndFar) {
 TEST(CameraRay, OrthographicAtCorners) {
   Camera camera;
   camera.projection = Projection::kOrthographic;
-  camera.window[0] = -4;  // off the axis
+  camera.window[0] = -4;  // off-axis window
   camera.window[1] = 6;
   camera.window[2] = -2;
   camera.window[3] = 3;
@@ -148,17 +148,17 @@ TEST(CameraRay, OrthographicAtCorners) {
     EXPECT_EQ(ray.d.y, 0);
     EXPECT_EQ(ray.d.z, -1);
     EXPECT_NEAR(ray.tfar, 10, 1e-5);
-    EXPECT_EQ(ray.spread, 0);  // as wide everywhere
+    EXPECT_EQ(ray.spread, 0);  // constant width
     EXPECT_NEAR(ray.width, 2.5 * kConeShare, 1e-6);
   }
   const FilterTable table(FilterKind::kBox, 1);
-  EXPECT_FALSE(CameraSetup(camera, 4, 2, table).is_pinhole());  // not from one point
+  EXPECT_FALSE(CameraSetup(camera, 4, 2, table).is_pinhole());  // rays have different origins
   EXPECT_TRUE(CameraSetup(Camera{}, 4, 2, table).is_pinhole());
 }
 
 TEST(CameraRay, CircleOfConfusion) {
-  // A thin lens of radius R in focus at f blurs a point of the film over a disk of radius
-  // R |z / f - 1| at distance z, with perspective and without.
+  // A thin lens of radius R focused at f blurs a point of the film over a disk of radius R |z / f -
+  // 1| at distance z, with and without perspective.
   for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
     Camera camera;
     camera.projection = projection;
@@ -166,9 +166,10 @@ TEST(CameraRay, CircleOfConfusion) {
     camera.focus_distance = 5;
     for (const double z : {2.0, 5.0, 9.0}) {
       const bool parallel = projection == Projection::kOrthographic;
-      const double middle = 0.25 * (parallel ? 1 : z);  // pixel centre of the window's right half
+      const double middle = 0.25 * (parallel ? 1 : z);  // centre of a pixel in the right half of
+                                                        // the window
       double widest = 0;
-      for (const float v : {0.f, 0.25f, 0.5f, 0.75f}) {  // the lens' edge
+      for (const float v : {0.f, 0.25f, 0.5f, 0.75f}) {  // edge of the lens
         const CameraRay<float> ray = ray_at(camera, 2, 1, 1, 0, {0.5f, 0.5f, 0.f, v});
         const double t = -(z + ray.o.z) / ray.d.z;
         const double x = ray.o.x + t * ray.d.x - 2 * middle, y = ray.o.y + t * ray.d.y;
@@ -188,9 +189,9 @@ TEST(CameraRay, LatlongSeesAllDirections) {
   camera.window[3] = 0.5f * kPi;
   camera.near_clip = 2;
   camera.far_clip = 5;
-  camera.lens_radius = 1;  // which it has no use for
+  camera.lens_radius = 1;  // latlong cameras ignore the lens
   const FilterTable table(FilterKind::kBox, 1);
-  const CameraSetup setup(camera, 8, 5, table);  // of any shape: it fills the picture
+  const CameraSetup setup(camera, 8, 5, table);  // any aspect ratio: the projection fills the image
   const auto at = [&](float x, float y) {
     return ray_through<float>(setup, x, y, 0.3f, 0.6f, 0.f, true);
   };
@@ -198,7 +199,7 @@ TEST(CameraRay, LatlongSeesAllDirections) {
     EXPECT_NEAR(ray.d.x, x, 1e-6);
     EXPECT_NEAR(ray.d.y, y, 1e-6);
     EXPECT_NEAR(ray.d.z, z, 1e-6);
-    EXPECT_NEAR(length(ray.o), 2, 1e-6);  // spheres, not planes
+    EXPECT_NEAR(length(ray.o), 2, 1e-6);  // a sphere, not a plane
     EXPECT_NEAR(ray.tfar, 3, 1e-5);
   };
   expect(at(4, 2.5f), 0, 0, -1);
@@ -224,14 +225,14 @@ TEST(CameraRay, ClippingPlanesCutOff) {
   const CameraRay<float> left = ray_at(camera, 2, 2, 0, 0, kCentre);  // x = z / 4 = -1 at z = -4
   EXPECT_NEAR(left.o.z, -4, 1e-6);
   EXPECT_NEAR(left.tfar, 0, 1e-5);
-  camera.clip_planes = {{0, 0, 1, -1}};  // nothing is before the camera
+  camera.clip_planes = {{0, 0, 1, -1}};  // everything is clipped
   EXPECT_LE(ray_at(camera, 1, 1, 0, 0, kCentre).tfar, 0);
-  camera.clip_planes = {{0, 1, 0, -1}};  // along the ray, which is on the wrong side
+  camera.clip_planes = {{0, 1, 0, -1}};  // parallel to the ray, which is on the clipped side
   EXPECT_LE(ray_at(camera, 1, 1, 0, 0, kCentre).tfar, 0);
 }
 
 TEST(CameraRay, ConformPolicies) {
-  // A window of 4 x 2 in a picture of 100 x 100 pixels: half_x, half_y.
+  // A window of 4 x 2 in an image of 100 x 100 pixels: expected half_x and half_y.
   const std::tuple<Conform, float, float> cases[] = {{Conform::kExpandAperture, 2.f, 2.f},
                                                      {Conform::kCropAperture, 1.f, 1.f},
                                                      {Conform::kAdjustApertureWidth, 1.f, 1.f},
@@ -249,7 +250,7 @@ TEST(CameraRay, ConformPolicies) {
     EXPECT_EQ(fitted.half_x, half_x);
     EXPECT_EQ(fitted.half_y, half_y);
   }
-  Camera camera;  // 1 x 1; pixels twice as wide as high make the picture 2 x 1
+  Camera camera;  // 1 x 1; with pixels twice as wide as high, the image is 2 x 1
   camera.pixel_aspect = 2;
   EXPECT_EQ(fitted_window(camera, 50, 50).half_x, 1.f);
   camera.conform = Conform::kCropAperture;

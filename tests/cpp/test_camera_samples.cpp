@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Camera rays go through the picture as the pixel filter says, and evenly through the lens.
+/// Camera rays are distributed by the pixel filter on the image and uniformly on the lens.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,12 +25,12 @@ constexpr double kPiD = 3.14159265358979323846;
 constexpr uint32_t kWidth = 8, kHeight = 6;
 constexpr float kX = 5, kY = 2;  ///< the pixel
 
-/// A filter at x in [-1, 1], not normalized: the functions that Settings documents.
+/// Unnormalised filter at x in [-1, 1], as documented at Settings.
 double filter_at(FilterKind kind, double x) {
   switch (kind) {
     case FilterKind::kBox:
       return 1;
-    case FilterKind::kGaussian:  // sigma is a third of the half width; lowered so as to end at 0
+    case FilterKind::kGaussian:  // sigma is a third of the half width; shifted down to end at 0
       return std::exp(-4.5 * x * x) - std::exp(-4.5);
     case FilterKind::kBlackmanHarris:
       return 0.35875 + 0.48829 * std::cos(kPiD * x) + 0.14128 * std::cos(2 * kPiD * x) +
@@ -38,7 +38,7 @@ double filter_at(FilterKind kind, double x) {
   }
   return 0;
 }
-/// Density over offsets in pixels of a filter so wide.
+/// Density over pixel offsets of a filter of this width.
 std::function<double(double)> filter_density(FilterKind kind, double width) {
   constexpr int kSteps = 4000;
   double sum = 0;
@@ -59,8 +59,8 @@ Camera make_camera(Projection projection, float lens) {
   return camera;
 }
 
-/// A ray of the pixel, and where on the picture (in pixels from the pixel's centre) and on the lens
-/// (in radii) it passes.
+/// Where a ray of the pixel passes: on the image in pixels from the pixel centre, and on the lens
+/// in radii.
 struct Passed {
   double x, y, lens_x, lens_y;
 };
@@ -73,7 +73,7 @@ Passed pass(const CameraSetup& setup, Random& random) {
     window[0] = std::atan2(w[0], -w[2]);
     window[1] = std::asin(w[1]);
   } else {
-    // All rays of a point of the picture meet in the plane in focus.
+    // All rays of a point of the image meet in the focal plane.
     const double f = setup.focus_distance, t = -f / w[2];
     const bool parallel = setup.projection == Projection::kOrthographic;
     for (int i = 0; i < 2; ++i) window[i] = (o[i] + t * w[i]) / (parallel ? 1 : f);
@@ -131,8 +131,8 @@ TEST(CameraSamples, FollowThePixelFilter) {
 }
 
 TEST(CameraSamples, FillTheLensEvenly) {
-  // Square of the distance from the lens' middle, and azimuth in turns; then the former beside the
-  // place on the picture, which it has nothing to do with.
+  // First the squared distance from the centre of the lens and the azimuth in turns; then the
+  // squared distance together with the position on the image, which are independent.
   Battery battery("lens");
   const FilterTable table(FilterKind::kGaussian, 3);
   const auto density = filter_density(FilterKind::kGaussian, 3);
@@ -163,14 +163,14 @@ TEST(CameraSamples, FillTheLensEvenly) {
   battery.judge();
 }
 
-// Paths from lights find a point where the camera's own ray to it passes, as densely as the rays of
-// a pixel do: the area on the picture, in pixels, of a small one across the ray.
+// Light paths project a point to where the camera's ray to it passes. The density equals that of
+// the rays of a pixel: the image area, in pixels, of a small area perpendicular to the ray.
 TEST(CameraConnections, AreTheWayBack) {
   const FilterTable table(FilterKind::kGaussian, 3);
   Random random(17);
   for (const CameraCase& seen : kCameras) {
     Camera made = make_camera(seen.projection, seen.lens);
-    // Turned, mirrored, and of another scale along each axis.
+    // Rotated, mirrored, and scaled differently along each axis.
     made.to_world.row[0] = {0.6f, -1.1f, 0.3f};
     made.to_world.row[1] = {0.9f, 0.8f, -0.2f};
     made.to_world.row[2] = {0.1f, 0.4f, 1.3f};
@@ -201,7 +201,7 @@ TEST(CameraConnections, AreTheWayBack) {
       };
       const auto s = moved(across.s), r = moved(across.t);
       const double area = std::abs(s[0] * r[1] - s[1] * r[0]);
-      // Near a pole of a latlong picture its columns converge.
+      // Near a pole of a latlong image the columns converge.
       const double latitude = setup.y1 - y * setup.step_y;
       if (seen.projection != Projection::kLatlong || std::abs(latitude) < 1.3) {
         ASSERT_NEAR(area / double{c.density}, 1, 0.01) << seen.name;
@@ -210,8 +210,8 @@ TEST(CameraConnections, AreTheWayBack) {
   }
 }
 
-// A picture of all directions goes on at its other edge, and beyond a pole half a turn on: light
-// counts for as much there as in the middle, and where the camera's samples see it.
+// A latlong image continues at its opposite edge, and beyond a pole with an offset of half a turn.
+// Light there counts as much as in the middle, at the position where camera samples see it.
 TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   constexpr uint32_t kAcross = 24, kDown = 12;
   const FilterTable table(FilterKind::kGaussian, 4);
@@ -226,7 +226,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   const Film film(all, {}, false);
   Random random(5);
   for (int i = 0; i < 300; ++i) {
-    // Near the edges; a camera's sample of the pixel there may lie beyond them.
+    // Points near the edges; a camera sample of such a pixel may lie beyond the edge.
     const float x = 4 * random() - 2 + (i % 2 ? kAcross : 0);
     const float y = i % 3 == 0 ? 4 * random() - 2 + (i % 2 ? kDown : 0) : kDown * random();
     const CameraRay<float> ray = ray_through<float>(setup, x, y, 0.f, 0.f, 0.f, true);
@@ -241,7 +241,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
       sum += double{w};
     });
     EXPECT_NEAR(sum, 1, 0.02) << x << " " << y;
-    // The pixels whose samples lie at (x, y) itself.
+    // Pixels whose samples lie at (x, y) itself.
     for (uint32_t row = 0; row < kDown; ++row)
       for (uint32_t column = 0; column < kAcross; ++column) {
         const float own = table.density(x - (static_cast<float>(column) + 0.5f)) *
@@ -249,7 +249,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
         EXPECT_GE(weight[film.index(column, row)], double{own} - 2e-3) << x << " " << y;
       }
   }
-  // A half of the way round shows nothing twice.
+  // An image of half a turn shows nothing twice.
   made.window[0] = -0.5f * static_cast<float>(kPiD);
   made.window[1] = 0.5f * static_cast<float>(kPiD);
   const CameraSetup front(made, kAcross, kDown, table);

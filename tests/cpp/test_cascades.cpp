@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples by brightness: what is rare and bright is taken away, and nothing else.
+// Cascaded outlier rejection: removes rare bright samples and nothing else.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint32_t kSide = 5, kMiddle = 12;
 
-/// A film of kSide x kSide pixels that each have `n` samples of brightness `y`.
+/// Makes a film of kSide x kSide pixels, each with `n` samples of brightness `y`.
 Film even_film(uint32_t n, float y) {
   Film film(kSide, kSide, {AovSet{0}});
   film.keep_cascades(1 / 64.f);
@@ -42,7 +42,7 @@ TEST(Cascades, TakeAwayTheOneSampleThatNobodyHasBeside) {
   add_sample(film, kMiddle, 4000, 2000, 0);
   const std::vector<float> beauty = film.beauty(), all = film.unbiased();
   EXPECT_GT(all[3 * kMiddle], 200.f);
-  // What is left of it changes the pixel by about an eighth for each layer.
+  // The remainder changes the pixel by about an eighth per layer.
   EXPECT_LT(beauty[3 * kMiddle], 1.5f);
   EXPECT_LT(beauty[3 * kMiddle + 1], 1.5f);
   EXPECT_EQ(beauty[3 * kMiddle + 2], 15 / 16.f);
@@ -54,7 +54,7 @@ TEST(Cascades, TakeAwayTheOneSampleThatNobodyHasBeside) {
 }
 
 TEST(Cascades, TrustWhatManySamplesSay) {
-  // One in eight samples is bright, in every pixel: that is the light there.
+  // One in eight samples is bright in every pixel, so that is the true image.
   Film film = even_film(56, 1);
   for (uint32_t i = 0; i < kSide * kSide; ++i)
     for (uint32_t s = 0; s < 8; ++s) add_sample(film, i, 500, 500, 500);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The chi-square test itself: right samplers pass as often as the level says, faults of 1 and 2 %
-/// do not.
+/// Tests of the chi-square test: correct samplers pass at the expected rate, and samplers with
+/// faults of 1 and 2 % fail.
 #include "chi_square.h"
 
 #include <gtest/gtest.h>
@@ -26,13 +26,14 @@ using chi_square::Random;
 using chi_square::Result;
 using Vec = Vec3<float>;
 
-/// A level as the largest batteries have it.
+/// The level that the largest batteries use.
 constexpr double kLevel = 1e-7;
-/// In `make test-long` samples are as many as there; of fewer what is found is larger.
+/// `make test-long` uses as many samples as those batteries; with fewer samples, only larger faults
+/// are detected.
 const size_t kSamples = is_long() ? 1000000 : 4 * chi_square::usual_samples();
 const double kFault = std::sqrt(1e6 / static_cast<double>(kSamples));
 
-/// The hemisphere by cosine.
+/// The hemisphere, sampled by cosine.
 Case cosine_case() {
   Case c{"cosine",
          bsdf_testing::direction_charts(),
@@ -45,8 +46,8 @@ Case cosine_case() {
   return c;
 }
 
-/// A material of two lobes, one of them narrow, and a delta lobe: its samples, and those of another
-/// in its place.
+/// A material with two lobes, one of them narrow, and a delta lobe; optionally with modified
+/// samples.
 struct Principled {
   OpenPbrParams<float> params = bsdf_testing::plain_params();
   Vec wo = direction(0.3, 0.4);
@@ -55,7 +56,7 @@ struct Principled {
     params.roughness = 0.1f;
     params.clearcoat = 0.5f;
   }
-  /// `change`: of the number that chooses the lobe.
+  /// `change` modifies the sample value that selects the lobe.
   Case make(const std::function<float(float)>& change = [](float l) { return l; }) const {
     const PrincipledBsdf<float> bsdf(params, false);
     Case c{"principled", bsdf_testing::direction_charts(), {}, {}};
@@ -88,7 +89,7 @@ TEST(ChiSquare, PValuesOfKnownStatistics) {
 }
 
 TEST(ChiSquare, RightSamplersPassAsOftenAsTheLevelSays) {
-  // p-values are uniform: Kolmogorov and Smirnov's statistic, whose 0.1 % point is 1.95 / sqrt(n).
+  // p-values are uniform: Kolmogorov-Smirnov statistic, whose 0.1 % point is 1.95 / sqrt(n).
   std::vector<double> fine;
   for (uint32_t seed = 1; seed <= (is_long() ? 400u : 60u); ++seed) {
     const Result r = chi_square::compare(cosine_case(), seed, 4000);
@@ -124,7 +125,7 @@ TEST(ChiSquare, FindsDensitiesThatLeanByTwoPercent) {
     return d(p) * (1 + 0.02 * kFault * std::sin(p.y));
   };
   EXPECT_NE(fault(c), "");
-  c = cosine_case();  // a power of the cosine for the cosine
+  c = cosine_case();  // a power of the cosine in place of the cosine
   c.density = [](const Place& p) {
     const double power = 1 + 0.05 * kFault;
     return p.chart == 0 ? (power + 1) / (2 * kPiD) * std::pow(1 - p.x, power) : 0;
@@ -156,7 +157,7 @@ TEST(ChiSquare, FindsLobesOfAnotherWidth) {
 
 TEST(ChiSquare, FindsLobesThatAreChosenTooOften) {
   const Principled material;
-  // The diffuse lobe comes first, a delta lobe last: both get one percent more, or less.
+  // The diffuse lobe comes first, a delta lobe last: each gets one per cent more or less.
   for (const double percent : {1.0, -1.0}) {
     const auto change = [=](float l) {
       return std::clamp(static_cast<float>(l + 0.01 * kFault * percent * (l < 0.5f ? -1 : 1) *
@@ -192,7 +193,7 @@ TEST(ChiSquare, FindsDeltaLobesAndNothingMoreOftenThanStated) {
 }
 
 TEST(ChiSquare, FindsNarrowLobesOfAnotherShare) {
-  // Two percent in a lobe of a thousandth of a radian; a tenth more of it is drawn.
+  // Two per cent in a lobe of a thousandth of a radian, with a tenth too many samples.
   const Vec wo = direction(0.5, 0.4);
   const Ggx<float> ggx{1e-3f};
   constexpr double kShare = 0.02;

@@ -12,10 +12,10 @@
 namespace wavecomb {
 namespace {
 
-/// Asks and tells a chooser, with the given times of each arm, and keeps the score.
+/// Plays a chooser against arms with given run times, and keeps the score.
 class Game {
  public:
-  /// Run time of an arm in round i, per packet; preparing costs `prepare` a record.
+  /// Run time of an arm per packet in round i; preparation costs `prepare` per record.
   using RunNs = std::function<double(size_t arm, int round)>;
 
   Game(size_t arms, RunNs run_ns, std::vector<double> prepare_ns)
@@ -55,7 +55,7 @@ Game::RunNs fixed(std::vector<double> ns) {
   return [ns = std::move(ns)](size_t arm, int) { return ns[arm]; };
 }
 
-/// Log-normal noise with a spike now and then, as on a busy machine.
+/// Log-normal noise with occasional spikes, as on a busy machine.
 std::function<double()> noisy(uint32_t seed, double spikes = 0) {
   return [rng = std::mt19937(seed), spikes]() mutable {
     const double x = std::exp(std::normal_distribution<double>(0, 0.1)(rng));
@@ -73,8 +73,8 @@ TEST(Chooser, TriesEachArmThenTakesTheLeast) {
 }
 
 TEST(Chooser, WeighsRunningAgainstPreparing) {
-  // Sorting costs 10 ns a record. Of 1600 records it saves half of 100 packets of 200 ns, 10 us for
-  // 16: not worth it. At 2000 ns a packet it saves 100 us.
+  // Sorting costs 10 ns per record. With 1600 records it halves 100 packets of 200 ns: it saves 10
+  // us and costs 16, a loss. At 2000 ns per packet it saves 100 us.
   Game cheap(2, fixed({200, 200}), {0, 10});
   cheap.work = {{100, 1600}, {50, 1600}};
   Game dear(2, fixed({2000, 2000}), {0, 10});
@@ -85,7 +85,7 @@ TEST(Chooser, WeighsRunningAgainstPreparing) {
   }
   EXPECT_EQ(cheap.play(), 0u);
   EXPECT_EQ(dear.play(), 1u);
-  // The same chooser, where the queue is grouped as it comes: no packets to win.
+  // The same chooser with a queue that arrives grouped: there are no packets to save.
   dear.work = {{50, 1600}, {50, 1600}};
   EXPECT_EQ(dear.play(), 0u);
 }
@@ -95,14 +95,14 @@ TEST(Chooser, LearnsEachDepthForItself) {
   const std::vector<Work> work(2, Work{10, 100});
   const auto play = [&](uint32_t depth) {
     const size_t arm = chooser.choose(depth, work);
-    // At even depths arm 0 is quicker, at odd ones arm 1.
+    // At even depths arm 0 is faster, at odd depths arm 1.
     chooser.learn(depth, arm, work[arm], arm == depth % 2 ? 1000. : 2000., 0);
     return arm;
   };
   for (int i = 0; i < 10; ++i)
     for (uint32_t depth = 0; depth < 6; ++depth) play(depth);
   for (uint32_t depth = 0; depth < 6; ++depth) EXPECT_EQ(play(depth), depth % 2) << depth;
-  // Very deep ones share what they learn.
+  // Very large depths share one entry.
   for (int i = 0; i < 10; ++i) play(1000 + Chooser::kDepths);
   EXPECT_NO_FATAL_FAILURE(play(0xffffffffu));
 }
@@ -130,7 +130,7 @@ TEST(Chooser, RegretIsBoundedWhereArmsAreAlike) {
 }
 
 TEST(Chooser, OneSlowMeasurementIsForgiven) {
-  // The best arm meets a busy machine when it is first looked at.
+  // The best arm is measured first while the machine is busy.
   int hits = 0;
   for (uint32_t seed = 0; seed < 200; ++seed) {
     Game game(2, fixed({150, 100}), {0, 0});
@@ -142,7 +142,7 @@ TEST(Chooser, OneSlowMeasurementIsForgiven) {
 }
 
 TEST(Chooser, TriesAgainAtEveryDepth) {
-  // Waves of eight depths: the turn of another arm must not always come at the same depth.
+  // Waves of eight depths: exploration must not always hit the same depth.
   Chooser chooser(2);
   const std::vector<Work> work(2, Work{10, 100});
   std::vector<int> others(8);
@@ -156,7 +156,7 @@ TEST(Chooser, TriesAgainAtEveryDepth) {
 }
 
 TEST(Chooser, FollowsAChange) {
-  // Half-way, another place of the picture: the arm that was nearly as good becomes better.
+  // Half-way the image content changes: the arm that was nearly as good becomes better.
   Game game(2, [](size_t arm, int round) { return arm == 0 || round < 2000 ? 100. : 70.; }, {0, 0});
   game.work[1].packets = 105;
   for (int i = 0; i < 2000; ++i) game.play();

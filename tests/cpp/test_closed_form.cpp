@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes whose radiance is known: the whole renderer against formulas.
+// Scenes of known radiance: the whole renderer against formulas.
 #include "curve_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/sampler.h"
@@ -12,8 +12,8 @@ namespace {
 
 using namespace scene_testing;
 
-/// Some 80 comparisons in this file; 4.6 standard errors each is one false alarm in 3,000 runs with
-/// other seeds (Sidak). The seeds are fixed.
+/// About 80 comparisons in this file. With 4.6 standard errors each, one run in 3,000 with other
+/// seeds fails by chance (Sidak). The seeds are fixed.
 constexpr double kSigmas = 4.6;
 
 Settings settings(uint32_t side = 16, uint32_t spp = 256) {
@@ -28,8 +28,8 @@ Settings settings(uint32_t side = 16, uint32_t spp = 256) {
   return s;
 }
 
-/// Expects the picture's mean to be `expected`; `within` is the relative error that the test must
-/// be able to see, `bias` what the scene itself is off (tessellation).
+/// Expects the mean of the image to be `expected`. `within` is the relative error that the test
+/// must be able to detect, `bias` the error of the scene itself (tessellation).
 void expect_radiance(const Picture& picture, double expected, const std::string& what,
                      double within = 0.005, double bias = 5e-5) {
   for (size_t c = 0; c < 3; ++c) {
@@ -41,7 +41,7 @@ void expect_radiance(const Picture& picture, double expected, const std::string&
     }
   }
 }
-/// Expects two pictures of one scene to have the same mean.
+/// Expects two images of one scene to have the same mean.
 void expect_equal_means(const Picture& a, const Picture& b, const std::string& what,
                         double within = 0.02) {
   for (size_t c = 0; c < 3; ++c) {
@@ -54,7 +54,7 @@ void expect_equal_means(const Picture& a, const Picture& b, const std::string& w
 }
 
 constexpr float kAlbedo = 0.6f;
-/// Radiance of a floor at the origin under one light.
+/// Renders a floor at the origin under one light.
 Picture floor_under(const Light& light, const Settings& s = settings()) {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, Vec3<float>(kAlbedo)));
@@ -117,7 +117,7 @@ TEST(ClosedForm, FloorUnderADistantLight) {
   sun.angle = 30;
   sun.to_world = rotate(0, -90);
   expect_irradiance(sun, 4 * kPiD * std::pow(std::sin(15 * kPiD / 180), 2), "sun at the zenith");
-  sun.to_world = rotate(2, 40) * rotate(0, -90);  // wholly above the horizon
+  sun.to_world = rotate(2, 40) * rotate(0, -90);  // entirely above the horizon
   expect_irradiance(
       sun, 4 * kPiD * std::pow(std::sin(15 * kPiD / 180), 2) * std::cos(40 * kPiD / 180), "sun");
 }
@@ -175,7 +175,7 @@ TEST(ClosedForm, WhiteFurnace) {
     SceneBuilder b;
     const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {1, 1, 1}));
     MeshData m = open_box ? box({-1, -1, -1}, {1, 1, 1}) : sphere(16, false);
-    if (open_box) m.indices.resize(30);  // open towards the camera; light bounces about
+    if (open_box) m.indices.resize(30);  // open towards the camera; light bounces around inside
     b.add_to_group(0, b.add_mesh(make_mesh(m, white)));
     b.add_light(make_light(LightKind::kDome, {1, 1, 1}));
     b.set_camera(make_camera({0, 0, 4}, {0, 0, 0}, 0.3f));
@@ -187,7 +187,7 @@ TEST(ClosedForm, WhiteFurnace) {
 }
 
 TEST(ClosedForm, WhiteFurnaceOfCurves) {
-  // Tubes and spheres are closed, so all light that meets them comes back: ribbons too.
+  // Tubes and spheres are closed, so all light that hits them is reflected; ribbons as well.
   for (const Primitive primitive : curve_testing::curved_primitives()) {
     SceneBuilder b;
     const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {1, 1, 1}));
@@ -202,7 +202,7 @@ TEST(ClosedForm, WhiteFurnaceOfCurves) {
 }
 
 TEST(ClosedForm, InsideAGlowingBody) {
-  // L = Le + rho L everywhere; cut off after n scatterings, L = Le (1 - rho^(n + 1)) / (1 - rho).
+  // L = Le + rho L everywhere; truncated after n scatterings, L = Le (1 - rho^(n + 1)) / (1 - rho).
   for (const bool round : {false, true}) {
     SceneBuilder b;
     constexpr float kRho = 0.5f;
@@ -224,7 +224,7 @@ TEST(ClosedForm, InsideAGlowingBody) {
 }
 
 TEST(ClosedForm, IntegratingSphere) {
-  // A point light in the middle: E = I / R^2 everywhere, L = rho / pi E / (1 - rho).
+  // A point light in the centre: E = I / R^2 everywhere, L = rho / pi E / (1 - rho).
   SceneBuilder b;
   const uint32_t wall = b.add_material(make_material(ProgramId::kDiffuse, Vec3<float>(0.7f)));
   b.add_to_group(0, b.add_mesh(make_mesh(sphere(48, false).transform(scale(2, 2, 2)), wall)));
@@ -239,7 +239,7 @@ TEST(ClosedForm, IntegratingSphere) {
 }
 
 TEST(ClosedForm, MirrorChain) {
-  // Two facing mirrors, met at 45 degrees four times; Schlick's formula for each.
+  // Two facing mirrors, hit four times at 45 degrees, with Schlick's formula at each.
   SceneBuilder b;
   const uint32_t mirror = b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.9f, 0.9f}, 0));
   Material lamp = make_material(ProgramId::kEmissive);
@@ -253,7 +253,7 @@ TEST(ClosedForm, MirrorChain) {
   WavefrontRenderer renderer(b.build());
   expect_radiance(renderer.render(settings(4, 4)), 2 * std::pow(f, 4), "four mirrors", 0.001, 2e-4);
   Settings s = settings(4, 4);
-  s.max_depth = 3;  // the fourth mirror's bounce is not made
+  s.max_depth = 3;  // the path ends at the fourth mirror
   EXPECT_EQ(mean_of(renderer.render(s)).mean, 0);
 }
 
@@ -272,10 +272,9 @@ TEST(ClosedForm, GlassInAConstantEnvironment) {
   }
 }
 
-// ---- estimators that must agree
-// -------------------------------------------------------------------
+// ---- estimators that must agree -----------------------------------------------------------------
 
-/// Direct light at the camera's one point by two estimators of this test's own.
+/// Direct light at the one point that the camera sees, by two independent estimators.
 struct DirectLight {
   Mean by_bsdf, by_light;
 };
@@ -353,7 +352,7 @@ TEST(ClosedForm, MultipleImportanceSamplingAgreesWithItsHalves) {
     SceneBuilder b;
     const uint32_t id = b.add_material(material);
     b.add_to_group(0, b.add_mesh(make_mesh(ground(9), id)));
-    // Something in the way of a part of the light.
+    // An occluder for part of the light.
     const uint32_t black = b.add_material(make_material(ProgramId::kDiffuse, {0, 0, 0}));
     b.add_to_group(0, b.add_mesh(make_mesh(box({-0.4f, 0.6f, -0.3f}, {0.1f, 0.7f, 0.4f}), black)));
     Light rect = make_light(LightKind::kRect, {4, 4, 4},
@@ -381,7 +380,7 @@ TEST(ClosedForm, MultipleImportanceSamplingAgreesWithItsHalves) {
     expect_equal(halves.by_bsdf, halves.by_light, "BSDF and light sampling");
     expect_equal(both, halves.by_light, "MIS and light sampling");
     expect_equal(both, halves.by_bsdf, "MIS and BSDF sampling");
-    // And sampled by cosine.
+    // With cosine sampling.
     s.cosine_sampling = true;
     expect_equal(mean_of(renderer.render(s)), halves.by_light, "MIS by cosine and light sampling");
   }
@@ -415,7 +414,7 @@ TEST(ClosedForm, ClampingTouchesIndirectLightOnly) {
   expect_same_picture(renderer.render(s), clamped, "direct light");
 }
 
-/// Glossy things without caustics.
+/// A glossy scene without caustics.
 std::shared_ptr<const Scene> glossy_scene() {
   SceneBuilder b;
   const uint32_t floor =

@@ -8,7 +8,7 @@ namespace {
 
 using Ids = std::vector<uint32_t>;
 
-/// Materials 0 and 1 read texture 0, 2 reads texture 1, 3 none.
+/// Materials 0 and 1 read texture 0, material 2 reads texture 1, and material 3 reads none.
 const std::vector<MaterialTraits> kTraits = {
     {0, 0, 10}, {0, 0, 10}, {0, 1, 20}, {1, MaterialTraits::kNone, 0}};
 
@@ -42,7 +42,7 @@ TEST(Coherence, MaterialHomogeneity) {
 }
 
 TEST(Coherence, TextureHomogeneity) {
-  // Materials 0 and 1 share a texture: what counts is the texels.
+  // Materials 0 and 1 share a texture: the texels count.
   EXPECT_EQ(measure({0, 1, 0}, {5, 5, 5}).texture_homogeneity(), 1);
   EXPECT_EQ(measure({0, 1, 0}, {5, 5, 6}).texture_homogeneity(), 0.5);
   EXPECT_EQ(measure({0, 2}, {5, 5}).texture_homogeneity(), 0) << "another texture";

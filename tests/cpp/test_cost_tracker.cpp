@@ -53,7 +53,7 @@ TEST(CostTracker, WhatIsBesideIsAShareOfEachTimedRecord) {
   CostTracker sum(2), worker(2);
   worker.count(Ids{0, 0, 0, 0, 1});
   worker.charge(Ids{0, 0}, 40);  // two of four
-  worker.charge_beside(0, 100);  // of all four
+  worker.charge_beside(0, 100);  // shared by all four
   sum.take(worker);
   EXPECT_DOUBLE_EQ(sum.ns()[0], 40 + 2 * 25);
   worker.count(Ids{0, 0});
@@ -136,15 +136,15 @@ TEST(MergeCosts, NothingMeasuredChangesNothing) {
 TEST(MergeCosts, PredictionByHand) {
   const std::vector<MaterialTraits> traits(4);
   CostSnapshot costs = unknown(4, 0);
-  costs.material_ns = {40, 110, 0, 70};  // of material 2 nothing was known, 3 is not measured
+  costs.material_ns = {40, 110, 0, 70};  // material 2 is unknown, material 3 is not measured
   CostTracker tracker(4);
   tracker.charge(Ids{0, 0, 0}, 150);  // 50 each
   tracker.charge(Ids{1}, 100);
   tracker.charge(Ids{2, 2}, 20);  // 10 each
   const CostPrediction p = merge_costs(tracker, traits, 0.3f, costs);
   EXPECT_EQ(p.materials, 2u);
-  // What can be compared is materials 0 and 1: mean (150 + 100) / 4 = 62.5;
-  // residual 3 x 10^2 + 1 x 10^2 = 400; variance 3 x 12.5^2 + 37.5^2 = 1875; error 3 x 10 + 10.
+  // Only materials 0 and 1 can be compared: mean (150 + 100) / 4 = 62.5; residual 3 x 10^2 + 1 x
+  // 10^2 = 400; variance 3 x 12.5^2 + 37.5^2 = 1875; error 3 x 10 + 10.
   EXPECT_NEAR(p.r2, 1 - 400. / 1875, 1e-9);
   EXPECT_NEAR(p.mean_error, 40. / 250, 1e-9);
 }
@@ -163,10 +163,10 @@ TEST(MergeCosts, PerfectAndPoorPredictions) {
   p = merge_costs(tracker, traits, 0.3f, costs);
   EXPECT_NEAR(p.r2, 0, 1e-9);
   EXPECT_NEAR(p.mean_error, 50. / 150, 1e-9);
-  costs.material_ns = {100, 50};  // the wrong way about
+  costs.material_ns = {100, 50};  // reversed order
   p = merge_costs(tracker, traits, 0.3f, costs);
   EXPECT_NEAR(p.r2, 1 - 5000. / 1250, 1e-9);
-  // One material alone has no variance.
+  // A single material has no variance.
   CostTracker one(2);
   one.charge(Ids{0}, 50);
   costs.material_ns = {50, 0};

@@ -23,7 +23,7 @@ struct TestRay {
   float o[3], d[3];
 };
 
-/// A ray that passes near a control point: at `near` times the radius.
+/// A ray that passes a control point at `near` times its radius.
 TestRay aimed(const Mesh& mesh, std::mt19937& rng, float near) {
   const size_t point = rng() % mesh.vertex_count();
   const float reach = near * mesh.radii[point], scale = std::exp(2.f * uniform(rng));
@@ -48,8 +48,8 @@ bool enters(const Bounds& box, const TestRay& ray) {
   return from <= to;
 }
 
-/// Calls look(prim, may be met, is met) for all segments. What may be met: of those whose clump's
-/// box the ray enters.
+/// Calls look(prim, may_hit, hits) for all segments. may_hit: the ray enters the box of the
+/// segment's BVH node.
 template <typename Look>
 void compare(const Mesh& mesh, const CurveClumps& clumps, const TestRay& ray, float tfar,
              const Look& look) {
@@ -87,7 +87,7 @@ TEST(CurveClumps, HoldAllPiecesOfEachSegment) {
       EXPECT_EQ(found.size(), mesh.primitive_count());
       for (const auto& [prim, pieces] : found) {
         EXPECT_EQ(pieces.first, radius < 0.1f ? 4u : 1u);
-        if (pieces.first > 1) continue;  // hulls of pieces are within that of the segment
+        if (pieces.first > 1) continue;  // hulls of sub-segments lie within that of the segment
         const Bounds& all = pieces.second;
         const Bounds one = curve_bounds(mesh, prim);
         EXPECT_TRUE(all.lo.x <= one.lo.x && all.lo.y <= one.lo.y && all.lo.z <= one.lo.z);

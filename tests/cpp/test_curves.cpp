@@ -33,7 +33,7 @@ V3 widen(const Vec3<float>& v) {
   return {v.x, v.y, v.z};
 }
 
-/// A segment by its definition: Bernstein polynomials in double precision.
+/// A segment by definition: Bernstein polynomials in double precision.
 struct Exact {
   const Mesh& mesh;
   uint32_t prim;
@@ -67,7 +67,7 @@ struct Exact {
   }
 };
 
-/// Where a value falls to its least (a local minimum) on [0, 1], near sample i of n.
+/// Refines a local minimum of f on [0, 1] near sample i of n.
 double refine(const std::function<double(double)>& f, int i, int n) {
   double a = std::max(0, i - 1) / static_cast<double>(n);
   double b = std::min(n, i + 1) / static_cast<double>(n);
@@ -81,8 +81,8 @@ double refine(const std::function<double(double)>& f, int i, int n) {
 constexpr double kMissed = 1e30;
 constexpr int kSamples = 1200;
 
-/// Least t > 0 where a ray meets the surface of the union of the spheres about a segment, by
-/// sampling u densely: entries are least over u, exits greatest.
+/// Smallest t > 0 at which a ray hits the union of the spheres around a segment, by dense samples
+/// of u: entry points are minima over u, exit points maxima.
 double brute_tube(const Exact& s, const V3& o, const V3& d) {
   double best = kMissed;
   for (const double side : {-1.0, 1.0}) {
@@ -96,7 +96,7 @@ double brute_tube(const Exact& s, const V3& o, const V3& d) {
     for (int i = 0; i <= kSamples; ++i) {
       if (at[i] == kMissed || (i > 0 && at[i] > at[i - 1]) || (i < kSamples && at[i] > at[i + 1]))
         continue;
-      // f is -z for exits: its least is the greatest z.
+      // f is -z for exits: its minimum is the largest z.
       const double z = -side * refine(f, i, kSamples);
       if (z > 0) best = std::min(best, z);
     }
@@ -104,7 +104,7 @@ double brute_tube(const Exact& s, const V3& o, const V3& d) {
   return best;
 }
 
-/// Least t > 0 on a ribbon, by changes of sign between samples of u.
+/// Smallest t > 0 on a ribbon, by sign changes between samples of u.
 double brute_ribbon(const Exact& s, const V3& o, const V3& d) {
   const auto beside = [&](double u) { return dot(cross(sub(s.point(u), o), s.across(u)), d); };
   const auto meet = [&](double u) {
@@ -146,7 +146,7 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
   for (const Primitive primitive : curved_primitives())
     for (const float radius : {0.01f, 0.1f}) {
       SceneBuilder b;
-      // Curves of one segment each: what is hit does not depend on what goes on.
+      // Curves of one segment each: hits do not depend on a continuation.
       const uint32_t mesh_id = b.add_mesh(make_curves(strands(primitive, 30, 1, 1.f, radius, 3)));
       b.add_to_group(0, mesh_id);
       const auto scene = b.build();
@@ -191,13 +191,13 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
           ++differing;
           continue;
         }
-        // Shading finds the same point again, and its normal.
+        // Shading computes the same point and its normal.
         const Vec3<float> dir{fd[0], fd[1], fd[2]};
         const Surface<float> s =
             setup_surface<float>(scene->view(), {0, 0, prim, found.begin()->u, found.begin()->v},
                                  dir * (1.f / static_cast<float>(length)), true, true, true);
         const V3 p = along(o, d, want);
-        const double off = 4e-7 + s.offset + 2e-6 * (want + 1e-2) * length;  // t may differ so much
+        const double off = 4e-7 + s.offset + 2e-6 * (want + 1e-2) * length;  // tolerance of t
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(widen(s.p)[c], p[c], off);
         EXPECT_NEAR(dot(widen(s.ng), widen(s.ng)), 1, 1e-5);
         if (is_sphere) {
@@ -208,19 +208,19 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
           const float hu = found.begin()->u;
           EXPECT_NEAR(dot(widen(s.ng), exact.across(hu)), 0, 1e-4);
         } else {
-          // A tube's normal points from its curve to the surface.
+          // The normal of a tube points from its curve to the surface.
           const double hu = std::min(std::max(found.begin()->u, 0.f), 1.f);
           EXPECT_GT(dot(unit(sub(p, exact.point(hu))), widen(s.ng)), 1 - 1e-5);
         }
       }
       EXPECT_GT(hits, rays / 3);
-      // Rays that graze, where sampling and solving see a miss and a hit; ribbons are grazed often.
+      // Grazing rays, where sampling and solving disagree about a hit; ribbons are grazed often.
       EXPECT_LE(differing, rays / (mesh.is_ribbon() ? 150 : 500))
           << static_cast<int>(primitive) << ", radius " << radius;
     }
 }
 
-/// The first hit of one ray alone.
+/// First hit of a single ray.
 struct OneHit {
   float t, u, v;
   uint32_t prim, geom, inst;
@@ -242,7 +242,8 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
   const auto random = [&] { return V3{uniform(rng), uniform(rng), uniform(rng)}; };
   for (const float away : {0.f, 50.f})
     for (const Primitive primitive : {Primitive::kLinearTube, Primitive::kSphere}) {
-      // Both are convex: what leaves one, however flat, meets it no more, and what enters it does.
+      // Both shapes are convex: a ray that leaves one, however flat, does not hit it again, and a
+      // ray that enters it does.
       SceneBuilder b;
       const uint32_t group = b.add_group("one");
       CurveData data;
@@ -261,7 +262,7 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
         const V3 from = along({away, -away, away}, random(), 3);
         const V3 to = along({away + 0.2, -away, away}, random(), 0.6);
         const V3 apart = sub(from, {away, -away, away});
-        if (dot(apart, apart) < 2.25) continue;  // it may be inside
+        if (dot(apart, apart) < 2.25) continue;  // the point may be inside
         const V3 d = unit(sub(to, from));
         const OneHit h = trace_one(accel, narrow(from), narrow(d));
         if (h.inst == kNoHit) continue;
@@ -270,7 +271,7 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
                                                       narrow(d), false, true, true);
         const V3 n = widen(s.ng);
         EXPECT_LT(dot(d, n), 1e-3);
-        // From straight out to as good as along the surface.
+        // From perpendicular to almost tangential.
         const double flat = std::pow(10.0, -6 * std::abs(uniform(rng)));
         const V3 side = unit(cross(n, random()));
         const Vec3<float> out = narrow(unit(along(side, n, flat)));
@@ -285,8 +286,8 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
 
 TEST(Curves, TubesHaveNoSeams) {
   const DenormalsOff denormals_off;
-  // A closed ring of four segments: whoever starts inside meets the outer wall once and then
-  // nothing of the ring's own segments in between, and light that aims at a seam does not get in.
+  // A closed ring of four segments: a ray from inside hits the outer wall first and no inner
+  // surface of the segments before, and rays aimed at a seam from outside do not enter.
   SceneBuilder b;
   CurveData ring;
   constexpr float k = 0.5522848f, r = 0.2f;
@@ -314,13 +315,13 @@ TEST(Curves, TubesHaveNoSeams) {
     const double phi = kPiD * uniform(rng), a = kPiD * uniform(rng);
     const V3 middle{std::cos(phi), std::sin(phi), 0};
     const V3 d = unit({uniform(rng), uniform(rng), uniform(rng)});
-    // The way out of a torus of the same radii, which the ring is within 1e-3.
+    // Exit point of a torus of the same radii, which the ring matches within 1e-3.
     const OneHit h = trace_one(accel, narrow(middle), narrow(d));
     ASSERT_EQ(h.inst, 0u) << "a hole";
     const V3 p = along(middle, d, h.t);
     const double tube = std::hypot(std::hypot(p[0], p[1]) - 1, p[2]);
     EXPECT_NEAR(tube, r, 1e-3) << "a wall inside";
-    // At a seam from outside: never inside first.
+    // At a seam from outside: the first hit is never on the inside.
     const V3 seam = widen(corner[i % 4]),
              at{seam[0] * (1 + r * std::cos(a)), seam[1] * (1 + r * std::cos(a)), r * std::sin(a)};
     const V3 out = along(at, unit(sub(at, seam)), 0.5);

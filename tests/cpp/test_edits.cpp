@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Edited scenes, twins, stop(), pick(): a scene that was edited is the scene built anew.
+/// Scene edits, copies, stop() and pick(): an edited scene equals a scene that is built anew.
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -18,7 +18,7 @@ namespace {
 using namespace scene_testing;
 using Clock = std::chrono::steady_clock;
 
-/// What edits may change.
+/// Values that edits may change.
 struct Values {
   std::vector<Material> materials;
   std::vector<Light> lights;
@@ -44,7 +44,7 @@ Values values() {
   return v;
 }
 
-/// Instances that inherit, a mesh with materials of faces, a world mesh.
+/// Instances that inherit materials, a mesh with face materials, and a world mesh.
 ScenePtr build(const Values& v) {
   SceneBuilder b;
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));
@@ -209,7 +209,7 @@ TEST(Edits, ShareWhatDidNotChange) {
     auto next = std::make_unique<EmbreeAccelerator>(edited, *accel, 1);
     EXPECT_EQ(next->embree_scene() == accel->embree_scene(), change.keeps_hierarchy) << change.what;
     scene = edited;
-    accel = std::move(next);  // what it shared must stay
+    accel = std::move(next);  // shared data must stay alive
   }
 }
 
@@ -249,7 +249,7 @@ TEST(Twins, RenderAtOnceEachItsOwnMaterials) {
   WavefrontRenderer renderer(build(v));
   const auto twin = renderer.twin();
   Values other = v;
-  other.materials[kLeaf].opacity = 0.2f;  // the same hierarchy, other answers of its filters
+  other.materials[kLeaf].opacity = 0.2f;  // same BVH, different results of its filters
   other.materials[kFloor].base_color = {0, 1, 0};
   const Change change{"twin", {}, {kLeaf, kFloor}};
   twin->edit(edit_for(change, *twin->scene(), other));
@@ -277,10 +277,10 @@ TEST(Twins, OutliveTheirOrigin) {
 
 TEST(Stop, EndsARenderFromAnotherThread) {
   WavefrontRenderer renderer(cornell());
-  renderer.stop();  // nothing goes on: nothing happens
+  renderer.stop();  // no render is running: no effect
   Settings s;
   s.width = s.height = 256;
-  s.spp = 1u << 16;  // hours
+  s.spp = 1u << 16;  // would take hours
   s.threads = 2;
   std::atomic<bool> looked{false}, refused{false};
   Clock::time_point asked;
@@ -317,7 +317,7 @@ static_assert(
         std::is_same_v<CostProfile, decltype(std::declval<WavefrontRenderer&>().cost_profile())>,
     "another thread may replace them: callers get copies");
 
-/// For the thread sanitizer, and for copies of vectors that are being replaced.
+/// For the thread sanitizer, and for copies of vectors while they are replaced.
 TEST(Renderer, StatisticsAreReadWhileAnotherThreadRenders) {
   WavefrontRenderer renderer(cornell());
   Settings s = small();
@@ -450,7 +450,7 @@ TEST(Picks, AgreeWithWhatThePictureShows) {
   Settings s = small();
   s.spp = 1;
   s.filter = FilterKind::kBox;
-  s.filter_width = 0.01f;  // rays through the middle of pixels
+  s.filter_width = 0.01f;  // rays through pixel centres
   s.aovs = AovSet{AovSet::kAll};
   const Picture p = renderer.render(s);
   const AovLayer &material = layer(p, "material_id"), &instance = layer(p, "instance_id");

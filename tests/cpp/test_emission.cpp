@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Paths from lights: they start evenly and by cosine, carry what the light sends out in all, and
-/// have the density that is told where such a path is met.
+/// Emission of light paths: uniform positions, cosine-weighted directions, the total power of the
+/// light, and the density that MIS uses where a camera path hits the light.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 using namespace light_testing;
 using chi_square::Random;
 
-/// A view whose infinite lights send paths towards a sphere.
+/// Makes a view whose infinite lights emit paths towards a sphere.
 LightView sending(const Lights& lights) {
   LightView view = lights.view();
   view.radius = 3;
@@ -33,7 +33,7 @@ EmissionNumbers<float> draw(Random& random) {
   return r;
 }
 
-/// Aimed at three spheres, one of which has the lights in it.
+/// Makes a view aimed at three spheres, one of which contains the lights.
 LightView aimed(const Lights& lights) {
   static const LightAim aim = [] {
     LightAim a;
@@ -60,7 +60,7 @@ LightView aimed(const Lights& lights) {
 struct Kind {
   const char* name;
   Lights lights;
-  double power;  ///< of green, W
+  double power;  ///< power of the green channel, W
 };
 
 std::vector<Kind> kinds() {
@@ -120,7 +120,7 @@ TEST(Emission, OfPicturesIsThatOfTheirTexels) {
     lights.set = {};
     lights.build({light});
     const LightView view = sending(lights);
-    // Another estimate of the same: evenly over the light.
+    // A second estimate of the same power: uniform samples over the light.
     double sum = 0, even = 0;
     constexpr int kPaths = 200000;
     for (int i = 0; i < kPaths; ++i) {
@@ -158,7 +158,7 @@ TEST(Emission, IsAsDenseAsWhoMeetsItIsTold) {
   }
 }
 
-/// Places and directions, mapped to the unit square, are even there.
+/// Positions and directions are uniform after they are mapped to the unit square.
 TEST(Emission, IsEvenOverLightsAndByCosine) {
   Random random(3);
   constexpr int kCells = 16, kPaths = 40000;
@@ -205,7 +205,7 @@ TEST(Emission, IsEvenOverLightsAndByCosine) {
         count(places, along, turn(double{dot(n, frame.t)}, double{dot(n, frame.s)}));
       } else if (name == "point") {
         n = {0, 0, 0};
-      } else {  // from afar
+      } else {  // infinite lights
         const Vec3<float> c = e.o - Vec3<float>(view.centre[0], view.centre[1], view.centre[2]);
         EXPECT_NEAR(dot(c, e.d), -view.reach, 1e-3);
         const Frame<float> frame = make_frame(e.d);
@@ -259,7 +259,7 @@ TEST(Emission, LightsThatDoNotShineOnAllAlikeSendNoPaths) {
       << "of a view that sends none";
 }
 
-/// All light is there, and that through one of the spheres is what it is without aiming.
+/// Aimed light paths carry the same total power, and the same power through one of the spheres.
 TEST(Emission, AimedCarriesTheSame) {
   Random random(11);
   constexpr int kPaths = 60000;
@@ -278,7 +278,7 @@ TEST(Emission, AimedCarriesTheSame) {
         };
         const bool first = meets({aim.x[0], aim.y[0], aim.z[0]}, aim.radius[0]);
         through += first ? 1 : 0;
-        // From afar: what comes by the scene beside it does not count.
+        // Infinite lights: paths that miss the scene do not count.
         const bool counts = e.light >= view.infinite_count ||
                             meets({view.centre[0], view.centre[1], view.centre[2]}, view.radius);
         const double flux[2] = {counts ? double{e.flux.y} : 0, first ? double{e.flux.y} : 0};
@@ -311,7 +311,7 @@ TEST(Emission, AimedIsAsDenseAsWhoMeetsItIsTold) {
       if (!e.valid) continue;
       const float t = 0.5f + 3 * random();
       const float met = emission_density<float>(view, e.light, fma(e.d, t, e.o), -e.d, t, true);
-      // At the rims of spheres rounding decides.
+      // At the boundary of a sphere, rounding decides.
       differ += std::abs(met - e.density) > 5e-3f * e.density ? 1 : 0;
     }
     EXPECT_LE(differ, kPaths / 500) << kind.name;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Triangles that emit and are partly there: what light samples bring of them, what rays meet of
-// them, and how often they are chosen. Pictures: tests/statistics/test_emissive_presence.py.
+// Emissive triangles with partial presence: light samples, ray hits and selection probabilities.
+// Image tests: tests/statistics/test_emissive_presence.py.
 #include <functional>
 
 #include "lane_testing.h"
@@ -18,7 +18,7 @@ const Vec3<float> kGlow(2, 1, 0.5f);
 const Vec3<float> kTint(0.5f, 3, 1);
 constexpr uint32_t kTexels = 8;
 
-/// An image of kTexels x kTexels values in all channels.
+/// Makes an image of kTexels x kTexels values, equal in all channels.
 std::vector<float> image(uint32_t seed) {
   std::mt19937 rng(seed);
   std::vector<float> values(size_t{4} * kTexels * kTexels);
@@ -36,7 +36,7 @@ GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_list<uin
   o.number = number;
   return o;
 }
-/// Components of `parameter` = coordinate `axis` of `input` + 0.5.
+/// Makes a graph with components of `parameter` = coordinate `axis` of `input` + 0.5.
 Graph ramp(const char* parameter, uint16_t components, GraphInput input, uint16_t axis) {
   Graph g;
   g.constants = {0.5f};
@@ -48,13 +48,13 @@ Graph ramp(const char* parameter, uint16_t components, GraphInput input, uint16_
   return g;
 }
 
-/// A place on the triangle, as the test works it out.
+/// A point on the triangle, computed independently of the code under test.
 struct Place {
-  float u, v;         ///< barycentrics, which are its texture coordinates, too
-  Vec3<float> local;  ///< from (-0.5, -0.5, 0) on, edges of length 1
+  float u, v;         ///< barycentrics, which equal the texture coordinates
+  Vec3<float> local;  ///< relative to (-0.5, -0.5, 0), edges of length 1
 };
 
-/// A material, and what is known of it.
+/// A material and its expected values.
 struct Case {
   std::string name;
   std::function<void(SceneBuilder&, Material&)> set;
@@ -86,7 +86,7 @@ std::vector<Case> cases() {
                            constant(0.4f, 0.5f, 0), constant(0.6f, 0.5f, 1), constant(1, 2, 0)};
   all.push_back({"texture",
                  [](SceneBuilder& b, Material& m) {
-                   m.opacity = 0;  // does not count
+                   m.opacity = 0;  // has no effect
                    add_image(b, m, Input::kOpacity, 1, 3);
                  },
                  [](const Scene& s, const Place& at) { return texel(s, 0, at).a; }});
@@ -97,7 +97,8 @@ std::vector<Case> cases() {
                  },
                  [](const Scene& s, const Place& at) {
                    const float value = texel(s, 0, at).r;
-                   if (std::abs(value - 0.5f) < 1e-4f) return -1.f;  // cannot be told
+                   // too close to the threshold to decide
+                   if (std::abs(value - 0.5f) < 1e-4f) return -1.f;
                    return value < 0.5f ? 0.f : 1.f;
                  }});
   all.push_back({"emission and opacity by textures",
@@ -135,7 +136,7 @@ std::vector<Case> cases() {
                  [](const Scene&, const Place& at) { return at.local.x + 0.5f; },
                  [](const Scene& s, const Place& at) {
                    const Texel<float> t = texel(s, 1, at);
-                   return Vec3<float>(at.u + 0.5f, t.g, t.b);  // drives red alone
+                   return Vec3<float>(at.u + 0.5f, t.g, t.b);  // drives red only
                  }});
   all.push_back({"a graph below a threshold",
                  [](SceneBuilder& b, Material& m) {
@@ -149,7 +150,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// No mesh light, or one of each mode.
+/// 0: no mesh light; 1 to 3: a mesh light with each MaterialSync.
 constexpr int kModes = 4;
 
 void add_triangle(SceneBuilder& b, const Case& one, int mode, const Affine& place,
@@ -180,7 +181,7 @@ void add_triangle(SceneBuilder& b, const Case& one, int mode, const Affine& plac
   b.add_to_group(group, b.add_mesh(std::move(mesh)));
   b.add_instance(0, group, place);
 }
-/// A scene of one such triangle.
+/// Makes a scene of one such triangle.
 std::shared_ptr<const Scene> make_scene(const Case& one, int mode) {
   SceneBuilder b;
   add_triangle(b, one, mode, translate(3, 1, -2) * rotate(1, 30) * scale(2, 1, -1));
@@ -216,7 +217,7 @@ TEST(EmissivePresence, LightSamplesBringOpacityTimesEmission) {
         ASSERT_NEAR(s.weight.x * s.pdf, expected.x, 1e-4f) << what;
         ASSERT_NEAR(s.weight.y * s.pdf, expected.y, 1e-4f) << what;
         ASSERT_NEAR(s.weight.z * s.pdf, expected.z, 1e-4f) << what;
-        // MIS: the density of the direction, whatever is there.
+        // MIS: the density of the direction does not depend on presence.
         const float t = s.distance;
         const float pdf =
             triangle_light_pdf<float>(lights, lights.first_triangle, from, s.wi, t, true);
@@ -243,7 +244,7 @@ TEST(EmissivePresence, RaysMeetItAsOftenAsItsOpacitySays) {
       uint32_t met = 0;
       for (uint32_t path = 0; path < kPaths; ++path)
         met += is_present(scene->view(), 1, mesh, 0, at.u, at.v, path, keys) ? 1 : 0;
-      // 156 comparisons: 4.5 standard errors each.
+      // 156 comparisons with 4.5 standard errors each.
       const double error = std::sqrt(opacity * (1 - opacity) / kPaths);
       EXPECT_NEAR(static_cast<double>(met) / kPaths, opacity, 4.5 * error + 1e-6) << one.name;
     }
@@ -310,7 +311,7 @@ TEST(EmissivePresence, LightsAreChosenByWhatIsThere) {
   const std::vector<float> values = image(1);
   for (size_t i = 3; i < values.size(); i += 4) mean += double{values[i]} / (kTexels * kTexels);
   EXPECT_NEAR(power(all[6]), mean * whole, 0.01 * whole);
-  // Opacity is 1 at one corner and 0 at the two others.
+  // Opacity is 1 at one corner and 0 at the other two.
   EXPECT_NEAR(power(all[10]), whole / 3, 0.01 * whole);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The lobes of fibres of hair, as program "hair" has them.
+/// Lobes of hair fibres in program "hair".
 #include <gtest/gtest.h>
 
 #include <array>
@@ -54,7 +54,7 @@ std::vector<Look> looks() {
           {"tinted", 0.4f, 0.5f, {0.6f, 0.6f, 0.6f}, 3, {0.5f, 0.2f, 0.9f}, 0.8f, 1.2f}};
 }
 
-/// Where a fibre is seen: sine of theta, and offset h from its middle.
+/// Returns wo for a fibre seen at the sine of theta and the offset h from its centre line.
 Vec seen_at(double sine, double h) {
   const double across = std::sqrt(1 - sine * sine);
   return {static_cast<float>(sine), static_cast<float>(across * h),
@@ -67,8 +67,8 @@ std::vector<Vec> views() {
   return all;
 }
 
-/// Directions as places: sin theta and the angle about the fibre, dw being the product of their
-/// differentials.
+/// Directions as points of a chart: sin theta and the azimuth around the fibre; dw is the product
+/// of their differentials.
 Vec wi_at(const Place& p) {
   const double across = std::sqrt(std::max(0.0, 1 - p.x * p.x));
   return {static_cast<float>(p.x), static_cast<float>(across * std::sin(p.y)),
@@ -110,7 +110,7 @@ TEST(Fibre, ReflectsAllLightWithoutAbsorption) {
     look.tint = {1, 1, 1};
     const Hair bsdf = hair(look);
     for (const Vec& wo : views()) {
-      // By samples, and by uniform directions that know nothing of the density.
+      // By importance sampling, and by uniform directions, which do not use the density.
       EXPECT_NEAR(furnace(bsdf, wo, 5000), 1, 0.005) << look.name << " " << wo.x << " " << wo.y;
       if (look.along < 0.2f) continue;
       double sum = 0, mass = 0;
@@ -138,8 +138,8 @@ TEST(Fibre, AbsorptionAndTintsTakeLight) {
   EXPECT_TRUE(is_black(s.weight));
 }
 
-// What of a fibre is hit is said by wo, so that f is reciprocal only where both directions stand
-// alike to it: theta_i = -theta_o, at the mirrored offset.
+// wo determines the offset h of the hit, so f is reciprocal only where both directions have the
+// same relation to it: theta_i = -theta_o, at the mirrored offset.
 TEST(Fibre, IsReciprocalAsFarAsItsModelIs) {
   for (Look look : looks()) {
     look.tilt = 0;
@@ -160,7 +160,7 @@ TEST(Fibre, IsReciprocalAsFarAsItsModelIs) {
   }
 }
 
-// In double precision, by the formulas of the papers as they stand there.
+// The lobes in double precision, by the formulas as printed in the papers.
 TEST(Fibre, LobesAreThoseOfThePaper) {
   const auto bessel = [](double x) {
     double sum = 0, term = 1;
@@ -184,15 +184,16 @@ TEST(Fibre, LobesAreThoseOfThePaper) {
             f(std::sin(a)), f(std::cos(a)), f(std::sin(b)), f(std::cos(b))));
         EXPECT_NEAR(ours, m, 2e-4 * m + 1e-12) << v << " " << a << " " << b;
       }
-  // Colour to absorption, at one roughness by hand: 5.969 - 0.0645 + 0.22788 - 0.28971 + ...
+  // Conversion of colour to absorption for one roughness by hand: 5.969 - 0.0645 + 0.22788 -
+  // 0.28971 + ...
   EXPECT_NEAR(fibre_color_divisor(0.3f), 5.88841, 1e-4);
   EXPECT_NEAR(fibre_variance(0.3f), 0.084611, 1e-5);
   EXPECT_NEAR(fibre_scale(0.3f), 0.1171598, 1e-6);
 }
 
-// Mitsuba 3.9.1's `hair` with the same parameters, sigma_a 0.06, 0.2 and 0.6 and int_ior 1.55, as
-// its eval and pdf gave them; its fibre lies along y of the local frame.
-// tests/statistics/test_hair.py compares pictures.
+// Values of eval and pdf of Mitsuba 3.9.1's `hair` with the same parameters: sigma_a 0.06, 0.2 and
+// 0.6, int_ior 1.55. Mitsuba's fibre lies along y of the local frame.
+// tests/statistics/test_hair_mitsuba.py compares images.
 TEST(Fibre, AgreesWithMitsuba) {
   struct Value {
     float along, about, tilt;
@@ -298,7 +299,7 @@ TEST(Fibre, AgreesWithMitsuba) {
   }
 }
 
-/// Values of a look, a view and a sample, as floats or as packets of them.
+/// Inputs and results of a fibre, a view and a sample, as floats or packets.
 constexpr size_t kGiven = 19, kFound = 12;
 
 template <typename F>

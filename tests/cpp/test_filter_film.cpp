@@ -22,11 +22,11 @@ struct FilterCase {
 const std::vector<FilterCase>& filters() {
   static const std::vector<FilterCase> all = {
       {FilterKind::kBox, "box", [](double) { return 1.0; }},
-      // sigma = width / 6 is 1 / 3 of the half width; lowered so as to end at 0.
+      // sigma = width / 6 is 1 / 3 of the half width; shifted down to end at 0.
       {FilterKind::kGaussian, "gaussian",
        [](double x) { return std::exp(-x * x * 9 / 2) - std::exp(-9.0 / 2); }},
       {FilterKind::kBlackmanHarris, "Blackman-Harris", [](double x) {
-         // The 4-term window around its middle (F. Harris, 1978).
+         // The 4-term Blackman-Harris window around its middle (F. Harris, 1978).
          return 0.35875 + 0.48829 * std::cos(kPiD * x) + 0.14128 * std::cos(2 * kPiD * x) +
                 0.01168 * std::cos(3 * kPiD * x);
        }}};
@@ -110,7 +110,7 @@ TEST(Film, ManySamplesStayExact) {
   for (size_t c = 0; c < 3; ++c)
     EXPECT_EQ(beauty[3 + c], static_cast<float>(exact[c] / kSamples)) << c;
   EXPECT_EQ(beauty[4], 0.1f);
-  // Without samples: black, and no division by zero.
+  // A pixel without samples is black, without a division by zero.
   EXPECT_EQ(beauty[0], 0);
   EXPECT_EQ(film.samples(), (std::vector<uint32_t>{0, kSamples}));
   EXPECT_EQ(film.depth()[0], std::numeric_limits<float>::infinity());
@@ -124,7 +124,7 @@ TEST(Film, AovsAreMeans) {
   ASSERT_NE(aovs.sums(Aov::kAlbedo, pixel), nullptr);
   aovs.sums(Aov::kAlbedo, pixel)[1] = 2;
   aovs.sums(Aov::kNormal, pixel)[2] = -1;
-  for (const float depth : {2.f, 3.f, 4.f}) {  // one of four missed
+  for (const float depth : {2.f, 3.f, 4.f}) {  // one of four rays missed
     aovs.add(Aov::kDepth, pixel, &depth);
     aovs.count_hit(pixel);
   }
@@ -140,7 +140,7 @@ TEST(Film, FinishGivesTheSameMeans) {
   std::uniform_real_distribution<double> uniform(-3, 3);
   for (uint32_t y = 0; y < film.height(); ++y)
     for (uint32_t x = 0; x < film.width(); ++x) {
-      const uint32_t n = x + 5 * y;  // the first has no samples
+      const uint32_t n = x + 5 * y;  // the first pixel has no samples
       film.pixel(x, y) = {uniform(rng), uniform(rng), uniform(rng), n};
       const size_t pixel = film.index(x, y);
       for (const Aov aov : {Aov::kAlbedo, Aov::kNormal, Aov::kDepth})

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Gaussian splats: hits against a search along the ray, places, boxes, harmonics, bad arrays.
+/// Gaussian splats: hits against a search along the ray, positions, bounds, spherical harmonics,
+/// and invalid arrays.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +18,7 @@ using namespace curve_testing;
 
 using Double3 = std::array<double, 3>;
 
-/// Squared deviations of a point from the middle of splat i, by its rotation and scales.
+/// Squared deviation (Mahalanobis distance) of a point from the centre of splat i.
 double deviations(const SplatData& data, size_t i, const Double3& p) {
   const float* q = &data.orientations[4 * i];
   const double norm =
@@ -28,7 +29,7 @@ double deviations(const SplatData& data, size_t i, const Double3& p) {
   };
   double d[3], sum = 0;
   for (size_t k = 0; k < 3; ++k) d[k] = p[k] - data.positions[3 * i + k];
-  // The offset turned back by the conjugate: d - 2 w (v x d) + 2 v x (v x d), over |q|^2.
+  // Rotates the offset by the conjugate quaternion: d - 2 w (v x d) + 2 v x (v x d), over |q|^2.
   const Double3 once = cross(v, d), twice = cross(v, once.data());
   for (size_t k = 0; k < 3; ++k) {
     const double local = d[k] + 2 * (twice[k] - w * once[k]) / norm;
@@ -58,7 +59,7 @@ TEST(GaussianSplats, AreMetWhereTheirResponseIsGreatest) {
       return Double3{o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]};
     };
     for (uint32_t i = 0; i < mesh.splats.size(); ++i) {
-      // Squared deviations are a parabola in t: thirds close in on its least.
+      // Squared deviation is a parabola in t: ternary search finds its minimum.
       double lo = -20, hi = 20;
       for (int step = 0; step < 90; ++step) {
         const double a = lo + (hi - lo) / 3, b = hi - (hi - lo) / 3;
@@ -95,7 +96,7 @@ TEST(GaussianSplats, AreMetWhereTheirResponseIsGreatest) {
 }
 
 TEST(GaussianSplats, HarmonicsAreOrthonormal) {
-  // Exact for polynomials of degree 6 and less: the middle rule about the axis, Gauss along it.
+  // Exact for polynomials up to degree 6: midpoint rule in azimuth, Gauss rule along the axis.
   constexpr double kNode[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
                                0.9602898564975363};
   constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Value graphs at materials: what they drive, lanes of one program and of several, emission.
-/// Operations themselves are tested against NumPy in tests/python/test_graph_code.py.
+/// Value graphs of materials: parameters that they drive, lanes with equal and different graphs,
+/// and emission. tests/python/test_graph_code.py tests the operations against NumPy.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -91,7 +91,7 @@ class GraphTest : public ::testing::Test {
   MaterialView view_;
 };
 
-/// All parameters of the material at uv, as lanes of floats.
+/// Evaluates all parameters of the material at uv.
 template <typename F>
 std::vector<F> parameters(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                           const F& width, const Mask<F>& active) {
@@ -128,7 +128,7 @@ TEST_F(GraphTest, DrivesWhatItSays) {
     EXPECT_EQ(got[output(same)], plain[output(same)]) << same;
 
   const auto other = parameters<float>(view_, 2u, {u, v}, 0.f, true);
-  EXPECT_EQ(other[output("opacity")], 1.f);  // it is presence
+  EXPECT_EQ(other[output("opacity")], 1.f);  // opacity means presence
   EXPECT_EQ(other[output("emission")], v);
   EXPECT_EQ(other[other.size() - 2], v);  // fetch_emission
   EXPECT_EQ(other.back(), v);             // fetch_opacity

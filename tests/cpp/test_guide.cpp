@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The field that guides bounces: its map of directions, tables, cells, and how it is looked up.
+/// The guiding field: equal-area map, tables, cells, and lookup.
 #include "wavecomb/learn/guide.h"
 
 #include "bsdf_testing.h"
@@ -22,14 +22,14 @@ using chi_square::Random;
 
 const GuideGrid kUnitGrid({0.f, 0.f, 0.f}, {1.f, 1.f, 1.f});
 
-/// A bounce at (x, y, z) of a surface that faces `axis`, along w.
+/// Makes a training bounce at (x, y, z) on a surface that faces `axis`, along w.
 TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>& w,
                       float value = 1) {
   return {{x, y, z}, {w.x, w.y, w.z}, 0.f, 0, axis, value, 1.f, 1.f, 0.f, 1.f};
 }
 
-/// Bounces all over the unit cube: those that face axis k go near the direction of axis k, more so
-/// on the right half.
+/// Makes bounces all over the unit cube. On surfaces that face axis k they point roughly along axis
+/// k, more closely in the right half.
 std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
   Random random(seed);
   std::vector<TrainingRecord> records;
@@ -63,14 +63,14 @@ TEST(Guide, OctahedralMapKeepsAreas) {
     ASSERT_NEAR(back.x, u, 2e-3) << v;
     ASSERT_NEAR(back.y, v, 2e-3) << u;
   }
-  // Corners, where the map folds.
+  // Corners, where the octahedral map folds.
   for (const float u : {0.f, 0.5f, kOneMinusEpsilon})
     for (const float v : {0.f, 0.5f, kOneMinusEpsilon})
       EXPECT_NEAR(length(octahedral_direction(u, v)), 1, 1e-5);
 }
 
-/// From the middle and back, and the factor as the map's own Jacobian, by chi-square: even over
-/// directions from the middle has the factor as its density from the place.
+/// The map from the centre and back are inverse. Chi-square test of the factor as Jacobian: uniform
+/// directions from the centre have the factor as their density from the shading point.
 TEST(Guide, SphereMovesDirections) {
   Random random(12);
   chi_square::Battery battery("sphere");
@@ -84,7 +84,7 @@ TEST(Guide, SphereMovesDirections) {
       const Vec3<float> w = octahedral_direction<float>(random(), random());
       const FromMiddle<float> seen = seen_from_middle<float>(offset, w);
       ASSERT_NEAR(length(seen.w), 1, 1e-5);
-      // Along w from the place, on the sphere.
+      // The point on the sphere lies along w from the shading point.
       ASSERT_NEAR(length(cross(seen.w - offset, w)), 0, 1e-5);
       ASSERT_GT(dot(seen.w - offset, w), 0);
       ASSERT_NEAR(length(seen_from_place<float>(offset, seen.w) - w), 0, 1e-5);
@@ -104,15 +104,15 @@ TEST(Guide, SphereMovesDirections) {
     battery.run(c);
   }
   battery.judge();
-  // What is no number, or too far away to be one.
+  // NaN, infinity, and coordinates that overflow.
   for (const float x : {kNan, kInf, 3e38f}) {
     const Vec3<float> o = sphere_offset<float>({x, 0.f, 0.f}, {0.f, 0.f, 0.f}, 3e38f);
     EXPECT_TRUE(length(o) < 0.71f || std::isnan(x)) << x;
   }
 }
 
-/// A lamp of a hand's width, a few metres from a wall of which a region knows two metres: places
-/// see it in directions that are 50 degrees apart.
+/// A lamp 20 cm wide, a few metres from a wall, and a region of two metres of that wall: directions
+/// to the lamp differ by 50 degrees.
 TEST(Guide, SpheresKnowHowFarLightIs) {
   Random random(13);
   const Vec3<float> lamp{0.5f, 0.5f, 0.5f};
@@ -121,7 +121,7 @@ TEST(Guide, SpheresKnowHowFarLightIs) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3<float> p = place(), d = lamp - p;
     records.push_back(bounce(p.x, p.y, p.z, 2, normalize(d)));
-    // Half as near: it shines through a hole at the lamp's place on what is behind.
+    // Half the distance: the light comes through a hole at the lamp's position.
     records.back().nearness = 0.5f / length(d);
   }
   const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
@@ -146,7 +146,7 @@ TEST(Guide, SpheresKnowHowFarLightIs) {
   EXPECT_GT(known, taken_for_far + std::log(2.0));
 }
 
-/// Blurred bins have the same sum, no holes beside what was seen, and nothing far from it.
+/// Blurred bins keep their sum, fill holes near observed directions, and add nothing far away.
 TEST(Guide, DirectionsAreBlurred) {
   Random random(14);
   for (int round = 0; round < 50; ++round) {
@@ -210,7 +210,7 @@ TEST(Guide, SamplesFollowTheirDensity) {
     for (uint32_t axis = 0; axis < kGuideAxes; ++axis) {
       const auto place = find_guide<float>(view, {x, 0.3f, 0.6f}, axis, 0, true);
       ASSERT_TRUE(place.guided);
-      // Over the square of the map, where the density is constant in each bin.
+      // Over the equal-area square, where the density is constant per bin.
       chi_square::Case c{"axis " + std::to_string(axis),
                          {{0, 1, 0, 1, kGuideSide, kGuideSide}},
                          [=](const Place& p) {
@@ -230,7 +230,7 @@ TEST(Guide, SamplesFollowTheirDensity) {
   battery.judge();
 }
 
-/// Where light comes from is found again: cells on the right know narrower lobes.
+/// The field reproduces the distribution of light: cells on the right have narrower lobes.
 TEST(Guide, CellsKnowTheirOwnLight) {
   const auto records = many_bounces(200000, 2);
   const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
@@ -249,14 +249,14 @@ TEST(Guide, CellsKnowTheirOwnLight) {
 
 TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   std::vector<TrainingRecord> records = many_bounces(20000, 3);
-  // A corner in which hardly anything was seen.
+  // A corner with hardly any training samples.
   std::erase_if(records, [](const TrainingRecord& r) {
     return r.p[0] < 0.25f && r.p[1] < 0.25f && r.p[2] < 0.25f;
   });
   const GuideField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
   const auto place = find_guide<float>(field.view(), {0.1f, 0.1f, 0.1f}, 0, 0, true);
   EXPECT_TRUE(place.guided);
-  // Outside of the bounds, and where nothing is a number.
+  // Positions outside of the bounds, and NaN.
   for (const float x : {-5.f, 9.f, kNan, kInf})
     find_guide<float>(field.view(), {x, x, x}, 3, 0, true);
   const GuideField empty(kUnitGrid, {}, 1, true, true, size_t{64} << 20);
@@ -264,7 +264,7 @@ TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   EXPECT_FALSE(find_guide<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
 }
 
-/// What a region's bounces are worth, counting those that bring nothing, by the formula.
+/// The survival factor of a region by its formula, including bounces without contribution.
 TEST(Guide, BouncesAreWeighed) {
   std::vector<TrainingRecord> records;
   for (int i = 0; i < 1000; ++i) records.push_back(bounce(0.5f, 0.5f, 0.5f, 2, {0.f, 1.f, 0.f}, 4));
@@ -272,7 +272,7 @@ TEST(Guide, BouncesAreWeighed) {
   const uint64_t at = bounce_place(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2);
   std::vector<BounceLesson> lessons(3000, {at, 0.f, 0.f, 2.f});
   lessons.insert(lessons.end(), 1000, {at, 4.f, 16.f, 6.f});
-  // Of surfaces that face another way nothing is known.
+  // No training samples of surfaces that face another axis.
   lessons.insert(lessons.end(), 10, {bounce_place(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
   field.weigh_bounces(lessons, {27, 0.5});
   // X = 16 / 4, c = 12 / 4.
@@ -292,7 +292,7 @@ TEST(Guide, MemoryIsBounded) {
   EXPECT_GT(small.facts().guided_regions, 5u);
 }
 
-/// The share whose second moment is least.
+/// The chosen fraction has the smallest second moment.
 TEST(Guide, SharesFollowMoments) {
   ShareMoments bad, good, none;
   Random random(8);
@@ -310,7 +310,7 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_EQ(kBsdfShares[bad.best()], 1.f);
   EXPECT_EQ(none.count, 0);
   EXPECT_EQ(kBsdfShares[none.best()], 1.f);
-  // Where the field is bad nothing is guided.
+  // Where the field does not help, nothing is guided.
   std::vector<TrainingRecord> records = many_bounces(50000, 9);
   for (TrainingRecord& r : records) r.guide_pdf = 1e-3f;
   const GuideField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
@@ -318,7 +318,7 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_EQ(field.facts().moment_ratio, 1);
   for (TrainingRecord& r : records) r.guide_pdf = 10.f;
   const GuideField better(kUnitGrid, records, 1, false, true, size_t{64} << 20);
-  // Unless that is not wanted: then the field only says what bounces bring.
+  // With `guides` false, the field only stores the survival factors.
   const GuideField told(kUnitGrid, records, 1, false, false, size_t{64} << 20);
   EXPECT_EQ(told.facts().guided_regions, 0u);
   EXPECT_EQ(told.facts().regions, better.facts().regions);
@@ -327,10 +327,11 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_NEAR(better.facts().guided_share, 0.75, 1e-6);
 }
 
-/// A field that is made of its parts again is the same; what would lead kernels astray is refused.
+/// A field that is restored from its parts is equal to the original. Parts that would mislead
+/// kernels are refused.
 TEST(Guide, IsMadeOfItsPartsAgain) {
   const auto records = many_bounces(80000, 11);
-  // So wide that what is known lies in few of its cells, which are divided.
+  // The grid is so large that all samples fall into few top-level entries, which are divided.
   const GuideGrid wide({0.f, 0.f, 0.f}, {20.f, 20.f, 20.f});
   const GuideField field(wide, records, 3, true, true, size_t{64} << 20);
   const GuideParts& parts = field.parts();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Diffuse bases under a rough interface, against integrals in double precision.
+/// Diffuse bases under a rough interface, compared with integrals in double precision.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ using Vec = Vec3<float>;
 constexpr double kCosines[] = {0.1, 0.2, 0.4, 0.7, 1.0};
 constexpr float kRoughnesses[] = {0.05f, 0.1f, 0.2f, 0.3f, 0.45f, 0.6f, 0.8f, 1.f};
 
-/// Exact reflectance of a dielectric of relative index eta, and the cosine beyond it.
+/// Exact reflectance of a dielectric of relative index eta, and the cosine of the refracted ray.
 struct Crossing {
   double reflectance, cos_t;
 };
@@ -34,8 +34,8 @@ Crossing exact(double c, double eta) {
   return {0.5 * (p * p + s * s), t};
 }
 
-/// What a GGX interface reflects and transmits in one bounce towards the cosine z: means of G2 / G1
-/// over visible normals, written for themselves.
+/// Albedos of reflection and transmission of a GGX interface for one bounce at cosine z: means of
+/// G2 / G1 over visible normals. Independent of the code under test.
 struct Albedo {
   double reflected, transmitted;
 };
@@ -78,7 +78,7 @@ void expect_base(Params p, const char* name, bool schlick, double f0, double bac
     const double e = albedo(z, alpha, static_cast<double>(p.ior), schlick, f0).reflected;
     for (const float base : {0.f, 0.2f, 1.f}) {
       p.base_color = Vec(base);
-      // The base has what the interface leaves of it, and its light comes back through it once.
+      // The base receives the transmitted light, which leaves through the interface once.
       const double expected = e + static_cast<double>(base) * (1 - e);
       const double found = furnace(Bsdf(p, schlick), direction(z, 0.4), 10000);
       EXPECT_GE(found, expected - 0.008)
@@ -96,7 +96,7 @@ TEST(RoughInterface, DiffuseBasesHaveWhatItLeaves) {
       p.roughness = r;
       p.ior = ior;
       expect_base<PlasticBsdf<float>>(p, "plastic", false, 0, 0);
-      // Principled gives back what bounces between facets: some of the reflectance squared.
+      // Principled compensates for multiple scattering, a fraction of the squared reflectance.
       expect_base<PrincipledBsdf<float>>(p, "principled", false, 0, 0.012);
     }
 }
@@ -111,7 +111,7 @@ TEST(RoughInterface, SchlicksTooWhereItIsAskedFor) {
 }
 
 TEST(RoughInterface, WhiteUnderAnySpecularColorIsWhite) {
-  // A white base under a grey mirror of 0.5: the fit of what facets lose is within 2 %, below.
+  // A white base under a grey mirror of 0.5: the fit of lost energy is at most 2 % too low.
   for (const float r : kRoughnesses) {
     Params p = plain_params();
     p.roughness = r;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Every operation of core/lanes.h at every width, against plain loops over plain numbers.
+/// Every operation of core/lanes.h at every width, compared with scalar loops.
 #include "lane_testing.h"
 
 #include <cstring>
@@ -27,7 +27,7 @@ TEST(Lanes, MinAndMaxTakeTheSecondWhereEitherIsNan) {
     const auto lo = map<F>(a, b, [](auto x, auto y) { return min(x, y); });
     const auto hi = map<F>(a, b, [](auto x, auto y) { return max(x, y); });
     for (size_t i = 0; i < a.size(); ++i) {
-      // Signed zeros compare equal, so the second is taken too.
+      // Signed zeros compare equal, so the second operand is returned.
       ASSERT_TRUE(same_bits(lo[i], a[i] < b[i] ? a[i] : b[i])) << a[i] << ", " << b[i];
       ASSERT_TRUE(same_bits(hi[i], a[i] > b[i] ? a[i] : b[i])) << a[i] << ", " << b[i];
     }
@@ -56,7 +56,7 @@ TEST(Lanes, PacketsAreNotDividedByNumbers) {
   static_assert(!Divides<FloatP<16>, int> && !Divides<FloatP<64>, float>);
   static_assert(Divides<FloatP<8>, FloatP<8>> && Divides<float, float>);
   static_assert(Divides<UInt<FloatP<8>>, uint32_t>);
-  // A packet of the number is what one lane computes; a product with its reciprocal is not.
+  // A packet division equals scalar division; multiplication by the reciprocal does not.
   const auto x = padded({}, 5000, 0.f, 1.f, 4);
   int reciprocal_differs = 0;
   for (const float number : {3.f, 7.f, 49.f, 90.f, 0.7f}) {
@@ -176,7 +176,7 @@ TEST(Lanes, Masks) {
       const uint32_t other = (bits * 0x9e3779b9u >> 9) & kAll;
       ASSERT_EQ(lane_bits<F>(Mask<F>(m & make_mask<F>(other))), bits & other);
       ASSERT_EQ(lane_bits<F>(Mask<F>(m | make_mask<F>(other))), bits | other);
-      // The same lanes as a mask of integers.
+      // The same lanes as an integer mask.
       ASSERT_EQ(lane_bits<UInt<F>>(Mask<UInt<F>>(m)), bits);
     }
     for (size_t n = 0; n <= kWidth<F> + 3; ++n) {
@@ -203,7 +203,7 @@ TEST(Lanes, SelectLoadStoreLane) {
         ASSERT_EQ(first_active(x, make_mask<F>(bits)), a[std::countr_zero(bits)]);
       }
     }
-    // Any alignment of bytes.
+    // Byte arrays of any alignment.
     alignas(64) char bytes[80];
     for (size_t offset = 0; offset < 8; ++offset) {
       store(bytes + offset, load<F>(a));
@@ -225,7 +225,7 @@ TEST(Lanes, GatherReadsActiveLanesOnly) {
       uint32_t index[16], wild[16];
       for (size_t k = 0; k < 16; ++k) {
         index[k] = static_cast<uint32_t>(rng()) % 1000u;
-        wild[k] = (bits >> k & 1u) ? index[k] : 0x7fffff00u;  // inactive lanes point nowhere
+        wild[k] = (bits >> k & 1u) ? index[k] : 0x7fffff00u;  // inactive lanes have invalid indices
       }
       const U i = load<U>(wild);
       const Mask<F> m = make_mask<F>(bits);
@@ -315,7 +315,7 @@ TEST(Lanes, CompressStoreKeepsOrderAndCounts) {
         ASSERT_EQ(out[k], expected[k]);
         ASSERT_EQ(out_words[k], expected_words[k]);
       }
-      for (size_t k = kWidth<F>; k < out.size(); ++k) {  // nothing past one packet
+      for (size_t k = kWidth<F>; k < out.size(); ++k) {  // nothing is written past one packet
         ASSERT_EQ(out[k], -7.f);
         ASSERT_EQ(out_words[k], 77u);
       }
@@ -335,7 +335,7 @@ TEST(Lanes, Lookup16ReadsATable) {
         ASSERT_EQ(lane(value, k), table[index[k]]) << kWidth<F> << " lanes, lane " << k;
     };
     uint32_t index[16];
-    for (uint32_t shift = 0; shift < 16; ++shift) {  // every entry in every lane
+    for (uint32_t shift = 0; shift < 16; ++shift) {  // each entry in each lane
       for (uint32_t k = 0; k < 16; ++k) index[k] = (k + shift) % 16;
       expect(index);
     }
@@ -351,7 +351,7 @@ TEST(Lanes, Lookup256ReadsATable) {
   alignas(64) float table[256];
   for (float& x : table) x = static_cast<float>(rng());
   for_each_lane_type([&]<typename F>() {
-    for (uint32_t shift = 0; shift < 256; ++shift) {  // every entry in every lane
+    for (uint32_t shift = 0; shift < 256; ++shift) {  // each entry in each lane
       uint32_t index[16];
       for (uint32_t k = 0; k < 16; ++k) index[k] = (k * 37 + shift) % 256;
       const F value = lookup256<F>(table, load<UInt<F>>(index));

@@ -24,7 +24,8 @@ Camera distorting(float k1, float p1 = 0) {
   return camera;
 }
 
-/// Where the model shows the point (x, y) of the plane at distance 1, y down.
+/// Image position of the point (x, y) of the plane at distance 1 in the distortion model; y points
+/// down.
 std::array<double, 2> shown(const Camera& c, double x, double y) {
   const double r2 = x * x + y * y;
   const double radial = 1 + r2 * (double{c.lens_k1} + r2 * double{c.lens_k2});
@@ -64,7 +65,7 @@ TEST(Lens, WhatFoldsOverIsRefused) {
 TEST(Lens, AMapMovesPixels) {
   const FilterTable filter(FilterKind::kBox, 1);
   Camera camera;
-  // 2 x 2 nodes: the picture is shrunk to its middle half.
+  // 2 x 2 nodes: the image shrinks to its middle half.
   camera.lens_map = {{0.25f, 0.25f, 0.75f, 0.25f}, {0.25f, 0.75f, 0.75f, 0.75f}};
   const CameraSetup setup(camera, 100, 100, filter);
   Camera plain;
@@ -88,7 +89,7 @@ TEST(Lens, OverscanIsTheSamePictureWithAnEdge) {
   EXPECT_THROW(CameraSetup(around, 220, 120, filter, 10), Error);
 }
 
-/// Points of a polygon are even over it: in each of its blades, and by distance in it.
+/// Points of a polygon are uniform: over its blades, and by distance within a blade.
 TEST(Lens, PointsOfAPolygonAreEven) {
   constexpr uint32_t kBlades = 5, kRings = 8, kSide = 200;
   std::vector<double> found(kBlades * kRings), expected(kBlades * kRings);
@@ -101,7 +102,7 @@ TEST(Lens, PointsOfAPolygonAreEven) {
       double angle = std::atan2(double{p.y}, double{p.x}) - 2 * M_PI * turn;
       angle -= 2 * M_PI * std::floor(angle / (2 * M_PI));
       const auto blade = std::min<size_t>(static_cast<size_t>(angle / (2 * half)), kBlades - 1);
-      // Its distance from the middle, across the blade; area grows with the square.
+      // Distance from the centre towards the blade's edge; the area grows with its square.
       const double middle = angle - static_cast<double>(2 * blade + 1) * half;
       const double across = std::hypot(double{p.x}, double{p.y}) * std::cos(middle);
       const double share = across * across / (std::cos(half) * std::cos(half));

@@ -11,14 +11,14 @@
 namespace wavecomb {
 namespace {
 
-/// Choices of a light, each with a = g / q and r = b / q.
+/// Samples of a light at its vertices, each with a = g / q and r = b / q.
 struct Samples {
   double share;
   std::vector<std::pair<double, double>> found;
 };
 
-/// Of vertices that are all alike, at which each part is chosen as often as its share says. All
-/// parts have as many samples.
+/// Returns the shares for identical vertices, where each part is chosen in proportion to its share
+/// and has the same number of samples.
 std::vector<double> balanced(const std::vector<Samples>& parts, const std::vector<double>& power) {
   std::vector<double> shares;
   for (const Samples& part : parts) shares.push_back(part.share);
@@ -31,7 +31,7 @@ std::vector<double> balanced(const std::vector<Samples>& parts, const std::vecto
   return balance.shares(power);
 }
 
-/// Shares as they were before the floor.
+/// Returns the shares without the minimum that every part gets.
 std::vector<double> without_floor(std::vector<double> shares, const std::vector<double>& power) {
   const auto n = static_cast<double>(shares.size());
   for (size_t i = 0; i < shares.size(); ++i)
@@ -42,7 +42,7 @@ std::vector<double> without_floor(std::vector<double> shares, const std::vector<
 
 TEST(LightBalance, IsTheSquareRootOfTheSecondMoment) {
   const std::vector<double> power{0.9, 0.05, 0.05};
-  // The third brings light to one vertex in four.
+  // The third part contributes at one vertex in four.
   const auto shares = without_floor(balanced({{0.5, {{4, 0}, {4, 0}, {4, 0}, {4, 0}}},
                                               {0.2, {{1, 0}, {1, 0}, {1, 0}, {1, 0}}},
                                               {0.3, {{2, 0}, {0, 0}, {0, 0}, {0, 0}}}},
@@ -56,14 +56,15 @@ TEST(LightBalance, IsTheSquareRootOfTheSecondMoment) {
 TEST(LightBalance, WhatBouncesFindHasTheFloor) {
   const std::vector<double> power{0.8, 0.2};
   const double floor = LightBalance::kFloor * (0.25 + 0.4);
-  // Even domes, dimmer and brighter than the lamp: g = radiance * b, half of it below the horizon.
+  // Uniform domes, dimmer and brighter than the lamp: g = radiance * b, half of the dome is below
+  // the horizon.
   for (const double radiance : {0.05, 0.5, 2.0}) {
     const auto shares =
         balanced({{0.6, {{radiance * 2, 2}, {0, 0}}}, {0.4, {{0.5, 0.01}, {0.5, 0.01}}}}, power);
     EXPECT_NEAR(shares[0], floor, 0.005) << radiance;
     EXPECT_NEAR(shares[0] + shares[1], 1, 1e-12);
   }
-  // One with a sun, which bounces do not find, has a share of its own.
+  // A dome with a sun, which bounces do not find, gets a larger share.
   EXPECT_GT(balanced({{0.6, {{0.4, 2}, {30, 0.001}}}, {0.4, {{0.5, 0.01}, {0.5, 0.01}}}}, power)[0],
             0.5);
 }
@@ -157,7 +158,7 @@ TEST(NodeBalance, FollowsWhatIsBelow) {
   for (int i = 0; i < 20; ++i) few.add(true, 0.5, 1, 1);
   for (int i = 0; i < 2000; ++i) {
     even.add(i % 2 == 0, 0.5, 1, 1);
-    if (i % 2 == 0) blocked.add(true, 0.5, 1, 1);  // and the left brings nothing
+    if (i % 2 == 0) blocked.add(true, 0.5, 1, 1);  // and light from the left is blocked
     stronger.add(i % 2 == 0, 0.5, i % 2 == 0 ? 4 : 1, 1);
     broken.add(true, 0.5, std::numeric_limits<double>::quiet_NaN(), 1);
   }

@@ -43,7 +43,7 @@ TEST(LightBuilder, FlatLightsShineToTheImageOfMinusZ) {
     expect_vec(only(Lights({make_light(kind, scale(-1, 1, 1))})).n, 0, 0, -1);
     expect_vec(only(Lights({make_light(kind, scale(1, 1, -1))})).n, 0, 0, 1);
     expect_vec(only(Lights({make_light(kind, rotate(90, 0))})).n, 0, 1, 0);
-    // A shear keeps the plane.
+    // A shear parallel to the plane does not change it.
     const Affine shear{{{1, 0, 5}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
     expect_vec(only(Lights({make_light(kind, shear)})).n, 0, 0, -1);
   }
@@ -71,7 +71,7 @@ TEST(LightBuilder, NormalizedLightsKeepTheirPower) {
       EXPECT_NEAR(static_cast<double>(only(lights).radiance[0]) * only(lights).area, 2, 1e-4);
     }
   }
-  // Small normalized spheres tend to the point light: intensity pi r^2 L.
+  // Small normalised spheres approach the point light: intensity pi r^2 L.
   Light light = make_light(LightKind::kSphere);
   light.normalize = true;
   light.radius = 1e-3f;
@@ -147,13 +147,13 @@ TEST(LightBuilder, ProbabilitiesFollowPower) {
   bright.width = 3;
   const Lights lights({black, dim, bright, make_light(LightKind::kRect)});
   EXPECT_EQ(lights.set.records[0].pick_pdf, 0);
-  EXPECT_GT(lights.set.records[1].pick_pdf, 1e-3f);  // the floor
+  EXPECT_GT(lights.set.records[1].pick_pdf, 1e-3f);  // minimum probability
   EXPECT_NEAR(lights.set.records[2].pick_pdf, 0.75, 0.01);
   EXPECT_NEAR(lights.set.records[3].pick_pdf, 0.25, 0.01);
 }
 
 TEST(LightBuilder, PickPdfIsExact) {
-  // Every number that u_pick can be, counted; with no other lights, a weak one, a strong one.
+  // Counts every possible value of u_pick, with no other light, a weak one and a strong one.
   for (const auto& [n, records, color] : {std::tuple{1u, 0u, 1.f},
                                           {2u, 0u, 1.f},
                                           {3u, 1u, 1e-9f},
@@ -217,18 +217,19 @@ TEST(LightBuilder, PickTableOfMillions) {
 }
 
 TEST(LightBuilder, FewStrongLightsHaveASmallTable) {
-  // A dome next to a million triangles: what chooses it stays in the cache.
+  // A dome next to a million triangles: the selection table stays small.
   std::vector<double> weights(1000001, 1);
   weights[0] = 1e6;
   std::vector<uint32_t> bins, numbers;
   const PickTable table = build_pick_table(weights, 1, bins, numbers);
-  // Half of the power, of which 1 % goes by heads; up to a unit of bins.
+  // Half of the power; 1 % of it is distributed equally among lights. Tolerance: one unit of the
+  // bins.
   EXPECT_NEAR(numbers[0], 0.99 * 0x1p24 / 2, 1 << 14);
   EXPECT_EQ(table.split, numbers[0]);
   EXPECT_LE(table.triangle_bins, 1024u);
 }
 
-/// Mean of max(bilinear, 0) style radiance over a cell, to be compared with the density.
+/// The density is positive wherever the bilinear image is.
 TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
   std::mt19937 rng(3);
   const uint32_t sizes[][2] = {{1, 1},   {2, 1},      {8, 4},      {17, 9},
@@ -257,7 +258,7 @@ TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
       Light light = make_light(LightKind::kDome);
       light.texture = texture;
       lights.build({light});
-      // Points near lit texels.
+      // Points near bright texels.
       for (uint32_t y = 0; y < h; ++y)
         for (uint32_t x = 0; x < w; ++x) {
           const float* texel = &rgb[3 * (size_t{y} * w + x)];
@@ -288,14 +289,14 @@ const uint16_t* values_of(const Distribution2D& d, uint32_t row) {
   return d.cumulative[size_t{row} * d.row_lines].value;
 }
 
-/// Expects that find_interval finds what a search of the whole row finds, for the given counts.
+/// Expects find_interval to agree with a search of the whole row.
 template <typename F>
 void expect_intervals(const Distribution2D& d, uint32_t row, uint32_t n,
                       const std::vector<uint32_t>& counts) {
   using U = UInt<F>;
   const uint16_t* from = values_of(d, row);
   for (size_t i = 0; i < counts.size(); i += kWidth<F>) {
-    // One lane in five is off.
+    // One lane in five is inactive.
     const Mask<F> active(not_(Mask<F>((lane_index<F>() + static_cast<uint32_t>(i)) % 5u == U(4u))));
     const auto found = detail::find_interval<F>(d, U(row), n, load<U>(&counts[i]), active);
     for (uint32_t k = 0; k < kWidth<F>; ++k) {
@@ -311,8 +312,8 @@ void expect_intervals(const Distribution2D& d, uint32_t row, uint32_t n,
   }
 }
 
-/// Counts at and beside all cumulative values (or some hundreds of them), and random ones; a
-/// multiple of 16.
+/// Counts at and next to cumulative values (all, or a few hundred of them), and random counts;
+/// padded to a multiple of 16.
 std::vector<uint32_t> hard_counts(const uint16_t* cumulative, uint32_t n, std::mt19937& rng) {
   std::vector<uint32_t> x;
   const auto add = [&](uint32_t count) {
@@ -326,7 +327,7 @@ std::vector<uint32_t> hard_counts(const uint16_t* cumulative, uint32_t n, std::m
 }
 
 TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
-  // Images with flat parts, black rows, one lit texel, steep ramps, and noise.
+  // Images with constant areas, black rows, a single bright texel, steep ramps, and noise.
   using Image = float (*)(uint32_t x, uint32_t y, uint32_t w, uint32_t h, uint32_t noise);
   const Image images[] = {
       [](uint32_t, uint32_t, uint32_t, uint32_t, uint32_t) { return 1.f; },
@@ -363,7 +364,7 @@ TEST(DomeDistribution, SearchByLinesEqualsSearchOfTheWholeRow) {
       ASSERT_GT(d.width, 0u);
       ASSERT_EQ(d.coarse.size(), d.height + 1);
       SCOPED_TRACE(testing::Message() << w << " x " << h << ", image " << image);
-      // All rows, or some twenty of many; the marginal comes behind them.
+      // All rows, or about twenty of many; the marginal distribution follows them.
       for (uint32_t y = 0; y <= d.height;
            y += y == d.height ? 1 : std::min(d.height - y, 1 + d.height / 20)) {
         const uint32_t n = y == d.height ? d.height : d.width;

@@ -27,8 +27,8 @@ Light named(LightKind kind, const Vec3<float>& color, const Affine& to_world, co
   return light;
 }
 
-/// A floor under a key and a fill lamp and an even dome, a lamp below the floor, a glowing box.
-/// `dome` and `key`: radiance.
+/// Makes a floor with a key and a fill light and a uniform dome, a light below the floor, and an
+/// emissive box. `dome` and `key` are radiances.
 SceneBuilder stage(float dome = 0.12f, float key = 13, float hidden = 300) {
   SceneBuilder b;
   const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f}));
@@ -85,7 +85,8 @@ TEST(LightCalibration, GivesSharesToWhatLights) {
   EXPECT_GT(share_of(shares, "Key"), 0.6);
   EXPECT_LT(share_of(shares, "Dome"), 0.1);
   EXPECT_GT(share_of(shares, "Fill"), share_of(shares, "Glow"));
-  // The lamp below the floor gives off most power and lights nothing: it has the floor.
+  // The light below the floor has the most power but illuminates nothing visible: it gets the
+  // minimum share.
   double by_power = 0;
   for (const LightShare& part : shares.parts)
     if (part.name == "Below") by_power = part.by_power;
@@ -144,7 +145,7 @@ TEST(LightCalibration, IsKeptUntilItIsAnother) {
   expect_same(first, again, "again");
   s.width = 40;
   EXPECT_FALSE(shares_of(renderer, s).kept);
-  // An edit is calibrated as the scene built with it is.
+  // An edited scene calibrates like a scene built with the edit.
   Light key = renderer.scene()->lights()[1];
   ASSERT_EQ(key.name, "Key");
   key.color = {2, 2, 2};

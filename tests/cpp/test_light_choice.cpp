@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights are chosen as often as stated: by power, with the shares of a calibration, by tree, and
-/// by tree with shares and tilted nodes.
+/// Lights are selected with the stated probabilities: by power, by calibrated shares, by the light
+/// tree, and by the tree with shares and calibrated nodes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,8 @@ float stated(const LightView& view, uint32_t light, const LightReceiver<float>& 
                                      : view.triangles[light - view.first_triangle].pick_pdf;
 }
 
-/// Counts choices for `to`; the last cell is none. Lights that cannot be chosen are not.
+/// Counts selections for receiver `to`. The last cell counts no selection; lights that cannot be
+/// selected have no cell.
 void count(Battery& battery, const std::string& name, const LightView& view,
            LightReceiver<float> to, uint32_t seed) {
   const size_t samples = chi_square::usual_samples();
@@ -50,7 +51,7 @@ void count(Battery& battery, const std::string& name, const LightView& view,
   battery.add(name, chi_square::p_of_counts(observed, expected));
 }
 
-/// Each record a part of its own, and the triangles together, or the tree, one more.
+/// Makes each record a separate part, and the triangles, or the whole tree, another one.
 LightParts parts_of(const LightSet& set, bool by_tree) {
   LightParts parts;
   parts.by_tree = by_tree;
@@ -67,7 +68,7 @@ LightParts parts_of(const LightSet& set, bool by_tree) {
   if (!by_tree) parts.of_mesh = {{set.first_triangle(), static_cast<uint32_t>(parts.size() - 1)}};
   return parts;
 }
-/// Shares that have nothing to do with power.
+/// Shares that are unrelated to power.
 std::vector<double> odd_shares(size_t n) {
   std::vector<double> shares(n);
   Numbers number(31);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cylinders, shaping and profiles: against sums over surfaces and values worked out by hand.
+/// Cylinders, shaping and IES profiles: compared with surface integrals and values computed by
+/// hand.
 #include <numbers>
 
 #include "lane_testing.h"
@@ -10,7 +11,7 @@ namespace {
 
 using namespace light_testing;
 
-/// Irradiance on a surface at `from` with normal n, by an n x n grid of midpoints.
+/// Irradiance on a surface at `from` with normal n, by n x n midpoints.
 double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<float>& n,
                   int grid = 600) {
   const LightView view = lights.view();
@@ -26,7 +27,7 @@ double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<floa
   return sum / grid / grid;
 }
 
-/// The same of a cylinder of radiance 3 along x about the origin: summed up over its surface.
+/// Irradiance from a cylinder of radiance 3 along x at the origin, summed over its surface.
 double cylinder_irradiance(double length, double radius, const Vec3<float>& from,
                            const Vec3<float>& n) {
   constexpr int kN = 1000;
@@ -68,8 +69,9 @@ TEST(Cylinder, IrradianceIsTheSumOverItsSurface) {
 }
 
 TEST(Cylinder, PlacesAlongALineOfItAreNotRounded) {
-  // Seen 0.01 above a line of the surface, from two lengths away, all sines of the slope are 1 but
-  // for some 1e-6, 30 steps of a float: places lay 0.05 apart and up to 0.03 beside the light.
+  // Seen from 0.01 above a line of the surface, two lengths away, all sines of the inclination
+  // differ from 1 by only about 1e-6, 30 float steps. A naive formula places samples
+  // 0.05 apart and up to 0.03 beside the light.
   Light light = make_light(LightKind::kCylinder);
   light.length = 2;
   const Lights lights({light});
@@ -99,7 +101,7 @@ TEST(Cylinder, NothingLeavesItsInside) {
   const Lights lights({make_light(LightKind::kCylinder)});
   const LightView view = lights.view();
   EXPECT_FALSE(sample_light<float>(view, Vec3<float>(0.1f, 0, 0.2f), 0.5f, 0.5f, 0.5f, true).valid);
-  // In at an open end, to the wall behind the axis.
+  // Through an open end, to the inner wall behind the axis.
   const Vec3<float> from{-2, 0, 0.1f}, dir{0.98058068f, 0, 0.19611614f};
   const auto t = trace(view, from, dir);
   ASSERT_TRUE(t);
@@ -119,8 +121,8 @@ TEST(Cylinder, NormalizeKeepsItsPower) {
   }
 }
 
-/// What a point at the origin shaped like this sends along `dir`, of a radiant intensity of 3 in
-/// green (2 in red).
+/// Radiant intensity of a shaped point light at the origin along `dir`, for an unshaped intensity
+/// of 3 in green and 2 in red.
 Color<float> sent(const Shaping& shaping, Vec3<float> dir, const Affine& turned = {},
                   std::vector<IesProfile> profiles = {}) {
   Light light = make_light(LightKind::kSphere, turned);
@@ -136,7 +138,7 @@ Color<float> sent(const Shaping& shaping, Vec3<float> dir, const Affine& turned 
 
 Vec3<float> off_axis(double degrees, double around = 0) {
   const double t = degrees * kPiD / 180, p = around * kPiD / 180;
-  // phi is that of the direction towards the light: see docs/lights.md.
+  // phi belongs to the direction towards the light, see docs/lights.md.
   return {static_cast<float>(-std::sin(t) * std::cos(p)),
           static_cast<float>(-std::sin(t) * std::sin(p)), static_cast<float>(-std::cos(t))};
 }
@@ -164,12 +166,12 @@ TEST(Shaping, ConeIsHardOrSmooth) {
   }
   EXPECT_NEAR(sent(all_soft, off_axis(45)).y, 1.5, 1e-4);
   EXPECT_FLOAT_EQ(sent({0, {}, 180, 0.3f}, off_axis(179)).y, 3);  // 180: no cone
-  // The axis is where -z goes, and lengths do not matter.
+  // The axis is the transformed -z, and scale does not matter.
   EXPECT_FLOAT_EQ(sent(hard, {1, 0, 0}, rotate(0, -90) * scale(3, 2, 5)).y, 3);
   EXPECT_EQ(sent(hard, {-1, 0, 0}, rotate(0, -90) * scale(3, 2, 5)).y, 0);
 }
 
-/// Two planes of 3 angles: 8 candela at the axis, falling.
+/// Two planes of 3 angles: 8 candela on the axis, decreasing outwards.
 IesProfile lamp() {
   return {{0, 30, 90}, {0, 90, 360}, {8, 6, 0, 8, 2, 1, 8, 6, 0}};
 }
@@ -184,7 +186,7 @@ TEST(Ies, BilinearBetweenItsAngles) {
   EXPECT_NEAR(candela(15, 90, shaping), 5, 5e-4);
   EXPECT_NEAR(candela(15, 45, shaping), 6, 6e-4);
   EXPECT_NEAR(candela(60, 90, shaping), 1.5, 1e-3);
-  EXPECT_NEAR(candela(60, 225, shaping), 2.25, 2e-3);  // half way from 90 to 360 degrees
+  EXPECT_NEAR(candela(60, 225, shaping), 2.25, 2e-3);  // half-way from 90 to 360 degrees
   EXPECT_EQ(candela(91, 0, shaping), 0);               // outside
   Shaping wide = shaping;
   wide.ies_angle_scale = 2;  // theta / 2
@@ -197,8 +199,8 @@ TEST(Ies, BilinearBetweenItsAngles) {
 }
 
 TEST(Ies, ScaledBeyondItsEnds) {
-  // As OpenUSD's delegate has it: beyond 180 degrees a profile goes on with its value there, below
-  // 0 it is dark.
+  // As in OpenUSD's reference implementation: beyond 180 degrees a profile keeps its last value,
+  // below 0 it is dark.
   const auto candela = [&](double theta, float angle_scale, const IesProfile& profile) {
     Shaping shaping{0, {}, 180, 0, 0};
     shaping.ies_angle_scale = angle_scale;
@@ -214,7 +216,7 @@ TEST(Ies, ScaledBeyondItsEnds) {
   EXPECT_NEAR(candela(135, -0.5f, all_around), 2, 1e-3);  // 2 theta - 180
   for (const double theta : {1.0, 45.0, 89.0})
     EXPECT_EQ(candela(theta, -0.5f, all_around), 0) << theta;
-  // What a profile does not reach stays dark.
+  // Directions outside of the profile's range stay dark.
   const IesProfile downwards{{0, 90}, {0}, {1, 2}};
   EXPECT_NEAR(candela(22.5, 0.5f, downwards), 1.5, 1e-3);
   for (const double theta : {46.0, 91.0, 120.0, 179.0})
@@ -222,8 +224,8 @@ TEST(Ies, ScaledBeyondItsEnds) {
 }
 
 TEST(Ies, MeanIsExactAndNormalizes) {
-  // The mean of cos(theta)'s own shape in degrees: a profile linear in theta, from 1 to 0, has
-  // 1/2 integral sin (1 - theta / pi) = 1 / 2.
+  // Spherical mean of a profile that is linear in theta from 1 to 0: 1/2 integral sin (1 - theta /
+  // pi) = 1 / 2.
   EXPECT_NEAR((IesProfile{{0, 180}, {0}, {1, 0}}).mean(), 0.5, 1e-12);
   // From 1 to 0 over a hemisphere: integral sin (1 - 2 theta / pi) = 1 - 2 / pi.
   EXPECT_NEAR((IesProfile{{0, 90}, {0}, {1, 0}}).mean(), 1 - 2 / kPiD, 1e-12);
@@ -232,7 +234,7 @@ TEST(Ies, MeanIsExactAndNormalizes) {
   shaping.ies_normalize = true;
   EXPECT_NEAR(sent(shaping, off_axis(0), {}, {lamp()}).y, 3 * 8 / lamp().mean(), 1e-3);
 
-  // The light's power is that of the unshaped one, up to the factor of a half sphere.
+  // With normalize, power equals that of the unshaped light, up to the factor of a half sphere.
   Light light = make_light(LightKind::kSphere);
   light.radius = 0;
   light.shaping = shaping;
@@ -270,7 +272,7 @@ TEST(Shaping, BothTechniquesSeeTheSame) {
           sample_light<float>(view, Vec3<float>(0, 0, 0), number(), number(), number(), true);
       if (!s.valid) continue;
       const auto t = trace(view, {0, 0, 0}, s.wi);
-      if (!t) continue;  // rounded over an edge
+      if (!t) continue;  // rounding moved the ray past an edge
       const auto hit = light_hit<float>(view, 0u, Vec3<float>(0, 0, 0), s.wi, *t, true);
       if (hit.pdf == 0) continue;
       EXPECT_NEAR(hit.radiance.x, s.weight.x * s.pdf, 2e-3 * hit.radiance.x + 1e-4);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Samples of every kind of light follow the density that the other half of MIS is told, seen from
-/// several points; so do those of many lights, whose choice and place are tested together.
+/// Samples of every kind of light follow the density that MIS uses for hits, seen from several
+/// points. For sets of lights, selection and position are tested together.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 using namespace light_testing;
 using chi_square::Battery;
 
-/// Points from which lights are seen. Most shine along -z and are about the origin.
+/// Points from which lights are seen. Most lights emit along -z and are at the origin.
 struct From {
   const char* name;
   Vec3<float> p;
@@ -46,9 +46,9 @@ TEST(LightSamples, OfRectsAndDisksFollowTheirDensity) {
 }
 
 TEST(LightSamples, RectsSeenVeryFlatKeepTheirFarEdge) {
-  // Where a rect is 60 to 100 times as far as the point is above its plane, the cosine that places
-  // a sample along its width is within 1e-4 of 1: computed by it, places rounded to 3e-4 of the
-  // width, and 0.13 % of the samples were moved to the far edge.
+  // For a rect 60 to 100 times as far away as the point is above its plane, the cosine used to
+  // place a sample along its width is within 1e-4 of 1. A computation by that cosine rounded
+  // positions to 3e-4 of the width and moved 0.13 % of the samples to the far edge.
   const Lights lights({make_light(LightKind::kRect, scale(2, 3, 1))});
   const chi_square::Case c = light_case("flat", lights.view(), Vec3<float>(4, 1, -0.05f));
   chi_square::Random random(3);
@@ -88,7 +88,7 @@ TEST(LightSamples, OfSpheresAndCylindersFollowTheirDensity) {
   battery.judge();
 }
 
-/// A picture with something in each texel, a few of them bright.
+/// Makes an image with positive texels, a few of them bright.
 std::vector<float> sky(uint32_t width, uint32_t height, float sun) {
   std::vector<float> rgb;
   Numbers number(9);
@@ -108,7 +108,7 @@ TEST(LightSamples, OfInfiniteLightsFollowTheirDensity) {
     see(battery, "distant of " + std::to_string(angle), distant, anywhere);
   }
   see(battery, "dome", make_light(LightKind::kDome), anywhere);
-  // A window before the room, and one at its side; the room is at z < 1.
+  // A portal in front of the room and one at its side; the room is at z < 1.
   const From rooms[] = {{"in the room", {0, 0, 0}},
                         {"at the window", {0.3f, 0.1f, 0.96f}},
                         {"beside the window", {3, 0.1f, 0.8f}},
@@ -140,7 +140,7 @@ TEST(LightSamples, OfInfiniteLightsFollowTheirDensity) {
   battery.judge();
 }
 
-/// Profiles that shine to one half, and unevenly to all sides.
+/// Profiles that cover one half, and that are asymmetric.
 std::vector<IesProfile> profiles() {
   return {{{0, 40, 40, 90}, {0}, {1, 3, 0.5f, 2}},
           {{0, 90, 180}, {0, 100, 360}, {1, 2, 3, 3, 0, 1, 1, 2, 3}}};
@@ -152,7 +152,7 @@ TEST(LightSamples, OfTrianglesFollowTheirDensity) {
                          sliver = make_triangle({-3, 0, 0}, {4, 0.01f, 0}, {4, 0, 0});
   see(battery, "triangle", Lights({}, {wide}), kFlat);
   see(battery, "sliver", Lights({}, {sliver}), kFlat);
-  // With a picture, half of it there, several of them.
+  // Textured triangles, partly transparent, several of them.
   Lights textured;
   const uint32_t material = textured.add_material(textured.add_texture(8, 8, sky(8, 8, 20)));
   EmissiveTriangle shown = wide;
@@ -162,7 +162,7 @@ TEST(LightSamples, OfTrianglesFollowTheirDensity) {
   other.opacity = 0.25f;
   textured.build({}, {shown, other, sliver});
   see(battery, "textured triangles", textured, kFlat);
-  // A mesh light whose light is shaped.
+  // A mesh light with shaping.
   Light lamp = make_light(LightKind::kTriangle);
   lamp.shaping.focus = 2;
   lamp.shaping.focus_tint = {0.2f, 0.1f, 0.3f};
@@ -204,7 +204,7 @@ TEST(LightSamples, OfShapedLightsFollowTheirDensity) {
 }
 
 TEST(LightSamples, OfManyLightsFollowTheirDensity) {
-  // The choice of the light and the place on it, by power and by tree.
+  // Selection of a light and position on it, by power and by light tree.
   Battery battery("many lights");
   const Lights lights = random_lights(is_long() ? 60 : 20, 7, 3);
   Numbers number(21);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The table of what a light can be told: its rows, the checks and the fingerprint that follow.
+/// The table of light parameters: its rows, and the checks and fingerprint derived from it.
 #include "wavecomb/scene/light_table.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ Light a_light(LightKind kind = LightKind::kRect) {
   return light;
 }
 
-/// What is said of the light; "": nothing.
+/// Returns the error message about the light, or "".
 template <typename Change>
 std::string said(const Change& change, const LightReferences& there = kThere) {
   Light light = a_light();
@@ -41,7 +41,7 @@ std::string said(const Change& change, const LightReferences& there = kThere) {
   return "";
 }
 
-/// A value that the row takes and that is not its default.
+/// Returns a valid value of the row other than its default.
 LightValue another(const LightParameter& p) {
   switch (p.kind) {
     case LightValueKind::kNumber:

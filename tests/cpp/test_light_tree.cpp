@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Choosing lights by tree: probabilities, bounds, and agreement of packets with scalars. Counts:
-/// test_light_choice.cpp.
+/// Light selection by tree: probabilities, bounds, and agreement of packets with scalars.
+/// test_light_choice.cpp tests frequencies.
 #include "wavecomb/light/light_tree.h"
 
 #include <chrono>
@@ -26,8 +26,8 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
         const LightReceiver<float> to = random_receiver(number);
         double sum = 0;
         for (uint32_t i = 0; i < view.count; ++i) sum += double{pick_pdf(view, i, to)};
-        // Bounds shrink on the way down: some numbers end where no light has anything to give, and
-        // then none is chosen.
+        // Bounds shrink on the way down, so some sample values end at nodes where no light
+        // contributes; then none is selected.
         double none = 0;
         constexpr int kTries = 400;
         for (int i = 0; i < kTries; ++i) {
@@ -39,7 +39,7 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
       }
     }
   }
-  // Spheres shine everywhere.
+  // Spheres emit in all directions.
   std::vector<Light> spheres;
   Numbers number(4);
   for (int i = 0; i < 500; ++i) {
@@ -56,8 +56,8 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
   }
 }
 
-/// A light that brings anything to a receiver is chosen sometimes: by a point on it that is seen
-/// from the front, above the receiver's horizon.
+/// Every light that contributes at a receiver can be selected. Checked by a point on the light's
+/// front side above the receiver's horizon.
 TEST(LightTree, WhatShinesCanBeChosen) {
   const Lights lights = random_lights(300, 8);
   const LightView power = lights.view(), view = by_tree(lights);
@@ -70,7 +70,7 @@ TEST(LightTree, WhatShinesCanBeChosen) {
     ++seen;
   }
   EXPECT_GT(seen, 4000);
-  // The same light again, by its number.
+  // The same light again, found by its index.
   Numbers again(9);
   for (int k = 0; k < 40000; ++k) {
     const Vec3<float> p = k % 3 == 0 ? again.point(1) : again.point(12), n = again.direction();
@@ -83,8 +83,8 @@ TEST(LightTree, WhatShinesCanBeChosen) {
   }
 }
 
-/// The density that a bounce would be told is that of the sample, and samples integrate to what
-/// choosing by power gives.
+/// The density for bounces equals that of samples, and the estimate equals that with selection by
+/// power.
 TEST(LightTree, BothHalvesOfMisAgree) {
   const Lights lights = random_lights(200, 14, 2);
   const LightView power = lights.view(), view = by_tree(lights);
@@ -105,7 +105,7 @@ TEST(LightTree, BothHalvesOfMisAgree) {
   }
   EXPECT_GT(finite, 5000);
 
-  double variance[2] = {0, 0};  // relative to the light that arrives
+  double variance[2] = {0, 0};  // relative to the incident light
   for (int k = 0; k < 12; ++k) {
     const Vec3<float> p = number.point(12), n = number.direction();
     LightReceiver<float> to(p, pack_normal<float>(n));
@@ -124,7 +124,8 @@ TEST(LightTree, BothHalvesOfMisAgree) {
       mean[way] = sum / kSamples;
       error2[way] = (sum2 / kSamples - mean[way] * mean[way]) / kSamples;
     }
-    // Both are 0 where no light shines; compilers choose the order of arguments, and so the places.
+    // Both are 0 where no light arrives. Compilers may evaluate arguments in any order, so
+    // positions differ between compilers.
     EXPECT_LE(std::abs(mean[0] - mean[1]), 4.5 * std::sqrt(error2[0] + error2[1])) << k;
     for (int way = 0; way < 2; ++way) variance[way] += error2[way] / (mean[0] * mean[0] + 1e-12);
   }
@@ -222,7 +223,7 @@ TEST(LightTree, LightsAtOnePlaceAndBlackOnes) {
   EXPECT_EQ(pick_pdf(by_tree(one), 1, LightReceiver<float>(Vec3<float>{0, 0, -3})), 1.f);
 }
 
-/// A weak lamp close by beats a strong one far away.
+/// A weak light nearby is preferred to a strong one far away.
 TEST(LightTree, NearLightsAreChosenMostly) {
   Light near = make_light(LightKind::kSphere, translate(0, 0, 1)), far = near;
   near.radius = far.radius = 0.1f;
@@ -247,9 +248,9 @@ TEST(LightTree, HundredThousandTrianglesAreQuick) {
   const LightTree tree = build_light_tree(lights.set, powers);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   RecordProperty("build_ms", static_cast<int>(1e3 * seconds.count()));
-  EXPECT_LT(seconds.count(), 20);  // of a machine with other things to do
+  EXPECT_LT(seconds.count(), 20);  // generous, for busy machines
   ASSERT_EQ(tree.nodes.size(), triangles.size() - 1);
-  // Deep enough for all, and balanced within reason.
+  // Deep enough for all lights, and reasonably balanced.
   const LightTree again = build_light_tree(lights.set, powers);
   EXPECT_EQ(tree.trails, again.trails);
   EXPECT_LT(*std::max_element(tree.trails.begin(), tree.trails.end()), 1u << 31);

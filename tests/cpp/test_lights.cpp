@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights: both halves of MIS, closed forms of irradiance, pictures on lights, lanes. Chi-squares
-/// are in test_light_samples.cpp.
+/// Lights: both techniques of MIS, closed forms of irradiance, textured lights, and lanes.
+/// test_light_samples.cpp has the chi-square tests.
 #include "wavecomb/light/light.h"
 
 #include <functional>
@@ -16,7 +16,7 @@ using namespace light_testing;
 using lane_testing::kInf;
 using lane_testing::kNan;
 
-/// What MIS sees of the density of direction `dir` from `from`, when the set holds one light.
+/// Density that MIS uses for direction `dir` from `from`, for a set with one light.
 float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& dir) {
   const LightView view = lights.view();
   if (view.first_triangle == 0) {
@@ -42,7 +42,7 @@ struct Case {
   Vec3<float> from{0, 0, 0};
 };
 
-/// One case for each way of sampling, seen from the origin.
+/// One case per sampling method, seen from the origin.
 std::vector<Case> sampling_cases() {
   std::vector<Case> cases;
   const auto add = [&](const char* name, const Light& light) {
@@ -111,12 +111,12 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
       ASSERT_TRUE(s.valid) << c.name;
       ASSERT_NEAR(dot(s.wi, s.wi), 1, 1e-5);
       const float pdf = density(c.lights, c.from, s.wi);
-      // Rounding may carry a direction over an edge of the light, or of a cell of the dome's image.
+      // Rounding may move a direction across an edge of the light or of a cell of the dome's image.
       if (std::fabs(pdf / s.pdf - 1) > 1e-3) {
         ++outside;
         continue;
       }
-      // weight pdf is the radiance, and the ray gets the same.
+      // weight * pdf is the radiance, and a hit returns the same.
       if (!is_dome_image) {
         ASSERT_NEAR(s.weight.y * s.pdf, 3, 1e-5);
       }
@@ -165,7 +165,7 @@ TEST(LightSampling, BothHalvesOfMisSumTo1) {
   EXPECT_EQ(balance_weight(1.f, kInf), 0.f);
 }
 
-/// Irradiance on a surface at `from` with normal n, by an n x n grid of jittered samples.
+/// Irradiance on a surface at `from` with normal n, by n x n jittered samples.
 double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<float>& n,
                   int grid = 700) {
   const LightView view = lights.view();
@@ -187,9 +187,9 @@ double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<floa
 const Vec3<float> kUp{0, 0, 1}, kOrigin{0, 0, 0};
 
 TEST(Irradiance, RectAboveAPoint) {
-  // A rect with a corner above the point: E = L / 2 (a / A atan(b / A) + b / B atan(a / B)),
-  // A = sqrt(1 + a^2), B = sqrt(1 + b^2), sides a and b in units of the height; four corners make
-  // one.
+  // A rect with a corner above the point: E = L / 2 (a / A atan(b / A) + b / B atan(a / B)), A =
+  // sqrt(1 + a^2), B = sqrt(1 + b^2), with sides a and b in units of the height. Four such rects
+  // form one.
   for (const float size : {0.1f, 1.f, 10.f}) {
     Light light = make_light(LightKind::kRect, translate(0, 0, 2) * scale(2 * size, 4 * size, 1));
     const double a = size / 2, b = 2 * size / 2, big_a = std::sqrt(1 + a * a),
@@ -197,7 +197,7 @@ TEST(Irradiance, RectAboveAPoint) {
     const double corner =
         3 / 2.0 * (a / big_a * std::atan(b / big_a) + b / big_b * std::atan(a / big_b));
     EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp) / (4 * corner), 1, 2e-3) << size;
-    // Nothing behind it.
+    // No light behind the rect.
     EXPECT_EQ(irradiance(Lights({light}), {0, 0, 5}, -kUp, 10), 0);
   }
 }
@@ -213,7 +213,7 @@ TEST(Irradiance, DiskAboveAPoint) {
 }
 
 TEST(Irradiance, SphereNearAndFar) {
-  // E = pi L (r / d)^2 cos for a sphere wholly above the horizon.
+  // E = pi L (r / d)^2 cos for a sphere entirely above the horizon.
   for (const double distance : {1.001, 2.0, 100.0, 1e5}) {
     for (const double tilt : {0.0, 0.4}) {
       const double cosine = std::cos(tilt);
@@ -222,7 +222,7 @@ TEST(Irradiance, SphereNearAndFar) {
           make_light(LightKind::kSphere, translate(static_cast<float>(distance * std::sin(tilt)), 0,
                                                    static_cast<float>(distance * cosine)));
       light.radius = 1;
-      if (distance < 1.1 && tilt > 0) continue;  // dips below the horizon
+      if (distance < 1.1 && tilt > 0) continue;  // partly below the horizon
       const double exact = kPiD * 3 / distance / distance * cosine;
       EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300) / exact, 1, 2e-3)
           << distance << ", " << tilt;
@@ -245,7 +245,7 @@ TEST(Irradiance, PointLight) {
 
 TEST(Irradiance, DistantLights) {
   for (const float angle : {0.f, 0.01f, 0.53f, 30.f, 180.f}) {
-    Light light = make_light(LightKind::kDistant);  // travels along -z
+    Light light = make_light(LightKind::kDistant);  // emits along -z
     light.angle = angle;
     light.normalize = true;
     EXPECT_NEAR(irradiance(Lights({light}), kOrigin, kUp, 300), 3, 3e-3) << angle;
@@ -266,7 +266,7 @@ TEST(Irradiance, Domes) {
   constant.build({dome});
   EXPECT_NEAR(irradiance(constant, kOrigin, kUp), 1.5 * kPiD, 0.01);
 
-  // An image with a sun, by integrating radiance over the sphere.
+  // An image with a sun; the reference integrates radiance over the sphere.
   std::mt19937 rng(77);
   std::vector<float> rgb(32 * 16 * 3);
   for (float& x : rgb) x = static_cast<float>(rng() % 100) / 100.f;
@@ -288,7 +288,7 @@ TEST(Irradiance, Domes) {
 }
 
 TEST(Irradiance, ManyLightsSumUp) {
-  // Four lights of very different power and kind, by choice among them.
+  // Selection among four lights of very different power and kind.
   Light rect = make_light(LightKind::kRect, translate(0, 0, 2)),
         sphere = make_light(LightKind::kSphere, translate(3, 0, 3)),
         distant = make_light(LightKind::kDistant),
@@ -311,8 +311,8 @@ TEST(Irradiance, TriangleAgreesWithRect) {
 }
 
 TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
-  // Top row red, green; bottom row blue, white. The rect shines along -z; it is seen from z < 0, +y
-  // up.
+  // Top row red, green; bottom row blue, white. The rect emits along -z and is seen from z < 0,
+  // with +y up.
   Lights lights;
   Light light = make_light(LightKind::kRect);
   light.color = {1, 1, 1};
@@ -330,11 +330,11 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
   EXPECT_NEAR(seen(0.25f, -0.25f).z, 1, 1e-5);  // lower left: blue
   EXPECT_NEAR(seen(0.25f, -0.25f).x, 0, 1e-5);
   EXPECT_NEAR(seen(-0.25f, -0.25f).x, 1, 1e-5);
-  // From behind: nothing.
+  // No light at the back.
   EXPECT_EQ(
       light_hit<float>(lights.view(), 0u, Vec3<float>{0, 0, 1}, {0, 0, -1}, 1.f, true).radiance.y,
       0);
-  // Samples carry the radiance that a hit at the same place gives.
+  // Samples have the radiance of a hit at the same position.
   std::mt19937 rng(2);
   for (int i = 0; i < 1000; ++i) {
     const auto s = sample_light<float>(lights.view(), Vec3<float>{0.1f, 0.2f, -1}, 0.f,
@@ -364,7 +364,7 @@ TEST(TexturedLights, DomeFollowsOpenExrsConvention) {
     paint(48, y, 2, 1);  // s = 3/4: blue
   }
   for (uint32_t y = 0; y < 3; ++y)
-    for (uint32_t x = 0; x < kW; ++x) rgb[3 * (y * kW + x)] = 7;  // the top: the pole +y
+    for (uint32_t x = 0; x < kW; ++x) rgb[3 * (y * kW + x)] = 7;  // the top rows: the pole +y
   light.texture = lights.add_texture(kW, kH, rgb);
   lights.build({light});
   const auto seen = [&](float x, float y, float z) {
@@ -409,7 +409,7 @@ TEST(TexturedLights, TriangleReadsItsMaterialsEmission) {
   }
 }
 
-/// A set with lights of all kinds, images among them.
+/// A set with lights of all kinds, some of them textured.
 Lights all_kinds() {
   Lights lights;
   std::mt19937 rng(12);
@@ -453,7 +453,7 @@ TEST(LightLanes, PacketsGiveTheBitsOfScalars) {
     for (size_t i = 0; i < kN; ++i) column.push_back(static_cast<float>(rng() >> 8) * 0x1p-24f);
   for (size_t i = 0; i < kN; ++i)
     for (size_t c = 0; c < 3; ++c) in[c][i] = in[c][i] * 8 - 4;
-  for (size_t i = 0; i < kN / 4; ++i) in[3][i] = 0.5f;  // packets of one light
+  for (size_t i = 0; i < kN / 4; ++i) in[3][i] = 0.5f;  // packets with equal lights
   std::vector<uint32_t> ids(kN);
   for (uint32_t i = 0; i < kN; ++i)
     ids[i] = i < kN / 4 ? i / 64 % view.count : static_cast<uint32_t>(rng()) % view.count;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arithmetic of what is too large to be made in a test.
+/// Size limits that are too large for a test to reach with real data.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -16,7 +16,7 @@
 namespace wavecomb {
 namespace {
 
-/// What `f` throws, "" where it does not.
+/// Returns the error message of `f`, or "".
 std::string refusal(const std::function<void()>& f) {
   try {
     f();
@@ -33,7 +33,7 @@ struct Limit {
 };
 
 TEST(Limits, scene_counts_end_where_words_do) {
-  // Words of a record times the last index stay below 2^31, those of rows below 2^32.
+  // 32-bit words of a record times the last index stay below 2^31, those of rows below 2^32.
   const Limit limits[] = {
       {&SceneCounts::meshes, 134217728, "134,217,729 meshes"},
       {&SceneCounts::materials, (1ull << 31) / (kInputCount * 16), "materials"},
@@ -75,7 +75,7 @@ TextureDesc image(uint32_t width, uint32_t height, uint32_t channels, TexelForma
   return desc;
 }
 
-/// Lays an image out; what is said against it, or "" and its view.
+/// Lays out an image. Returns the error message, or "" and the view.
 std::string layout_refusal(const TextureDesc& desc, TextureView& view) {
   view = {};
   view.format = desc.format;
@@ -85,8 +85,8 @@ std::string layout_refusal(const TextureDesc& desc, TextureView& view) {
 
 TEST(Limits, texels_are_numbered_to_the_last) {
   TextureView view;
-  // One byte a texel: 5.7 thousand million of them take less than 8 GiB, but 32 bits do not number
-  // them.
+  // One byte per texel: 5.7 thousand million texels take less than 8 GiB, but exceed 32-bit
+  // indices.
   const std::string said = layout_refusal(image(65536, 65536, 1, TexelFormat::kU8), view);
   EXPECT_NE(said.find("'large.tif'"), std::string::npos) << said;
   EXPECT_NE(said.find("hold 5726 million texels; 4294 million is the most"), std::string::npos)
@@ -124,12 +124,12 @@ TEST(Limits, ids_of_layers_are_whole_numbers_of_a_float) {
   EXPECT_EQ(refusal([&] { check_id_layers(set, 1u << 25, 1u << 24); }), "");
   EXPECT_NE(refusal([&] { check_id_layers(set, 1, (1u << 24) + 1); }).find("crypto_material"),
             std::string::npos);
-  // The id in the layer is one more than the number.
+  // The id in the layer is one more than the index.
   const float last = static_cast<float>((1u << 24) - 1) + 1.f;
   EXPECT_NE(last, static_cast<float>((1u << 24) - 2) + 1.f);
 }
 
-/// 100 triangles, a rect and a dome, of which a table can choose among `most_picked`.
+/// Makes 100 triangles, a rect and a dome; a table can select among at most `most_picked`.
 LightSet many_lights(size_t most_picked, float mean_scale = 1) {
   using namespace light_testing;
   std::vector<Light> lights{make_light(LightKind::kRect, translate(3, 3, 3)),
@@ -155,7 +155,7 @@ TEST(Limits, the_tree_alone_chooses_among_more_lights_than_a_table_can) {
       refusal([&] { chooses_by_tree(LightSelection::kPower, alone); }),
       "by power one of 16,777,215 lights can be chosen; the scene has 102 lights and emissive "
       "triangles; choose --light-selection tree");
-  // What it chooses, and how probable that is, has nothing of the table.
+  // Selections and their probabilities do not use the table.
   by_tree.by_tree = alone.by_tree = true;
   const LightReceiver<float> to(Vec3<float>{4, 5, 2});
   for (uint32_t i = 0; i < 1000; ++i) {
@@ -189,7 +189,7 @@ TEST(Limits, lights_are_numbered_to_the_last) {
   EXPECT_EQ(refusal([] { check_light_count(uint64_t{kMaxLights} + 1); }),
             "the scene has 268,435,457 lights and emissive triangles; 268,435,456 can be numbered; "
             "give meshes that emit fewer triangles or instances");
-  // Not what is left of it in 32 bits.
+  // The count must not be truncated to 32 bits.
   EXPECT_NE(refusal([] { check_light_count((uint64_t{1} << 32) + 5); }), "");
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights that do not give all surfaces the same: multipliers, hidden shapes, links to geometry.
+/// Lights that affect surfaces differently: multipliers, hidden shapes, and light linking.
 #include "scene_testing.h"
 #include "wavecomb/scene/links.h"
 
@@ -28,7 +28,7 @@ Affine facing_down(float y) {
 Light disk(float y = 1) {
   return make_light(LightKind::kDisk, {3, 3, 3}, facing_down(y));
 }
-/// Irradiance of disk() below its centre.
+/// Irradiance of disk() at the point below its centre.
 constexpr double kUnderDisk = kPiD * 3 * 0.25 / 1.25;
 
 uint32_t add_mesh(SceneBuilder& b, MeshData data, uint32_t material, const char* name) {
@@ -37,7 +37,7 @@ uint32_t add_mesh(SceneBuilder& b, MeshData data, uint32_t material, const char*
   return b.add_mesh(std::move(mesh));
 }
 
-/// A floor of some material that a camera sees at the origin.
+/// A floor of a given material, seen by a camera at the origin.
 struct Stage {
   SceneBuilder b;
   explicit Stage(const Material& material) {
@@ -54,7 +54,7 @@ Material grey() {
   return make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f});
 }
 
-/// The picture by waves, which must be the one that the reference makes.
+/// Renders by waves and expects the image of the reference integrator.
 Picture checked(const ScenePtr& scene, const Settings& s) {
   WavefrontRenderer renderer(scene);
   Picture waves = renderer.render(s);
@@ -74,7 +74,7 @@ TEST(Multipliers, ScaleTheDiffuseResponse) {
     Stage stage(grey());
     Light light = disk();
     light.diffuse = factor;
-    light.specular = 0.5f;  // of which a diffuse floor has nothing
+    light.specular = 0.5f;  // without effect on a diffuse floor
     stage.b.add_light(light);
     expect_mean(checked(stage.b.build(), settings()),
                 0.6 / kPiD * kUnderDisk * static_cast<double>(factor), "diffuse");
@@ -133,7 +133,7 @@ TEST(HiddenLights, ShineAndAreNotMet) {
   Light light = disk();
   light.visible = false;
   stage.b.add_light(light);
-  Light above = disk(1);  // whose way the hidden one would be in
+  Light above = disk(1);  // a light that the hidden one would occlude
   above.to_world = facing_down(1.2f);
   stage.b.add_light(above);
   const double from_above = kPiD * 3 * 0.25 / (1.2 * 1.2 + 0.25);
@@ -168,7 +168,7 @@ TEST(LightLinks, MirrorsShowWhatTheyAreLinkedTo) {
 }
 
 TEST(LightLinks, BothTechniquesKeepTheMean) {
-  // A light that is linked to everything by a set gives what an unlinked one does.
+  // A light that is linked to everything through a set contributes like an unlinked one.
   Picture pictures[2];
   for (const bool linked : {false, true}) {
     Stage stage(make_material(ProgramId::kPrincipled, {0.5f, 0.5f, 0.5f}, 0.4f));

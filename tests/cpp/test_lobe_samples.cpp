@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Samples of single lobes follow their densities: normals and directions, before programs choose
-/// among lobes.
+/// Samples of single lobes, normals or directions, follow their densities, without selection among
+/// lobes.
 #include <gtest/gtest.h>
 
 #include <utility>
@@ -25,7 +25,8 @@ using Vec = Vec3<float>;
 
 constexpr double kCosines[] = {0.05, 0.3, 0.7, 0.95};
 
-/// A lobe whose `sample(random)` gives directions of density `pdf(w)`; the zero vector: no sample.
+/// A lobe whose `sample(random)` returns directions of density `pdf(w)`, or the zero vector for no
+/// sample.
 template <typename Pdf, typename Sample>
 chi_square::Case lobe_case(std::string name, const Vec& wo, const Pdf& pdf, const Sample& sample) {
   chi_square::Case c;
@@ -44,7 +45,7 @@ std::string named(const char* name, double value) {
   return std::string(name) + " " + std::to_string(value).substr(0, 6);
 }
 
-/// Roughness squared: of 0.032, which is the narrowest, 0.1, 0.3 and 1.
+/// Squared roughnesses of 0.032, the narrowest lobe, 0.1, 0.3 and 1.
 std::vector<float> alphas() {
   return is_long() ? std::vector<float>{0.001024f, 0.01f, 0.09f, 1.f}
                    : std::vector<float>{0.001024f, 0.09f};

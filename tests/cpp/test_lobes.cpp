@@ -18,8 +18,8 @@ using bsdf_testing::direction;
 using Vec = Vec3<float>;
 using Complex = std::complex<double>;
 
-/// Fresnel's equations with complex refraction, the textbook form that the code under test does not
-/// use.
+/// Fresnel's equations with complex refraction: the textbook form, which the code under test does
+/// not use.
 double fresnel_reference(double cos_i, Complex n) {
   const Complex sin_t = std::sqrt(1 - cos_i * cos_i) / n;
   const Complex cos_t = std::sqrt(1.0 - sin_t * sin_t);
@@ -34,7 +34,7 @@ TEST(Fresnel, DielectricMatchesReference) {
       const double c = i / 1000.0;
       const float f = fresnel_dielectric(static_cast<float>(c), static_cast<float>(n)).reflectance;
       const double n_float = static_cast<float>(n), c_float = static_cast<float>(c);
-      const bool critical = std::abs(n * n - (1 - c * c)) < 1e-3;  // infinite slope there
+      const bool critical = std::abs(n * n - (1 - c * c)) < 1e-3;  // the slope is infinite there
       EXPECT_NEAR(f, fresnel_reference(c_float, n_float), critical ? 2e-3 : 2e-6) << n << " " << c;
     }
 }
@@ -42,16 +42,17 @@ TEST(Fresnel, DielectricMatchesReference) {
 TEST(Fresnel, KnownValues) {
   EXPECT_NEAR(fresnel_dielectric(1.f, 1.5f).reflectance, 0.04f, 1e-7f);
   EXPECT_NEAR(fresnel_dielectric(0.5f, 1.5f).reflectance, 0.0891867f, 1e-6f);  // 60 degrees
-  // Brewster's angle tan = n: only the perpendicular part, ((n^2 - 1) / (n^2 + 1))^2 / 2, is left.
+  // At Brewster's angle, tan = n, only perpendicular polarisation is reflected: ((n^2 - 1) / (n^2 +
+  // 1))^2 / 2.
   EXPECT_NEAR(fresnel_dielectric(1 / std::sqrt(1 + 2.25f), 1.5f).reflectance,
               0.5f * std::pow(1.25f / 3.25f, 2.f), 1e-6f);
   EXPECT_EQ(fresnel_dielectric(0.5f, 1 / 1.5f).reflectance,
-            1.f);  // total: the critical angle is 41.8
+            1.f);  // total internal reflection: the critical angle is 41.8 degrees
   EXPECT_EQ(fresnel_dielectric(0.5f, 1 / 1.5f).cos_t, 0.f);
   EXPECT_EQ(fresnel_dielectric(0.f, 1.5f).reflectance, 1.f);
   EXPECT_EQ(fresnel_dielectric(0.f, 1.f).reflectance, 0.f);
   EXPECT_LT(fresnel_dielectric(0.3f, 1.f).reflectance, 1e-12f);
-  // Reflectances agree from both sides of an interface along one path of light.
+  // Reflectances agree from both sides of an interface along the same path.
   for (float c : {0.1f, 0.4f, 0.8f, 1.f}) {
     for (bool schlick : {false, true}) {
       const auto [r, t] = fresnel_dielectric(c, 1.5f, schlick);
@@ -70,7 +71,7 @@ TEST(Fresnel, ConductorMatchesReference) {
           fresnel_conductor(static_cast<float>(c), static_cast<float>(eta), static_cast<float>(k)),
           fresnel_reference(c, {eta, k}), 3e-6);
     }
-  // Silver near 600 nm reflects some 98 % (n = 0.13, k = 4.0: ((n - 1)^2 + k^2) / ((n + 1)^2 +
+  // Silver near 600 nm reflects about 98 % (n = 0.13, k = 4.0: ((n - 1)^2 + k^2) / ((n + 1)^2 +
   // k^2)).
   EXPECT_NEAR(fresnel_conductor(1.f, 0.13f, 4.f), (0.87 * 0.87 + 16) / (1.13 * 1.13 + 16), 1e-6);
 }
@@ -85,7 +86,7 @@ TEST(Fresnel, F82TintHitsItsTwoColours) {
   EXPECT_NEAR(at_82.y, 0.7f * schlick.y, 1e-5f);
   EXPECT_NEAR(at_82.z, 0.2f * schlick.z, 1e-5f);
   EXPECT_NEAR(f(0.f).y, 1.f, 1e-6f);
-  // The mean over the hemisphere, where nothing is clamped.
+  // Hemispherical mean, where nothing is clamped.
   double mean = 0;
   for (int i = 0; i < 10000; ++i) {
     const float c = (static_cast<float>(i) + 0.5f) / 10000.f;
@@ -108,7 +109,8 @@ TEST(Coat, AverageReflectanceIsCloseAndNeverAbove) {
 }
 
 TEST(Ggx, ProjectedNormalsCoverTheSurfaceOnce) {
-  // int D(h) h.z dh = 1 (Walter et al. 2007, eq. 4), by slope: h.z^2 = 1 / (1 + tan^2).
+  // int D(h) h.z dh = 1 (Walter et al. 2007, eq. 4), integrated over slopes: h.z^2 = 1 / (1 +
+  // tan^2).
   for (float alpha : {0.01f, 0.1f, 0.5f, 1.f}) {
     const Ggx<float> ggx{alpha};
     double sum = 0;
@@ -136,7 +138,7 @@ TEST(Ggx, VisibleNormalsProjectToTheViewersArea) {
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < n; ++j) {
           const double y = (i + 0.5) / n,
-                       x = 1 - (1 - y) * (1 - y);  // takes the singularity out of 1 / z
+                       x = 1 - (1 - y) * (1 - y);  // removes the singularity of 1 / z
           const double z = 1 / std::sqrt(1 + static_cast<double>(alpha) * alpha * x / (1 - x));
           const Vec h = direction(z, 2 * bsdf_testing::kPiD * (j + 0.5) / n);
           sum += 2 * (1 - y) * std::max(0.0, static_cast<double>(dot(wo, h))) / z;
@@ -146,7 +148,7 @@ TEST(Ggx, VisibleNormalsProjectToTheViewersArea) {
     }
 }
 
-/// Area that a map from the tangent plane at `w` to the sphere gives to a unit area, by central
+/// Area to which a map from the tangent plane at `w` to the sphere scales a unit area, by central
 /// differences.
 template <typename Map>
 double numeric_jacobian(const Vec& w, Map map) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// core/math.h against double precision, in units in the last place, and packets against scalars.
+/// core/math.h compared with double precision, in units in the last place, and packets with
+/// scalars.
 #include "wavecomb/core/math.h"
 
 #include <functional>
@@ -13,7 +14,7 @@ using namespace lane_testing;
 
 constexpr double kPiD = 3.14159265358979323846;
 
-/// Floats that cover [lo, hi] evenly, and by magnitude, with the ends.
+/// Floats that cover [lo, hi] uniformly and by magnitude, including the ends.
 std::vector<float> cover(float lo, float hi, size_t n = 400000) {
   std::vector<float> x = {lo, hi};
   for (size_t i = 0; i < n; ++i) {
@@ -59,7 +60,7 @@ TEST(Math, SinCos) {
     expect_lanes_agree(x, sine, "sin");
     expect_lanes_agree(x, cosine, "cos");
   }
-  // Relative error near 0 and near the zeros of both.
+  // Relative error near the zeros of both functions.
   const auto x = cover(-0.124f, 0.124f);
   EXPECT_LE(worst_ulps(x, map<float>(x, sine), sin_d), 2.5);
   EXPECT_LE(worst_ulps(x, map<float>(x, cosine), cos_d), 2.5);

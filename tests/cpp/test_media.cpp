@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Events that are no hits, and shadow rays that bring back a colour: fog through both integrators.
+// Medium events, and shadow rays with coloured transmittance: fog in both integrators.
 #include "media_testing.h"
 #include "wave_testing.h"
 #include "wavecomb/integrate/run_wave.h"
@@ -21,7 +21,8 @@ struct FoggyScene {
   Fog fog;
 };
 
-/// A floor and a lamp's shape in fog, and a point light; `on_floor`: what the camera looks at.
+/// Makes a floor and a light's geometry in fog, and a point light. `on_floor` aims the camera at
+/// the floor.
 FoggyScene foggy(const Vec3<float>& extinction, bool with_lamp, bool on_floor, float size) {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f}));
@@ -71,8 +72,8 @@ Picture foggy_reference(const FoggyScene& f, const Settings& s) {
   return run.picture();
 }
 
-/// A record of fog has no triangle, is sorted among those that have, and is shaded by a program
-/// that is no surface's; that shows in no bit.
+/// Fog records have no triangle, are sorted among surface records, and are shaded by a non-surface
+/// program. The image is bitwise the same for all schedules.
 TEST(Media, FogIsOnePicture) {
   for (const bool tracks_ratio : {false, true}) {
     FoggyScene f = foggy({0.3f, 0.5f, 0.9f}, true, true, 1.5f);
@@ -102,10 +103,10 @@ TEST(Media, FogIsOnePicture) {
   }
 }
 
-/// Light of the point that is scattered once, along the ray from `o` to `end`, and what the floor
-/// there sends back, if the ray ends on one:
-///   L = int_0^t sigma a / (4 pi) I / r(x)^2 exp(-sigma (x + r(x))) dx
-///       + rho / pi I cos / r(t)^2 exp(-sigma (t + r(t)))
+/// Light of the point light scattered once along the ray from `o` to `end`, plus the reflection of
+/// the floor if the ray ends on it:
+///    L = int_0^t sigma a / (4 pi) I / r(x)^2 exp(-sigma (x + r(x))) dx
+///        + rho / pi I cos / r(t)^2 exp(-sigma (t + r(t)))
 double single_scattering(double sigma, double albedo, double floor_albedo, bool on_floor) {
   const double light[3] = {0.6, 1.6, 0};
   const double o[3] = {0, on_floor ? 2.0 : 1.0, 3}, at[3] = {0, on_floor ? 0.0 : 1.0, 0};
@@ -133,8 +134,8 @@ double single_scattering(double sigma, double albedo, double floor_albedo, bool 
   return l;
 }
 
-/// Some 12 comparisons with 4.2 standard errors each: one false alarm in 3,000 runs with other
-/// seeds (Sidak).
+/// About 12 comparisons with 4.2 standard errors each: one run in 3,000 with other seeds fails by
+/// chance (Sidak).
 TEST(Media, SingleScatteringIsTheIntegral) {
   const float extinction[3] = {0.3f, 0.5f, 0.9f};
   const double albedo[3] = {0.9, 0.8, 0.7}, floor[3] = {0.6, 0.5, 0.4};
@@ -161,7 +162,8 @@ TEST(Media, SingleScatteringIsTheIntegral) {
     }
 }
 
-/// Walls of radiance 1 around fog that loses nothing: radiance is 1 everywhere.
+/// White furnace: walls of radiance 1 around fog without absorption give a radiance of 1
+/// everywhere.
 TEST(Media, FurnaceOfWhiteFog) {
   SceneBuilder b;
   const uint32_t fog = b.add_material(make_material(ProgramId::kPrincipled, {1, 1, 1}));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tangents that vary smoothly over triangles: who has them, where they are split, how they turn.
+/// Smoothly interpolated tangents: meshes that have them, where they are split, and their
+/// orientation.
 #include "wavecomb/scene/mesh_tangents.h"
 
 #include "lane_testing.h"
@@ -22,7 +23,7 @@ Material brushed() {
   return m;
 }
 
-/// One mesh, placed once by `to_world`.
+/// Makes a scene of one mesh with one instance, transformed by `to_world`.
 ScenePtr one_mesh(const MeshData& data, const Material& material, const Affine& to_world = {}) {
   SceneBuilder b;
   const uint32_t group = b.add_group("group");
@@ -37,7 +38,7 @@ Surface<float> surface_at(const Scene& scene, uint32_t prim, float u, float v) {
 V unit(const V& v) {
   return v * (1 / length(v));
 }
-/// The tangent in the plane of the shading normal, as frames take it.
+/// Tangent in the plane of the shading normal, as used in frames.
 V grain(const Surface<float>& s) {
   return make_frame<float>(s.ns, s.dpdu, s.handedness).s;
 }
@@ -45,8 +46,7 @@ double degrees_between(const V& a, const V& b) {
   return std::acos(std::clamp(double{dot(unit(a), unit(b))}, -1.0, 1.0)) * 180 / kPiD;
 }
 
-/// Whether a triangle of sphere() touches the seam, where tangents are of one side alone, or a
-/// pole.
+/// Whether a triangle of sphere() touches a pole or the seam, where tangents are one-sided.
 bool is_outermost(const Mesh& mesh, uint32_t prim) {
   for (size_t k = 0; k < 3; ++k) {
     const float* uv = &mesh.uvs[2 * mesh.indices[3 * prim + k]];
@@ -107,7 +107,7 @@ TEST(Tangents, OnlyMeshesWhoseMaterialAsksHaveThem) {
   EXPECT_NE(scene->view().tangents[2].codes, 0u);
 }
 
-/// Brushed along circles of latitude: the true grain at a point is known.
+/// Anisotropy along circles of latitude: the true direction is known at each point.
 TEST(Tangents, ACoarseSphereIsBrushedAsAFineOne) {
   constexpr uint32_t kRings = 8;
   const MeshData ball = sphere(kRings, true);
@@ -132,7 +132,7 @@ TEST(Tangents, ACoarseSphereIsBrushedAsAFineOne) {
   EXPECT_GT(worst_flat, 8);
 }
 
-/// Two squares side by side whose texture is mirrored in the edge between them.
+/// Two adjacent squares whose texture is mirrored at the shared edge.
 MeshData mirrored_pair() {
   MeshData m;
   for (int i = 0; i < 6; ++i) m.vertex(float(i % 3 - 1), 0, -float(i / 3));
@@ -157,8 +157,8 @@ TEST(Tangents, AreSplitWhereTheTextureIsMirroredAndAtEdges) {
         1e-4f);
   EXPECT_FALSE(make_tangents(make_mesh(sphere(6, true))).at_corners);
 
-  // A roof of two slopes, u along it from eaves to eaves: one tangent on the ridge, or two where
-  // normals make it an edge.
+  // A roof of two slopes with u from eaves to eaves: one tangent at the ridge, or two if separate
+  // normals make it a sharp edge.
   MeshData roof;
   for (int i = 0; i < 6; ++i) roof.vertex(float(i % 3 - 1), i % 3 == 1 ? 1.f : 0.f, -float(i / 3));
   roof.indices = mirrored_pair().indices;
@@ -182,7 +182,7 @@ TEST(Tangents, AreSplitWhereTheTextureIsMirroredAndAtEdges) {
 }
 
 TEST(Tangents, WhatCancelsOutIsTheTrianglesOwn) {
-  // All of a pole's triangles meet in one vertex with one texture coordinate.
+  // All triangles at a pole share one vertex with one texture coordinate.
   MeshData fan;
   fan.vertex(0, 1, 0);
   for (int i = 0; i < 6; ++i) {
@@ -193,7 +193,7 @@ TEST(Tangents, WhatCancelsOutIsTheTrianglesOwn) {
   fan.normals.assign(21, 0);
   for (size_t i = 1; i < 21; i += 3) fan.normals[i] = 1;
   fan.normals_at = Attribute::kVertex;
-  // By corner, so that u goes on past the last spoke.
+  // Texture coordinates per corner, so that u continues past the last spoke.
   for (int i = 0; i < 6; ++i)
     fan.uvs.insert(fan.uvs.end(), {0.5f, 1, float(i) / 6, 0, float(i + 1) / 6, 0});
   fan.uvs_at = Attribute::kCorner;
@@ -206,7 +206,7 @@ TEST(Tangents, WhatCancelsOutIsTheTrianglesOwn) {
     }
 }
 
-/// However a mesh is placed and however its texture lies, the frame's t goes along v.
+/// The axis t of the frame points along v for any transform of the mesh and of its texture.
 TEST(Tangents, FramesAreTurnedAsTheTextureIs) {
   MeshData ball = sphere(6, true), turned = ball;
   for (size_t i = 0; i < turned.uvs.size(); i += 2) turned.uvs[i] = 1 - turned.uvs[i];
@@ -220,7 +220,7 @@ TEST(Tangents, FramesAreTurnedAsTheTextureIs) {
         for (uint32_t prim = 0; prim < data->indices.size() / 3; ++prim) {
           const Surface<float> s = surface_at(*scene, prim, 0.3f, 0.3f);
           ASSERT_EQ(s.handedness, data == &ball ? side : -side);
-          // v goes up the sphere.
+          // v increases towards the top of the sphere.
           const V up = place.vector(V(0, 1, 0));
           const Frame<float> f = make_frame<float>(s.ns, s.dpdu, s.handedness);
           const V v = unit(up - s.ns * dot(s.ns, up));
@@ -230,7 +230,7 @@ TEST(Tangents, FramesAreTurnedAsTheTextureIs) {
       }
 }
 
-/// A sphere that spins while the shutter is open.
+/// Makes a sphere that rotates while the shutter is open.
 Mesh spinning(uint32_t material) {
   MeshData data = sphere(5, true);
   MeshData later = data;
@@ -328,7 +328,7 @@ TEST(Tangents, AnEditedSceneHasThoseOfOneBuiltAnew) {
     return std::vector<uint32_t>(p, p + ball.positions.size() / 3);
   };
   EXPECT_EQ(codes(*edited), codes(*anew));
-  // Shared where the material changes otherwise, gone where nothing asks any more.
+  // Shared if an edit does not affect tangents, removed if no material needs them.
   metal.base_color = {1, 0, 0};
   EXPECT_EQ(edited->edited({.materials = {{0, metal}}})->view().tangents, edited->view().tangents);
   metal.openpbr.anisotropy = 0;

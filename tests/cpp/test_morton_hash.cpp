@@ -41,7 +41,7 @@ TEST(Morton, Lanes) {
   });
 }
 
-/// Inverse of hash_u32, step by step: there is one, so the hash is a bijection.
+/// Inverse of hash_u32. Since it exists, the hash is a bijection.
 uint32_t unhash(uint32_t x) {
   x ^= x >> 16;
   x *= 0x43021123u;
@@ -87,7 +87,7 @@ TEST(Hash, TwoWordsRarelyCollide) {
   const auto collisions = std::distance(std::unique(all.begin(), all.end()), all.end());
   EXPECT_LT(collisions, 25);
   EXPECT_NE(hash_u32(1u, 2u), hash_u32(2u, 1u));
-  // None at all while one word stays.
+  // No collisions while one 32-bit word is constant.
   for (const uint32_t fixed : {0u, 1u, 12345u, 0xffffffffu})
     for (const bool first : {false, true}) {
       all.clear();

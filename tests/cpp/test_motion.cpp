@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What moves while the shutter is open: against closed forms, and one picture for all schedules.
+// Motion blur: compared with closed forms, and one image for all schedules.
 #include "wavecomb/surface/motion.h"
 
 #include "curve_testing.h"
@@ -12,7 +12,7 @@ namespace {
 using namespace scene_testing;
 using namespace wave_testing;
 
-/// A mesh whose shape goes from `a` to `b` and on.
+/// Makes a mesh that deforms through the given shapes.
 Mesh deforming(const std::vector<MeshData>& shapes, uint32_t material = 0) {
   MeshData all = shapes.front();
   for (size_t s = 1; s < shapes.size(); ++s) {
@@ -25,7 +25,8 @@ Mesh deforming(const std::vector<MeshData>& shapes, uint32_t material = 0) {
   return mesh;
 }
 
-/// Curves or points that sway: each step a little further to the right, where they are high.
+/// Makes curves or points that sway: each motion step moves them further to the right, in
+/// proportion to their height.
 Mesh swaying(Primitive primitive, uint32_t steps, uint32_t seed, uint32_t material) {
   curve_testing::CurveData data = curve_testing::strands(primitive, 12, 2, 0.8f, 0.06f, seed);
   const std::vector<float> still = data.positions, normals = data.normals;
@@ -47,7 +48,7 @@ Material glowing() {
   return m;
 }
 
-/// One pixel of the square [-0.5, 0.5]^2 of the plane z = 0.
+/// Settings for one pixel that covers the square [-0.5, 0.5]^2 of the plane z = 0.
 Settings one_pixel(uint32_t spp) {
   Settings s;
   s.width = s.height = 1;
@@ -57,7 +58,7 @@ Settings one_pixel(uint32_t spp) {
   return s;
 }
 
-/// Mean radiance of one pixel by the reference integrator.
+/// Mean radiance of one pixel with the reference integrator.
 double mean(const ScenePtr& scene, uint32_t spp) {
   WaveRun run(scene, {one_pixel(spp), kReferenceLanes, 1});
   run.all(64);
@@ -68,13 +69,13 @@ Camera camera_before_the_plane() {
   return make_camera({0, 0, 1}, {0, 0, 0}, 1);
 }
 
-/// A glowing half plane that covers the pixel from its left edge to x = `edge`.
+/// An emissive half plane that covers the pixel from its left edge to x = `edge`.
 MeshData half_plane(float edge) {
   return quad({-3, -1, 0}, {3 + edge, 0, 0}, {0, 2, 0});
 }
 
 TEST(Motion, MovingEdgeCoversAPixelForItsShareOfTheTime) {
-  // The edge goes from -0.5 to 0.3: at time t it covers 0.8 t of the pixel, 0.4 on average.
+  // The edge moves from -0.5 to 0.3: at time t it covers 0.8 t of the pixel, 0.4 on average.
   SceneBuilder builder;
   builder.add_material(glowing());
   builder.add_to_group(0, builder.add_mesh(deforming({half_plane(-0.5f), half_plane(0.3f)})));
@@ -83,8 +84,8 @@ TEST(Motion, MovingEdgeCoversAPixelForItsShareOfTheTime) {
 }
 
 TEST(Motion, MovingPointsAndCurvesCoverTheirShare) {
-  // A disk of radius 0.3 before a pixel of side 1, seen from afar: there from step 0 to 1, then on
-  // its way out, from step 2 to 3 gone.
+  // A disk of radius 0.3 in a pixel of side 1, seen from far away: inside the pixel from step 0 to
+  // 1, moving out from step 1 to 2, outside from step 2 to 3.
   for (const bool tube : {false, true}) {
     curve_testing::CurveData data;
     data.primitive = tube ? Primitive::kLinearTube : Primitive::kSphere;
@@ -101,14 +102,14 @@ TEST(Motion, MovingPointsAndCurvesCoverTheirShare) {
     builder.add_to_group(0, builder.add_mesh(std::move(mesh)));
     Camera camera = make_camera({0, 0, 1000}, {0, 0, 0}, 0.001f);
     builder.set_camera(camera);
-    // On its way of 9 it is whole for 0.2, then half of it on average for 0.6.
+    // Of its path of length 9, it is fully visible for 0.2, then half visible on average for 0.6.
     const double seen = kPiD * 0.09, crossing = (0.2 + 0.5 * 0.6) / 9;
     EXPECT_NEAR(mean(builder.build(), 1u << 18), seen * (1 + crossing) / 3, 2e-3) << tube;
   }
 }
 
 TEST(Motion, EveryStepCounts) {
-  // There and back again: 0 to 0.8 to 0.
+  // Forth and back: 0 to 0.8 to 0.
   SceneBuilder builder;
   builder.add_material(glowing());
   const MeshData out = half_plane(-0.5f), in = half_plane(0.3f);
@@ -122,7 +123,7 @@ TEST(Motion, MovingInstanceAndNestedOnesCoverTheirShare) {
   builder.add_material(glowing());
   const uint32_t inner = builder.add_group("inner"), outer = builder.add_group("outer");
   builder.add_to_group(inner, builder.add_mesh(make_mesh(half_plane(-0.5f), 0)));
-  // Both move: by 0.2 and by 0.6, the outer one in three steps.
+  // Nested motion: by 0.2 and by 0.6, the outer one in three steps.
   const Affine by[2] = {translate(0, 0, 0), translate(0.2f, 0, 0)};
   const Affine on[4] = {translate(0, 0, 0), translate(0.2f, 0, 0), translate(0.4f, 0, 0),
                         translate(0.6f, 0, 0)};
@@ -158,14 +159,15 @@ TEST(Motion, TimesAreSpreadEvenlyAndDisturbNothing) {
       ++bins[static_cast<size_t>(t * 16)];
     }
     EXPECT_NEAR(sum / 4096, 0.5, 0.02);
-    // Stratified: each sixteenth gets its sixteenth.
+    // Stratified: each sixteenth of the shutter gets a sixteenth of the samples.
     if (kind == SamplerKind::kSobol) {
       for (const int n : bins) EXPECT_EQ(n, 256);
     }
   }
 }
 
-/// Many things that move in many ways: shapes, smooth normals, instances that turn and mirror.
+/// A scene with many kinds of motion: deformation, smooth normals, and instances that rotate and
+/// mirror.
 ScenePtr moving_scene(bool moving_camera) {
   SceneBuilder builder;
   Material grey;
@@ -213,7 +215,7 @@ ScenePtr moving_scene(bool moving_camera) {
     builder.add_to_group(group, builder.add_mesh(swaying(primitive, 1, seed + 50, 1)));
     ++seed;
   }
-  // A lamp that moves: seen, but not aimed at.
+  // A moving light: visible, but not sampled.
   const Affine fly[2] = {translate(0, 3, 0), translate(2, 3, 0)};
   const uint32_t lamp = builder.add_group("lamp");
   builder.add_to_group(lamp, builder.add_mesh(make_mesh(sphere(4, false), 3)));
@@ -271,7 +273,7 @@ TEST(Motion, OnePictureForEverySchedule) {
 }
 
 TEST(Motion, ScenesAtRestDoNotChange) {
-  // Steps that are all alike: the picture of a scene without them but for what rounding may do.
+  // Identical motion steps: the image equals that of a static scene, up to rounding.
   const auto build = [](bool steps) {
     SceneBuilder builder;
     builder.add_material(glowing());
@@ -318,8 +320,8 @@ TEST(Motion, SurfacesAreWhereRaysMeetThem) {
   EXPECT_GT(met, 2000u);
 }
 
-/// Rays at vertices, edges and faces of a mesh where they are at the rays' own times, many of them
-/// along an axis.
+/// Rays to vertices, edges and faces of a mesh at their positions at the time of the ray, many of
+/// them parallel to an axis.
 struct AimedRays {
   std::vector<float> column[8];  ///< origin, direction, tfar, time
 
@@ -361,7 +363,7 @@ struct AimedRays {
 };
 
 TEST(Motion, PacketsMeetWhatRaysAloneDo) {
-  // Shared edges, surfaces that cross, and all that moves in one scene or the other.
+  // Shared edges, intersecting surfaces, and all kinds of motion, in two scenes.
   const size_t n = size_for_build(200000, 20);
   for (const bool instances : {false, true}) {
     SceneBuilder builder;
@@ -390,7 +392,7 @@ TEST(Motion, PacketsMeetWhatRaysAloneDo) {
       if (width > accel.native_width()) continue;
       HitBuffer& h = hits.emplace_back(n);
       auto& occluded = blocked.emplace_back(n + 16);
-      // In pieces, so that packets are made up otherwise.
+      // In chunks, which changes the composition of packets.
       for (size_t first = 0; first < n; first += 16 * width + 5) {
         const size_t m = std::min<size_t>(16 * width + 5, n - first);
         accel.intersect(
@@ -421,7 +423,7 @@ TEST(Motion, BadMotionIsRefused) {
   expect_refused([] {
     SceneBuilder b;
     Mesh mesh = make_mesh(half_plane(0));
-    mesh.steps = 3;  // four points cannot be three times as many
+    mesh.steps = 3;  // four points cannot be split into three steps
     b.add_mesh(mesh);
   });
   expect_refused([] {

@@ -15,7 +15,7 @@ namespace {
 
 using namespace light_testing;
 
-/// Where a light is at the ends of the shutter, which it turns and travels through in between.
+/// Transform of a light that moves and rotates between the shutter ends, at `time`.
 Affine place_at(float time, float size) {
   const auto angle = static_cast<double>(time);
   Affine place = rotate(20 + 8 * angle, -30 + 6 * angle) * scale(size, size, size);
@@ -23,7 +23,8 @@ Affine place_at(float time, float size) {
   return place;
 }
 
-/// One light of each kind, which is where `place_at` says at `time` and moves if it is told to.
+/// Makes one light of each kind, at its transform at `time`; with `moves`, it moves over the
+/// shutter.
 Lights one_of_each(float time, bool moves) {
   Lights lights;
   const uint32_t image = lights.add_texture(4, 2, {1, 0, 0, 0, 1, 0, 0, 0, 1, 3, 3, 3,  //
@@ -55,7 +56,7 @@ TEST(MovingLights, AreAtEachTimeAsIfTheyStoodThere) {
       LightReceiver<float> to(number.point(4));
       to.time = time;
       const float pick = number(), u = number(), v = number();
-      // What is round is sampled about an axis of no meaning.
+      // Round lights are sampled around an arbitrary axis.
       const auto kind = LightKind{
           static_cast<uint8_t>(view.lights[chosen_light<float>(view, to, pick, true)].kind)};
       if (kind != LightKind::kRect && kind != LightKind::kDisk && kind != LightKind::kDome)

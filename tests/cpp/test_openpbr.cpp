@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where OpenPBR is reciprocal, where it is not, by how much and why. Its energy is in
-/// test_openpbr_energy.cpp, the battery of all programs in test_programs.cpp.
+/// Reciprocity of OpenPBR: where it holds, where it does not, by how much and why.
+/// test_openpbr_energy.cpp tests its energy, test_programs.cpp what all programs have in common.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,8 +27,7 @@ P edited(Edit edit) {
   return p;
 }
 
-/// Two directions, each with a density in proportion to its cosine; on either side of what
-/// transmits.
+/// Two directions of cosine-weighted density, on either side for transmissive materials.
 struct Pair {
   Vec o, i;
 };
@@ -47,17 +46,17 @@ void for_pairs(const P& p, int count, Function function) {
   }
 }
 
-/// n^2 on the side of w: f(o, i) n_i^2 = f(i, o) n_o^2 (Veach 1997, eq. 5.14).
+/// Squared index on the side of w: f(o, i) n_i^2 = f(i, o) n_o^2 (Veach 1997, eq. 5.14).
 double index2(const P& p, const Vec& w) {
   const bool solid = p.transmission_weight > 0 && p.thin_walled == 0;
   return solid && w.z < 0 ? double{p.ior} * double{p.ior} : 1;
 }
-/// f n_i^2 towards o.
+/// f n_i^2 for o and i.
 double value(const Bsdf& bsdf, const P& p, const Vec& o, const Vec& i) {
   return double{bsdf.eval(o, i).f_cos.y} / std::abs(double{i.z}) * index2(p, i);
 }
 
-/// Mean of |f(o, i) - f(i, o)| over that of f, both directions weighed by their cosines.
+/// Mean of |f(o, i) - f(i, o)| relative to the mean of f, with cosine weights for both directions.
 double asymmetry(const P& p) {
   const Bsdf bsdf(p, false);
   double difference = 0, sum = 0;
@@ -77,7 +76,8 @@ TEST(OpenPbr, LobesThatAreNotScaledAreReciprocal) {
          p.specular_weight = 0, p.thin_walled = 1, p.subsurface_weight = 0.7f;
          p.subsurface_anisotropy = 0.3f;
        })},
-      // A metal that reflects nothing at normal incidence has nothing to give back.
+      // A metal that reflects nothing at normal incidence gets no compensation for multiple
+      // scattering.
       {"black metal",
        edited([](P& p) { p.metallic = 1, p.roughness = 0.6f, p.base_color = Vec(0.f); })},
       {"black brushed metal", edited([](P& p) {
@@ -97,7 +97,7 @@ TEST(OpenPbr, LobesThatAreNotScaledAreReciprocal) {
   }
 }
 
-/// What the viewer's side alone decides is all that breaks reciprocity.
+/// The scaling by the viewer's side is the only cause of asymmetry.
 TEST(OpenPbr, WithoutTheViewersScaleItIsReciprocal) {
   const auto scales = [](const P& p, const Vec& w) {
     return OpenPbrBase<float>(p).view(Vec(w.x, w.y, std::abs(w.z)), w.z < 0, p.energy);
@@ -136,7 +136,7 @@ TEST(OpenPbr, WithoutTheViewersScaleItIsReciprocal) {
 }
 
 TEST(OpenPbr, LayersAreNotReciprocalByTheFiguresOfItsPage) {
-  // docs/openpbr.md quotes these.
+  // docs/openpbr.md quotes these values.
   struct Row {
     const char* name;
     P params;
@@ -191,7 +191,7 @@ TEST(OpenPbr, LayersAreNotReciprocalByTheFiguresOfItsPage) {
                       {"film on glass 0.2", film(0.2f, 1), 0.0028},
                       {"film on glass 0.5", film(0.5f, 1), 0.067},
                       {"film on glass 1", film(1.f, 1), 0.423}};
-  // Pairs are few where lobes are narrow: a sixth either way, or 0.1 %.
+  // Narrow lobes get few pairs: the tolerance is a sixth, or 0.1 %.
   for (const Row& row : rows)
     EXPECT_NEAR(asymmetry(row.params), row.size, std::max(row.size / 6, 1e-3)) << row.name;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// OpenPBR in a white furnace: what comes back against integrals of the model's own formulas in
-/// double precision (openpbr_integrals.h), channel by channel.
+/// OpenPBR in a white furnace, compared per channel with double-precision integrals of the model's
+/// formulas (openpbr_integrals.h).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -34,14 +34,14 @@ std::vector<float> roughnesses() {
   return {0.f, 0.13f, 0.3f, 0.55f, 0.8f, 1.f};
 }
 
-/// White, with nothing that absorbs.
+/// White parameters without absorption.
 P white() {
   P p = plain_params();
   p.base_color = p.specular_color = p.subsurface_color = Vec(1.f);
   return p;
 }
 
-/// Mean weight of samples, radiance scaling undone.
+/// Mean weight of samples, without radiance scaling.
 Rgb measured(const Bsdf& bsdf, const Vec& wo, uint32_t samples) {
   Rgb sum{0, 0, 0};
   for (uint32_t i = 0; i < samples; ++i) {
@@ -54,15 +54,15 @@ Rgb measured(const Bsdf& bsdf, const Vec& wo, uint32_t samples) {
   return sum;
 }
 
-/// What tables and the sum over samples may be off.
+/// Tolerances for tables and sampling noise.
 struct Bounds {
-  double loss = 0.008, gain = 0.003;  ///< against the prediction
-  double most = 1.002;                ///< whatever the prediction
+  double loss = 0.008, gain = 0.003;  ///< relative to the prediction
+  double most = 1.002;                ///< absolute limit
   std::vector<double> azimuths = {0.3};
   uint32_t samples = is_long() ? 32768 : 8192;
 };
 
-/// Expects what the integrals predict, from both sides where they differ.
+/// Expects the predicted albedo, from both sides if they differ.
 void expect_predicted(const P& p, const std::string& what, const Bounds& bounds = {}) {
   const Bsdf bsdf(p, false);
   const OpenPbrModel model(p);
@@ -80,7 +80,7 @@ void expect_predicted(const P& p, const std::string& what, const Bounds& bounds 
                  << phi << " channel " << k;
             return text.str();
           };
-          // At grazing angles the tables are coarse, most of all inside of rough glass.
+          // At grazing angles the tables are coarse, most of all inside rough glass.
           const double loss = side < 0 && z < 0.2 ? 2 * bounds.loss : bounds.loss;
           const double more = z < 0.05 ? 0.01 : 0;
           EXPECT_GE(found[k], expected[k] - loss) << where();
@@ -210,14 +210,14 @@ TEST(OpenPbrEnergy, CoatedGlass) {
   }
 }
 
-/// Films on glass, metal, a diffuse base, below a coat, and on all together.
+/// Thin films on glass, metal, a diffuse base, below a coat, and on all of them together.
 TEST(OpenPbrEnergy, FilmsGainNothing) {
   struct Kind {
     const char* name;
     float metallic, transmission, wall, coat;
   };
   constexpr float kFilms[3][2] = {{120, 1.25f}, {350, 1.8f}, {900, 1.5f}};
-  uint32_t turn = 0;  // one film for each, unless there is time
+  uint32_t turn = 0;  // one film each, unless in long tests
   for (const Kind& kind :
        {Kind{"film on gloss", 0, 0, 0, 0}, Kind{"film on metal", 1, 0, 0, 0},
         Kind{"film on glass", 0, 1, 0, 0}, Kind{"film on a wall", 0, 1, 1, 0},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tests without a part are skipped, and fail in CI.
+/// Tests with a missing requirement are skipped, and fail in CI.
 #include "parts.h"
 
 #include <gtest/gtest-spi.h>
@@ -8,7 +8,7 @@
 namespace wavecomb {
 namespace {
 
-/// Sets an environment variable, or removes it, until the end of the scope.
+/// Sets or removes an environment variable for the duration of a scope.
 class Variable {
  public:
   Variable(const char* name, const char* value) : name_(name) {

@@ -96,7 +96,7 @@ TEST(PassPlan, TimedPassesReachEveryCheck) {
   }
 }
 
-/// A plan as pixel -> (first sample, samples), each pixel once.
+/// Converts a plan to pixel -> (first sample, samples), and expects each pixel once.
 std::map<uint32_t, std::pair<uint32_t, uint32_t>> by_pixel(const PassPlan& plan) {
   std::map<uint32_t, std::pair<uint32_t, uint32_t>> out;
   for (const PassBatch& b : plan.batches)
@@ -115,7 +115,7 @@ TEST(PassPlan, AllPixelsInMortonOrder) {
 
 TEST(PassPlan, TakesActivePixelsBelowTheTarget) {
   const std::vector<uint32_t> order = morton_pixel_order({0, 0, 3, 2});
-  //                                      a pass that was cut, and one pixel that was left at 16
+  //                                       an interrupted pass, and one pixel left at 16
   const std::vector<uint32_t> samples = {32, 48, 64, 16, 64, 32};
   const std::vector<uint8_t> active = {1, 1, 1, 1, 0, 0};
   const auto plan =

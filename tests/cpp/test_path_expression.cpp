@@ -14,10 +14,10 @@ namespace wavecomb {
 namespace {
 
 const std::vector<std::string> kKeys{"other", "key"};
-/// A letter for each event, and for each end by key: lights, domes, objects, volumes.
+/// A letter for each event, and for each path end with a key: lights, domes, objects, volumes.
 constexpr std::string_view kEventLetters = "abcdefvw", kEndLetters = "lgoeLGOE";
 
-/// An expression, and the same as a regular expression over those letters.
+/// A path expression and the equivalent regular expression over those letters.
 struct Pair {
   const char *expression, *regex;
 };
@@ -38,7 +38,7 @@ constexpr Pair kPairs[] = {
     {"C < T D > . *", "d.*"},
 };
 
-/// Where the automaton is after some events.
+/// State of the automaton after some events.
 uint32_t state_after(const PathAutomaton& a, const std::vector<uint32_t>& events) {
   uint32_t state = 0;
   for (const uint32_t e : events) state = a.next[state * PathAutomaton::kNextWords + e];
@@ -89,7 +89,7 @@ TEST(PathExpression, IsTheLeastAutomaton) {
     return PathAutomaton(std::vector<NamedExpression>{{"a", text}}, kKeys).states();
   };
   EXPECT_EQ(states("C.*"), 1u);
-  EXPECT_EQ(states("C[LO]"), 2u);  // and where nothing can match any more
+  EXPECT_EQ(states("C[LO]"), 2u);  // including the state where nothing can match any more
   EXPECT_EQ(states("C(.|.)*.*(D*.*)*"), 1u);
   EXPECT_EQ(states("C<RD>.*[LO]"), 3u);
 }
@@ -121,7 +121,7 @@ TEST(PathExpression, ErrorsNameThePlace) {
   EXPECT_NE(message_of("a b", "C.*").find("letters, digits and underscores"), std::string::npos);
   EXPECT_NE(message_of("a", "CsL").find("straight"), std::string::npos);
   EXPECT_NE(message_of("a", std::string(200, '(')).find("nested too deep"), std::string::npos);
-  EXPECT_EQ(message_of("a", "C.*<L.'nobody'>"), "");  // groups are known with the scene
+  EXPECT_EQ(message_of("a", "C.*<L.'nobody'>"), "");  // group names are resolved with the scene
   EXPECT_THROW(PathAutomaton(std::vector<NamedExpression>{{"a", "C.*<L.'nobody'>"}}, kKeys), Error);
   EXPECT_THROW(check_expressions(std::vector<NamedExpression>{{"a", "C.*"}, {"a", "CL"}}), Error);
 }
@@ -131,8 +131,8 @@ TEST(PathExpression, TooMuchIsRefused) {
   EXPECT_THROW(PathAutomaton(wide, kKeys), Error);
 }
 
-/// From the end a path is read to any vertex, from the camera to the same: it matches what it does
-/// when the camera reads it all.
+/// A path is read backwards from its end to some vertex, and forwards from the camera to the same
+/// vertex. The combination matches exactly if the forward automaton matches the whole path.
 TEST(BackwardAutomaton, MeetsTheForwardOneAnywhere) {
   std::vector<NamedExpression> all;
   for (const Pair& pair : kPairs)
@@ -159,8 +159,7 @@ TEST(BackwardAutomaton, MeetsTheForwardOneAnywhere) {
   }
 }
 
-/// Which of the last eleven events that were read are diffuse: 2^11 states from the light, few from
-/// the camera.
+/// Which of the last eleven events were diffuse: 2^11 states backwards, few states forwards.
 TEST(BackwardAutomaton, RefusesWhatIsTooMuch) {
   const PathAutomaton forward(std::vector<NamedExpression>{{"a", "C.{10}D.*[LO]"}}, kKeys);
   EXPECT_LT(forward.states(), 20u);

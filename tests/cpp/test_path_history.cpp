@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Paths that keep their vertices, read as one would who learns where light comes from.
+// Path histories: vertices of finished paths, read as guiding does to learn incident light.
 #include <map>
 #include <mutex>
 
@@ -12,8 +12,8 @@ namespace {
 using namespace scene_testing;
 using namespace wave_testing;
 
-/// Sums, by cell of space and octant of direction, of the light that came back along bounces,
-/// L_j = (R_end - R_j) / T_j, in integers.
+/// Sums of the radiance returned along bounces, L_j = (R_end - R_j) / T_j, by spatial cell and
+/// octant of direction, in integers.
 class LightField final : public HistoryReader {
  public:
   using Key = std::array<int, 4>;
@@ -33,7 +33,7 @@ class LightField final : public HistoryReader {
     }
   }
   const std::map<Key, Sums>& sums() const { return sums_; }
-  /// Over all bounces, and of vertices.
+  /// Sums over all cells.
   Sums total() const {
     Sums all;
     for (const auto& [key, s] : sums_) {
@@ -93,12 +93,12 @@ TEST(PathHistory, IsOneForAllSchedules) {
           EXPECT_TRUE(field->sums() == expected->sums())
               << lanes << " lanes, waves of " << wave_size << ", policy " << policy;
         }
-    // The first vertices are the same where fewer are kept.
+    // The first vertices are the same if fewer are kept.
     EXPECT_LT(field_of({s}, 64, 1)->total().vertices, total.vertices);
   }
 }
 
-/// Nothing else is changed by it, and without it nothing is kept.
+/// Histories do not change the image, and without a reader none are stored.
 TEST(PathHistory, ChangesNoPicture) {
   const ScenePtr scene = mixed();
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 1u);
@@ -116,7 +116,7 @@ TEST(PathHistory, ChangesNoPicture) {
   }
 }
 
-/// Checks vertex by vertex.
+/// Checks each vertex.
 class Furnace final : public HistoryReader {
  public:
   static constexpr uint32_t kMost = 3;
@@ -138,9 +138,10 @@ class Furnace final : public HistoryReader {
   std::vector<double> light[kMost];
 };
 
-/// A point light in the middle of a sphere that reflects half: what comes back along a bounce is
-///   L = rho / pi I / R^2 / (1 - rho)
-/// from every vertex.
+/// A point light at the centre of a sphere of reflectance 1/2: the radiance returned along a bounce
+/// is
+///    L = rho / pi I / R^2 / (1 - rho)
+/// at every vertex.
 TEST(PathHistory, FindsTheLightThatBouncesMeet) {
   SceneBuilder b;
   const uint32_t wall = b.add_material(make_material(ProgramId::kDiffuse));

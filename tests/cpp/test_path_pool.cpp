@@ -14,7 +14,7 @@ using namespace lane_testing;
 
 constexpr uint32_t kSlots = 53;
 
-/// Number of word k of a path in `slot` that no other word has.
+/// Unique value for word k of the path in `slot`.
 float word(uint32_t slot, uint32_t k) {
   return static_cast<float>(100 * slot + k + 1);
 }
@@ -28,19 +28,19 @@ PathRow<F> numbered_path(const UInt<F>& slot) {
           at(10),
           at(11),
           at(12),
-          // Any bits, NaN too: keys are hashes.
+          // Arbitrary bits including NaN: keys are hashes.
           {slot * 100u + 0x7f800001u, slot * 100u + 0xff800001u},
           slot * 100u + 0x7fc00001u};
 }
 
-/// All slots in random order, `kWidth` at a time, each packet with a mask of its own.
+/// Visits all slots in random order, `kWidth` at a time, with a random mask per packet.
 template <typename F, typename Function>
 void for_each_packet_of_slots(uint32_t seed, const Function& f) {
   std::mt19937 rng(seed);
   std::vector<uint32_t> slots(kSlots);
   std::iota(slots.begin(), slots.end(), 0u);
   std::shuffle(slots.begin(), slots.end(), rng);
-  slots.resize(kSlots + 16, 0x7fffff00u / 16);  // inactive lanes point nowhere
+  slots.resize(kSlots + 16, 0x7fffff00u / 16);  // inactive lanes have invalid indices
   for (size_t i = 0; i < kSlots; i += kWidth<F>)
     f(load<UInt<F>>(slots.data() + i), first_lanes<F>(kSlots - i));
 }
@@ -59,7 +59,7 @@ TEST(PathPool, PathsComeBackFromTheirSlots) {
       ASSERT_EQ(std::bit_cast<uint32_t>(row[14]), 100 * s + 0xff800001u);
       ASSERT_EQ(std::bit_cast<uint32_t>(row[15]), 100 * s + 0x7fc00001u);
     }
-    // Shadow rays and radiance are untouched.
+    // Shadow rays and radiance are unchanged.
     ASSERT_TRUE(std::all_of(pool.shadows, pool.radiance + kSlots * kRadianceWords,
                             [](float x) { return x == 0; }));
     for_each_packet_of_slots<F>(2, [&](const U& slot, const Mask<F>& active) {
@@ -88,7 +88,7 @@ TEST(PathPool, RadianceAddsUpInActiveLanesOnly) {
     std::vector<std::array<float, 3>> expected(kSlots, {0, 0, 0});
     for (uint32_t round = 0; round < 3; ++round)
       for_each_packet_of_slots<F>(round, [&](const U& slot, const Mask<F>& active) {
-        // Every third slot sits one round out.
+        // Every third slot is skipped in each round.
         const Mask<F> lit = active & Mask<F>((slot + round) % 3u != U(0u));
         const F x = F(Int<F>(slot)) + 0.125f;
         add_radiance<F>(pool.radiance, slot, {x, F(2.f * x), F(3.f * x)}, lit);
@@ -111,12 +111,12 @@ TEST(PathPool, BlocksOfRows) {
   ASSERT_NE(cold.cold, nullptr);
   EXPECT_LT(plain.bytes(), cold.bytes());
   EXPECT_GE(plain.bytes(), 400u * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords));
-  // Paths and shadow rays are cache lines.
+  // Paths and shadow rays are aligned to cache lines.
   EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.paths) % 64, 0u);
   EXPECT_EQ(reinterpret_cast<uintptr_t>(plain.shadows) % 64, 0u);
   EXPECT_EQ(plain.shadows - plain.paths, 100 * ptrdiff_t{kRowWords<PathRow>});
   EXPECT_EQ(plain.radiance - plain.shadows, 100 * ptrdiff_t{kRowWords<ShadowRow>});
-  // What nobody asks for takes nothing: a path, its shadow ray and its radiance are 144 bytes.
+  // Unused features take no memory: a path, its shadow ray and its radiance take 144 bytes.
   EXPECT_LE(plain.bytes(), 100u * 144 + 4 * (SoaBlock::kPad + 32));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rects that are sampled by their picture: chi-square in the picture from several points, both
-/// halves of MIS, irradiance by numeric integration, and what the picture is worth.
+/// Rects that are sampled by their texture: chi-square over the texture from several points, both
+/// techniques of MIS, irradiance by numerical integration, and the reduction of noise.
 #include <gtest/gtest.h>
 
 #include "light_charts.h"
@@ -12,14 +12,14 @@ using namespace light_testing;
 
 constexpr uint32_t kTexelsX = 12, kTexelsY = 8;
 
-/// A few bright texels on a dim ground.
+/// A few bright texels on a dim background.
 std::vector<float> spots() {
   std::vector<float> rgb(size_t{kTexelsX} * kTexelsY * 3, 0.02f);
   for (const uint32_t texel : {2 * kTexelsX + 3, 5 * kTexelsX + 9, 5 * kTexelsX + 8})
     for (uint32_t c = 0; c < 3; ++c) rgb[texel * 3 + c] = 40;
   return rgb;
 }
-/// Half of it black, colours in the rest.
+/// Half of the image is black, the rest coloured.
 std::vector<float> half_dark() {
   std::vector<float> rgb;
   std::mt19937 rng(3);
@@ -59,8 +59,8 @@ Lights make_rect(const Place& place, const std::vector<float>& rgb) {
   return lights;
 }
 
-/// Where on the rect a direction goes, as shares of its edges, and the square of the distance over
-/// the area and the cosine: what an area's density is to a solid angle's.
+/// Where a direction hits the rect, as fractions of its edges, and the squared distance over area
+/// and cosine, which converts area density to solid angle density.
 struct OnRect {
   double a, b, distance2, measure;
 };
@@ -75,7 +75,7 @@ OnRect on_rect(const LightRecord& r, const Vec3<float>& from, double a, double b
   return {a, b, d2, cosine * r.area / d2};
 }
 
-/// The density that paths see of a point of the rect.
+/// Density that paths see when they hit a point of the rect.
 double hit_density(const LightView& view, const Vec3<float>& from, double a, double b,
                    Color<float>* radiance = nullptr) {
   const LightRecord& r = view.lights[0];
@@ -118,7 +118,7 @@ TEST(PicturedRect, BothTechniquesSeeOneDensityAndOneRadiance) {
       ASSERT_TRUE(s.valid) << place.name;
       const auto t = trace(view, place.from, s.wi);
       const auto hit = light_hit<float>(view, 0u, place.from, s.wi, t.value_or(s.distance), true);
-      // Rounding may carry a direction over an edge of the rect or of a cell.
+      // Rounding may move a direction across an edge of the rect or of a cell.
       const float most = 1e-3f * s.weight.y * s.pdf + 1e-5f;
       const bool same = t && std::fabs(hit.pdf / s.pdf - 1) < 1e-3f &&
                         std::fabs(hit.radiance.y - s.weight.y * s.pdf) < most * 20;
@@ -128,7 +128,7 @@ TEST(PicturedRect, BothTechniquesSeeOneDensityAndOneRadiance) {
   }
 }
 
-/// Mean and variance of the estimator of irradiance on a surface that faces the rect's middle.
+/// Mean and variance of the irradiance estimate on a surface that faces the centre of the rect.
 struct Estimate {
   double mean, variance;
 };
@@ -168,7 +168,8 @@ TEST(PicturedRect, IrradianceIsThatOfItsPicture) {
           const OnRect at = on_rect(r, place.from, a, b);
           Color<float> radiance(0.f);
           hit_density(view, place.from, a, b, &radiance);
-          // cos d^2 = measure d^4 / A: the receiver faces the rect, so both cosines are one.
+          // cos d^2 = measure d^4 / A: the receiver is parallel to the rect, so both cosines are
+          // equal.
           const double cosine = at.measure * at.distance2 / static_cast<double>(r.area);
           exact += static_cast<double>(radiance.y) * cosine * at.measure / kN / kN;
         }
@@ -191,7 +192,7 @@ TEST(PicturedRect, ThePictureTakesNoiseAway) {
                      std::to_string(gain));
       std::printf("%s, %s: %.2f times less variance\n", bright ? "spots" : "noise", place.name,
                   gain);
-      // Few bright spots: much less noise; an unquiet picture: never much more.
+      // A few bright spots: much less noise. A noisy image: never much more.
       EXPECT_GT(gain, bright ? 5 : 0.7) << place.name << (bright ? ", spots" : ", noise");
     }
 }
@@ -217,7 +218,7 @@ TEST(PicturedRect, EvenAndBlackPictures) {
 }
 
 TEST(PicturedRect, DensityIsPositiveWhereverThePictureIs) {
-  // One texel in large images, in the middle and in corners, with each way to wrap.
+  // A single bright texel in large images, in the middle and in corners, with each wrap mode.
   for (const Wrap wrap : {Wrap::kClamp, Wrap::kRepeat})
     for (const auto& [w, h] : {std::pair{1u, 1u}, {3u, 2u}, {1500u, 1200u}})
       for (const size_t lit : {size_t{0}, size_t{w} * h / 2, size_t{w} * h - 1}) {
@@ -227,7 +228,7 @@ TEST(PicturedRect, DensityIsPositiveWhereverThePictureIs) {
         Light light = make_light(LightKind::kRect, kPlaces[1].rect);
         light.texture = lights.add_texture(w, h, rgb, wrap);
         lights.build({light});
-        if (w * h == 1) continue;  // even
+        if (w * h == 1) continue;  // constant image
         const Distribution2D& d = lights.set.distributions.at(0);
         EXPECT_LE(d.width, 1024u);
         EXPECT_LE(d.height, 1024u);

@@ -21,7 +21,7 @@ namespace {
 
 using Order = std::vector<uint32_t>;
 
-/// Records with every column a policy may ask for, and what is known of their materials.
+/// Records with every column that a policy may use, and the properties of their materials.
 struct Records {
   std::vector<uint32_t> program, material, position_key, texture_key;
   std::vector<float> throughput, scratch;
@@ -37,9 +37,9 @@ struct Records {
     position_key.push_back(position);
     texture_key.push_back(texture);
   }
-  /// Only the columns that the policy names, as in a render.
+  /// Only the columns that the policy declares, as in a render.
   ShadingQueueView view(uint32_t columns) {
-    scratch.assign(traits.size(), -1.f);  // whatever was left there
+    scratch.assign(traits.size(), -1.f);  // stale data
     ShadingQueueView v;
     v.program = program;
     v.material = material;
@@ -53,7 +53,7 @@ struct Records {
   }
 };
 
-/// The order in which the policy has the records shaded.
+/// Returns the order in which the policy shades the records.
 Order order_of(std::string_view name, Records& records) {
   const auto policy = make_policy(name);
   const size_t n = records.size();
@@ -101,7 +101,7 @@ TEST(Policies, ProgramGroupsPrograms) {
 
 TEST(Policies, CodeGroupsProgramsAndMaterialsThatVary) {
   Records r = by_hand();
-  // Program 0: constant, then materials 1 and 2, which have textures; program 1: all constant.
+  // Program 0: constants first, then materials 1 and 2 with textures; program 1: all constants.
   EXPECT_EQ(order_of("code", r), (Order{4, 1, 5, 2, 6, 0, 3, 7}));
   r.traits[3].graph = 7;
   EXPECT_EQ(order_of("code", r), (Order{4, 1, 5, 2, 6, 0, 7, 3}));
@@ -111,7 +111,7 @@ TEST(Policies, CodeGroupsProgramsAndMaterialsThatVary) {
 
 TEST(Policies, MaterialIsTypeThenCost) {
   Records r = by_hand();
-  // Program 0: 20 ns (materials 2 and 4, apart), 80 ns; program 1: 10 ns, 50 ns.
+  // Program 0: 20 ns (materials 2 and 4, separately), 80 ns; program 1: 10 ns, 50 ns.
   EXPECT_EQ(order_of("material", r), (Order{2, 6, 4, 1, 5, 3, 0, 7}));
   r.costs.material_ns = {5, 1, 2, 10, 3};
   EXPECT_EQ(order_of("material", r), (Order{1, 5, 2, 6, 4, 0, 7, 3}));
@@ -119,11 +119,11 @@ TEST(Policies, MaterialIsTypeThenCost) {
 
 TEST(Policies, TextureIsTypeThenMemory) {
   Records r = by_hand();
-  // Program 0: no texture, 1000 bytes, 4000 bytes; program 1 has none: arrival.
+  // Program 0: no texture, 1000 bytes, 4000 bytes; program 1 has none: order of arrival.
   EXPECT_EQ(order_of("texture", r), (Order{4, 2, 6, 1, 5, 0, 3, 7}));
   r.costs.material_ns = {1, 9, 3, 7, 5};
   EXPECT_EQ(order_of("texture", r), (Order{4, 2, 6, 1, 5, 0, 3, 7})) << "costs do not matter";
-  r.traits[1].texture_bytes = uint64_t{1} << 60;  // larger than the key's 56 bits
+  r.traits[1].texture_bytes = uint64_t{1} << 60;  // exceeds the 56 bits of the key
   EXPECT_EQ(order_of("texture", r), (Order{4, 2, 6, 1, 5, 0, 3, 7}));
 }
 
@@ -134,12 +134,12 @@ TEST(Policies, TextureLocalityIsMaterialThenTexels) {
 
 TEST(Policies, CostBenefitIsTypeThenScoreThenPlace) {
   Records r = by_hand();
-  // Scores: 1.5 / 50 = 0.03, 1 / (80 + 20) = 0.01, 0.5 / (20 + 5) = 0.02, 1 / 10 = 0.1 and
-  // 0.1 / 20 = 0.005; within a material by the Morton code of the hit.
+  // Scores: 1.5 / 50 = 0.03, 1 / (80 + 20) = 0.01, 0.5 / (20 + 5) = 0.02, 1 / 10 = 0.1 and 0.1 / 20
+  // = 0.005. Within a material, records are ordered by the Morton code of the hit.
   EXPECT_EQ(order_of("cost-benefit", r), (Order{2, 6, 5, 1, 4, 3, 7, 0}));
   r.costs.texture_ns[1] = 100;  // 0.5 / 120 < 0.005
   EXPECT_EQ(order_of("cost-benefit", r), (Order{5, 1, 4, 2, 6, 3, 7, 0}));
-  r.costs.material_ns.assign(5, 0.f);  // nothing known
+  r.costs.material_ns.assign(5, 0.f);  // unknown costs
   EXPECT_NO_FATAL_FAILURE(order_of("cost-benefit", r));
 }
 
@@ -184,12 +184,11 @@ TEST(Policies, AscendingBitsAscend) {
         << values[i];
 }
 
-// ---- against a naive model
-// -----------------------------------------------------------------------
+// ---- comparison with a naive model --------------------------------------------------------------
 
 using Key = std::tuple<uint64_t, uint64_t, uint64_t, uint64_t>;
 
-/// Keys of the table, written out plainly.
+/// Keys of the table in docs/scheduling.md, written without optimisation.
 std::map<std::string, std::vector<Key>> naive_keys(const Records& r) {
   std::vector<float> score(r.traits.size());
   for (size_t i = 0; i < r.size(); ++i) score[r.material[i]] += r.throughput[i];
@@ -247,7 +246,7 @@ TEST(Policies, EqualAStableSortOfTheTable) {
 
 TEST(Policies, BatchesCoverTheQueueOnce) {
   for (const std::string& name : policy_names()) {
-    if (name == "adaptive") continue;  // chooses among the others
+    if (name == "adaptive") continue;  // selects among the other policies
     for (const size_t n : kSizes) {
       for (const bool materialize : {false, true}) {
         Records r = random_records(n, 7);
@@ -288,7 +287,7 @@ TEST(Policies, BatchesCoverTheQueueOnce) {
           ++batches;
         }
         EXPECT_EQ(times, std::vector<uint32_t>(n, 1)) << name << ", " << n;
-        // Five programs, so at most five batches end short where programs are together.
+        // Five programs: at most five batches are not full if programs are grouped.
         if (name != "none") {
           EXPECT_LE(batches, n / kMaxBatch + 5) << name << ", " << n;
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Every program's samples follow the density that eval states, and so do those of cosine_sampling.
+/// Samples of every program, with and without cosine_sampling, follow the density of eval.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +19,7 @@ using chi_square::Place;
 using chi_square::Random;
 using Vec = Vec3<float>;
 
-/// Whether a sample's weight and density are what eval says of its direction. Narrow lobes amplify
-/// the rounding of wi.
+/// Whether weight and density of a sample agree with eval. Narrow lobes amplify rounding of wi.
 bool agrees(const BsdfSample<float>& s, const BsdfEval<float>& e) {
   const auto near = [&](float weight, float f_cos) {
     return std::abs(weight * s.pdf - f_cos) <= 5e-3f * f_cos + 1e-5f * s.pdf;
@@ -29,13 +28,13 @@ bool agrees(const BsdfSample<float>& s, const BsdfEval<float>& e) {
          near(s.weight.y, e.f_cos.y) && near(s.weight.z, e.f_cos.z);
 }
 
-/// Delta lobes are atoms; two are told apart by side, weight and probability.
+/// Delta lobes are atoms, distinguished by side, weight and probability.
 template <typename Bsdf>
 chi_square::Case sampling_case(std::string name, const Bsdf& bsdf, const Vec& wo) {
   chi_square::Case c;
   c.name = std::move(name) + ", z " + std::to_string(wo.z).substr(0, 5);
   c.charts = bsdf_testing::direction_charts();
-  // Refraction ends along a line, where rules over large boxes err by 0.4 %.
+  // The density of refraction ends along a curve, where rules over large boxes err by 0.4 %.
   if (Bsdf::kTransmits && is_long()) c.boxes = 60;
   c.density = [&bsdf, wo](const Place& p) {
     return static_cast<double>(bsdf.eval(wo, bsdf_testing::direction_at(p)).pdf);
@@ -53,8 +52,8 @@ chi_square::Case sampling_case(std::string name, const Bsdf& bsdf, const Vec& wo
   return c;
 }
 
-/// Roughnesses, each with the cosines from which it is seen. 0.03 is smooth, and 0.032 is the
-/// narrowest lobe that is not.
+/// Roughnesses with the cosines at which they are viewed. 0.03 counts as smooth, and 0.032 is the
+/// narrowest rough lobe.
 struct Seen {
   float roughness;
   std::vector<double> cosines;
@@ -65,7 +64,7 @@ std::vector<Seen> roughnesses() {
   return {{0.03f, all}, {0.032f, all}, {0.1f, all}, {0.3f, all}, {1.f, all}};
 }
 
-/// Calls f(case, cosines). What has no roughness is taken once.
+/// Calls f(case, cosines), once for materials without a roughness.
 template <typename Function>
 void for_each_case(const Function& f) {
   for (const Row& row : table()) {
@@ -77,7 +76,7 @@ void for_each_case(const Function& f) {
   }
 }
 
-/// In parts, which may run at once.
+/// Split into tests that can run in parallel.
 template <typename Wanted>
 void expect_follow(const char* name, size_t least, const Wanted& wanted) {
   Battery battery(name);
@@ -112,7 +111,7 @@ TEST(ProgramSamples, OfOpenPbrThatTransmitsFollowTheirDensity) {
                 [](const Case& c) { return c.program == ProgramId::kOpenPbr && !c.two_sided(); });
 }
 
-/// A program whose bounces are sampled as the setting cosine_sampling says.
+/// A program with bounces sampled by the setting cosine_sampling.
 template <typename Bsdf>
 struct ByCosine {
   static constexpr bool kTransmits = false;
@@ -123,7 +122,7 @@ struct ByCosine {
     return ShadeSettings(s);
   }();
 
-  /// What of a vertex says so.
+  /// Replaces the vertex, which enables the setting.
   static constexpr bool has(Feature /*feature*/) { return true; }
 
   BsdfEval<float> eval(const Vec& wo, const Vec& wi) const {

@@ -37,8 +37,8 @@ TEST(Programs, TableFindsEachProgram) {
 }
 
 TEST(Programs, DeltaLobesAreChosenAsOftenAsStated) {
-  // What cosine_sampling weighs all other lobes by. Numbers are stratified: the share errs by a
-  // stratum for each lobe.
+  // cosine_sampling scales the density of other lobes by 1 - delta_probability. Sample values are
+  // stratified, so the error is one stratum per lobe.
   for (const Case& c : usual_cases())
     with_bsdf(c, [&](const auto& bsdf) {
       for (const Vec& wo : views(c)) {
@@ -100,7 +100,7 @@ TEST(Programs, DiffusePartIsOfTheWhole) {
           rest += whole.x - part.x;
         }
       if (c.program != ProgramId::kOpenPbr) return;
-      // Metal and glass have no diffuse part, EON without a specular lobe has no other.
+      // Metal and glass have no diffuse part; EON without a specular lobe has only a diffuse part.
       const P& p = c.params;
       const bool opaque = p.metallic < 1 && p.transmission_weight < 1;
       EXPECT_EQ(diffuse > 0, opaque) << c.name;
@@ -126,7 +126,7 @@ TEST(Programs, ReciprocityHolds) {
         const auto a = bsdf.eval(wo, wi), b = bsdf.eval(wi, wo);
         const double x = a.f_cos.x / std::abs(wi.z) * std::pow(index(wi), 2);
         const double y = b.f_cos.x / std::abs(wo.z) * std::pow(index(wo), 2);
-        // The absolute part is for 1 - F near the critical angle, where its slope is infinite.
+        // The absolute tolerance is for 1 - F near the critical angle, where its slope is infinite.
         EXPECT_NEAR(x, y, 2e-3 * std::max(x, y) + 1e-5) << c.name << " " << wo.z << " " << wi.z;
         compared += x > 0;
       }
@@ -182,7 +182,7 @@ TEST(Programs, LosslessMaterialsPassTheWhiteFurnace) {
 }
 
 TEST(Programs, MultipleScatteringKeepsTheEnergyOfMetals) {
-  // The fit is within 2 % (see LostEnergy).
+  // The fit is accurate to 2 % (see LostEnergy).
   for (float alpha : {0.1f, 0.2f, 0.3f, 0.5f, 0.7f, 1.f})
     for (const ProgramId id : {ProgramId::kMetal, ProgramId::kPrincipled}) {
       const Case c = make_case("white metal", id, [&](P& p) {
@@ -197,7 +197,7 @@ TEST(Programs, MultipleScatteringKeepsTheEnergyOfMetals) {
     }
 }
 
-/// The values of one sample and one evaluation, as bits.
+/// Bits of one sample and one evaluation.
 template <typename Bsdf, typename F>
 void record_bits(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi, const F& l, const F& u,
                  const F& v, float* out) {
@@ -230,7 +230,7 @@ void record_bits(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi, const F
 }
 constexpr size_t kRecorded = 19;
 
-/// One random input of every kind, some at the edges.
+/// Random inputs of every kind, some at the ends of their range.
 struct Inputs {
   OpenPbrParams<float> params;
   Vec wo, wi;
@@ -379,7 +379,7 @@ TEST(Programs, PacketEqualsScalarBitForBit) {
   }
 }
 
-/// `p` as a material that shows these parts only.
+/// Returns `p` with only these features.
 P with_parts(P p, ProgramId program, uint32_t parts) {
   const auto lacks = [parts](Part part) { return (parts & part) == 0; };
   if (lacks(kMetals)) {
@@ -400,7 +400,7 @@ P with_parts(P p, ProgramId program, uint32_t parts) {
 template <uint32_t kVariant>
 void expect_variant_equals_program() {
   constexpr ProgramId kId = program_of(kVariant);
-  if constexpr (kVariant >= kProgramCount) {  // or it is the program
+  if constexpr (kVariant >= kProgramCount) {  // variants, or the full program
     using Full = Program<kId, float>;
     using Least = VariantBsdf<kVariant, float>;
     std::mt19937 rng(500 + kVariant);
@@ -443,7 +443,8 @@ TEST(Programs, NoInputGivesNonsense) {
                             << in.params.roughness << " ior " << in.params.ior;
         }
         ASSERT_NEAR(length(s.wi), 1.f, 1e-4f) << kProgramNames[id];
-        // Single-lobe weights are bounded by 1 / eta^2, mixed ones by 1 / least lobe probability.
+        // Weights of single lobes are bounded by 1 / eta^2, those of mixtures by 1 / minimum lobe
+        // probability.
         ASSERT_LE(max_component(s.weight) * s.eta * s.eta, 120.f) << kProgramNames[id];
         ASSERT_TRUE(s.pdf > 0 || is_black(s.weight)) << kProgramNames[id];
       });

@@ -12,7 +12,7 @@
 namespace wavecomb {
 namespace {
 
-/// Expects that sort() equals std::stable_sort for these keys.
+/// Expects sort() to equal std::stable_sort for these keys.
 void expect_sorted(const std::vector<uint64_t>& keys, RadixSorter& sorter, const char* what) {
   const size_t n = keys.size();
   std::copy(keys.begin(), keys.end(), sorter.keys());
@@ -75,7 +75,7 @@ TEST(RadixSort, SortsFewerThanItCanHold) {
   }
 }
 
-/// A queue with all columns, as if of 12 materials with 6 programs and 4 textures.
+/// A queue with all columns, for 12 materials with 6 programs and 4 textures.
 struct Queue {
   std::vector<uint32_t> program, material, position_key, texture_key;
   std::vector<float> throughput, scratch = std::vector<float>(12);
@@ -115,7 +115,7 @@ TEST(Policies, GiveStablePermutations) {
   Queue queue(3000);
   RadixSorter sorter(3000);
   for (const std::string& name : policy_names()) {
-    if (name == "adaptive") continue;  // chooses among the others
+    if (name == "adaptive") continue;  // selects among the other policies
     const auto policy = make_policy(name);
     EXPECT_EQ(policy->name(), name);
     for (const size_t n : {0u, 1u, 7u, 3000u}) {
@@ -123,7 +123,7 @@ TEST(Policies, GiveStablePermutations) {
       EXPECT_EQ(view.size(), n);
       if (!policy->order(view, queue.costs, {sorter.keys(), n})) continue;
       const std::vector<uint64_t> keys(sorter.keys(), sorter.keys() + n);
-      // Pure: the same queue gets the same keys.
+      // Policies are pure: the same queue gets the same keys.
       ASSERT_TRUE(policy->order(view, queue.costs, {sorter.keys(), n}));
       EXPECT_TRUE(std::equal(keys.begin(), keys.end(), sorter.keys())) << name;
       std::vector<uint32_t> order(n);

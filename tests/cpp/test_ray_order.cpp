@@ -15,7 +15,7 @@
 namespace wavecomb {
 namespace {
 
-/// Coordinates of a cell of the 1024^3 grid from its Morton code, bit by bit.
+/// Decodes a Morton code to a cell of the 1024^3 grid, bit by bit.
 std::array<uint32_t, 3> cell_of(uint32_t code) {
   std::array<uint32_t, 3> cell{};
   for (uint32_t bit = 0; bit < 30; ++bit) cell[bit % 3] |= (code >> bit & 1u) << (bit / 3);
@@ -31,7 +31,7 @@ struct Ray {
   float o[3], d[3];
 };
 
-/// Rays in slots of a pool, none side by side, listed in random order.
+/// Rays in random, non-adjacent slots of a pool.
 struct PoolRays {
   PathPool pool;
   std::vector<uint32_t> slot;
@@ -66,7 +66,7 @@ struct PoolRays {
   }
 };
 
-/// Rays from points spread over the box and beyond it.
+/// Rays from points inside and outside the box.
 std::vector<Ray> random_rays(size_t n) {
   std::vector<Ray> rays(n);
   std::mt19937 rng(3);
@@ -131,7 +131,7 @@ TEST(RayOrder, DirectionKeysAreOctantAndLongAxes) {
       }
     }
   });
-  // Both keys fit beside the outcome of shading.
+  // Both keys fit next to the outcome of shading.
   static_assert(kDirectionKeys <=
                 1u << (ShadingQueue::kShadowKeyShift - ShadingQueue::kRayKeyShift));
   static_assert(ShadingQueue::kRayKeyShift >= 2 && ShadingQueue::kShadowKeyShift <= 26);
@@ -201,12 +201,12 @@ TEST(RayOrder, SortByDirectionEqualsStableSort) {
       std::stable_sort(pairs.begin(), pairs.end(),
                        [](const auto& a, const auto& b) { return a.first < b.first; });
       for (const auto& pair : pairs) expected.push_back(pair.second);
-      expected.push_back(77u);  // nothing behind the last
+      expected.push_back(77u);  // nothing is written past the last entry
       EXPECT_EQ(sorted, expected) << n << " rays, " << keys << " keys";
     }
 }
 
-/// A wave by itself, without a scene: enough to order rays and to fetch them.
+/// A wave without a scene, sufficient to order and fetch rays.
 struct BareWave {
   Settings settings;
   Film film{1, 1, {AovSet{0}}};
@@ -224,7 +224,7 @@ struct BareWave {
   }
 };
 
-/// Writes a shadow ray to its row: ten words.
+/// Writes a shadow ray to its row of ten 32-bit words.
 void store_shadow(const PathPool& pool, uint32_t slot, const Ray& r, float first) {
   float* row = pool.shadows + slot * kRowWords<ShadowRow>;
   std::copy_n(r.o, 3, row);
@@ -269,7 +269,7 @@ TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
             done = static_cast<RayOrder>(choice.arm);
             ASSERT_LT(choice.arm, Wave::kRayOrders);
           }
-          if (n <= kWidth<F>) done = RayOrder::kSlot;  // a packet is not ordered
+          if (n <= kWidth<F>) done = RayOrder::kSlot;  // a single packet is not ordered
           std::vector<uint64_t> keys(n, 0);
           if (done == RayOrder::kDirection)
             std::copy(key.begin(), key.end(), keys.begin());
@@ -280,7 +280,7 @@ TEST(RayOrder, QueuesAreOrderedStablyAndFetchedFromTheirSlots) {
             return keys[ray_of[a]] < keys[ray_of[b]];
           });
           EXPECT_EQ(std::vector<uint32_t>(queue.slot, queue.slot + n), expected);
-          // Each entry has its own slot's ray, whatever the order.
+          // Each entry has the ray of its slot, in any order.
           const float* const columns[] = {queue.ox, queue.oy, queue.oz,
                                           queue.dx, queue.dy, queue.dz};
           for (size_t i = 0; i < n; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays of a render, recorded and traced again.
+// Recording the rays of a render and tracing them again.
 #include "scene_testing.h"
 #include "wavecomb/render/ray_recording.h"
 
@@ -38,7 +38,7 @@ TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
 }
 
 TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
-  // Instances and every kind of light, round ones too.
+  // Instances and every kind of light, including round ones.
   const ScenePtr scene = mixed();
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, kPlenty);

@@ -44,7 +44,7 @@ TEST(Renderer, RefusesWhatCannotBe) {
   s = tiny();
   s.lanes = 3;
   EXPECT_NE(complaint(s).find("lanes"), std::string::npos);
-  // And it still renders.
+  // Rendering still works.
   EXPECT_EQ(complaint(tiny()), "");
 }
 
@@ -64,7 +64,7 @@ TEST(Renderer, RendersAgainAndAgain) {
 }
 
 TEST(Renderer, MoreSamplesContainFewer) {
-  // Sample i of a pixel is the same whatever spp is: means of 8 and 16 samples are related.
+  // Sample i of a pixel does not depend on spp: the means of 8 and 16 samples are related.
   WavefrontRenderer renderer(cornell());
   Settings s = tiny();
   s.spp = 16;
@@ -130,7 +130,7 @@ TEST(Renderer, CancelKeepsWhatIsDone) {
   for (const IntegratorKind kind : {IntegratorKind::kWavefront, IntegratorKind::kReference}) {
     Settings s;
     s.width = s.height = 512;
-    s.spp = 1u << 16;  // hours
+    s.spp = 1u << 16;  // would take hours
     s.integrator = kind;
     s.threads = 2;
     const auto start = Clock::now();

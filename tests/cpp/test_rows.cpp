@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rows to and from lanes at every width, against plain loops over words. Memory ends where the
-/// rows end, so that a word too many is a crash.
+/// Loads and stores of rows at every lane width, compared with scalar loops. Rows end at the end of
+/// accessible memory, so that any access beyond crashes.
 #include "wavecomb/core/rows.h"
 
 #include <sys/mman.h>
@@ -19,8 +19,8 @@ namespace {
 
 using namespace lane_testing;
 
-/// Words between two pages that may not be touched: `begin()` is the first word of a page and
-/// `end()` is behind its last.
+/// Memory between two inaccessible pages: `begin()` is the first 32-bit word of a page and `end()`
+/// is just past the last one.
 class GuardedWords {
  public:
   GuardedWords() : page_(static_cast<size_t>(sysconf(_SC_PAGESIZE))) {
@@ -44,14 +44,13 @@ class GuardedWords {
   char* all_;
 };
 
-/// Any bits; every fourth word is a NaN with a payload, quiet or signalling.
+/// Random bits; every fourth word is a NaN with a payload, quiet or signalling.
 uint32_t random_word(std::mt19937& rng) {
   const auto word = static_cast<uint32_t>(rng());
   return word % 4 == 0 ? word | 0x7f800001u : word;
 }
 
-/// Where a row of n words starts: the first and the last place of a row in `size` words, and
-/// others.
+/// Start of a row of n words: the first and last possible position in `size` words, and others.
 uint32_t random_place(std::mt19937& rng, uint32_t size, uint32_t n) {
   switch (rng() % 4) {
     case 0:
@@ -63,16 +62,16 @@ uint32_t random_place(std::mt19937& rng, uint32_t size, uint32_t n) {
   }
 }
 
-/// An index that inactive lanes have; nothing is there.
+/// Invalid index of inactive lanes.
 constexpr uint32_t kWild = 0x7fffff00u;
 
-/// Calls f.operator()<F, N>() for every lane type and each of the row lengths.
+/// Calls f.operator()<F, N>() for every lane type and row length.
 template <size_t... N, typename Function>
 void for_each_row(const Function& f) {
   for_each_lane_type([&]<typename F>() { (f.template operator()<F, N>(), ...); });
 }
 
-/// N values of random bits in the lanes, and the same words by lane.
+/// N random values per lane, and the same 32-bit words by lane.
 template <typename F, size_t N>
 struct RandomRows {
   std::array<F, N> values;
@@ -87,7 +86,7 @@ struct RandomRows {
   }
 };
 
-/// Expects that word k of lane i is `expected(i, k)`, to the bit.
+/// Expects word k of lane i to equal `expected(i, k)` bitwise.
 template <typename F, size_t N, typename Expected>
 void expect_words(const std::array<F, N>& rows, const Expected& expected) {
   for (size_t k = 0; k < N; ++k) {
@@ -118,7 +117,7 @@ TEST(Rows, LoadRowsReadsActiveRowsAndNothingElse) {
 }
 
 TEST(Rows, LoadRowsOfReadsEachLanesOwnArray) {
-  // Each array ends where its memory ends.
+  // Each array ends at the end of its memory.
   std::vector<std::unique_ptr<GuardedWords>> memory;
   std::mt19937 rng(2);
   for (int i = 0; i < 5; ++i) {
@@ -154,7 +153,7 @@ TEST(Rows, StoreRowsWritesActiveRowsAndNothingElse) {
   const GuardedWords memory;
   std::mt19937 rng(3);
   for_each_row<2, 4, 8, 16>([&]<typename F, size_t N>() {
-    // As few words as hold a row a lane and one more between, up to the end of the page.
+    // Room for one row per lane plus one row in between, up to the end of the page.
     constexpr uint32_t kPlaces = kWidth<F> + 1;
     uint32_t* const base = memory.end() - kPlaces * N;
     for (const uint32_t bits : mask_patterns<F>()) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The sampler: nets, stratification, independence, agreement with textbook Sobol, lanes.
+/// The sampler: digital nets, stratification, independence, agreement with textbook Sobol
+/// sequences, and lanes.
 #include "wavecomb/core/sampler.h"
 
 #include <set>
@@ -20,9 +21,8 @@ Sample4<float> sobol(uint32_t pixel, uint32_t sample, uint32_t set, uint32_t see
   return draw(SamplerKind::kSobol, pixel, sample, set, seed);
 }
 
-/// Column k of the generator matrix of one dimension, bit 31 the first after the point: the
-/// recurrence of Bratley and Fox (TOMS 659) for a primitive polynomial of degree s with inner
-/// coefficients a.
+/// Column k of the generator matrix of one dimension; bit 31 is the first binary digit. Recurrence
+/// of Bratley and Fox (TOMS 659) for a primitive polynomial of degree s with inner coefficients a.
 std::vector<uint32_t> sobol_columns(uint32_t s, uint32_t a, std::vector<uint32_t> m, uint32_t n) {
   for (uint32_t k = static_cast<uint32_t>(m.size()); k < n; ++k) {
     uint32_t value = m[k - s] ^ (m[k - s] << s);
@@ -46,7 +46,7 @@ TEST(Sobol, DirectionNumbersAreThoseOfJoeAndKuo) {
   for (uint32_t k = 0; k < 20; ++k) {
     EXPECT_EQ(reverse(c2[k]), detail::kSobol2[k]) << k;
     EXPECT_EQ(reverse(c3[k]), detail::kSobol3[k]) << k;
-    // Pascal's matrix, as the sampler's shifts make it.
+    // Pascal's matrix by the same shifts as in the sampler.
     uint32_t d1 = 1u << k;
     d1 ^= d1 >> 16;
     d1 ^= (d1 & 0xff00ff00u) >> 8;
@@ -84,7 +84,7 @@ TEST(Sobol, NibbleTablesMultiplyByTheMatrix) {
   expect_product(detail::kSobol3);
 }
 
-/// Whether bit b of f(x) depends on bits 0..b of x only, and flips with bit b.
+/// Whether bit b of f(x) depends only on bits 0 to b of x, and flips with bit b.
 TEST(Sobol, LaineKarrasIsAnOwenScramble) {
   std::mt19937 rng(1);
   for (int n = 0; n < 2000; ++n) {
@@ -92,13 +92,13 @@ TEST(Sobol, LaineKarrasIsAnOwenScramble) {
     const uint32_t y = detail::laine_karras(x, seed);
     for (uint32_t b = 0; b < 32; ++b) {
       const uint32_t changed = y ^ detail::laine_karras(x ^ 1u << b, seed);
-      ASSERT_EQ(changed & ((1u << b) - 1u), 0u);  // lower bits see nothing of it
-      ASSERT_TRUE(changed >> b & 1u);             // a permutation of each node of the tree
+      ASSERT_EQ(changed & ((1u << b) - 1u), 0u);  // lower bits are unaffected
+      ASSERT_TRUE(changed >> b & 1u);             // permutes each node of the tree
     }
   }
 }
 
-/// The net property of `points`, which are 2^m: each elementary interval of area 2^-m holds one.
+/// Expects the net property of 2^m points: each elementary interval of area 2^-m holds one.
 void expect_net(const std::vector<std::pair<float, float>>& points) {
   const auto m = static_cast<uint32_t>(std::countr_zero(points.size()));
   for (uint32_t a = 0; a <= m; ++a) {
@@ -146,8 +146,8 @@ TEST(Sobol, EveryDimensionIsStratifiedSingly) {
 }
 
 TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
-  // Shuffled index, textbook generator matrices, and a scramble made digit by digit: walk down the
-  // tree, flipping each bit by what the hash does to it given the bits above.
+  // Shuffled index, textbook generator matrices, and a digit-by-digit scramble: descends the tree
+  // and flips each bit by the hash of the bits above.
   const std::vector<uint32_t> columns[4] = {
       sobol_columns(0, 0, std::vector<uint32_t>(20, 1), 20), sobol_columns(1, 0, {1}, 20),
       sobol_columns(2, 1, {1, 3}, 20), sobol_columns(3, 1, {1, 3, 1}, 20)};
@@ -155,7 +155,7 @@ TEST(Sobol, EqualsNaiveOwenScrambledSobol) {
     uint32_t result = 0;
     for (uint32_t b = 0; b < 32; ++b) {
       const uint32_t above = b == 0 ? 0 : x >> (32 - b) << (32 - b);
-      // Bit 31 - b of the scrambled prefix with a 0 there says whether to flip.
+      // Bit 31 - b of the scrambled prefix with a 0 at this position decides whether to flip.
       const uint32_t flip = reverse(detail::laine_karras(reverse(above), seed)) >> (31 - b) & 1u;
       result |= ((x >> (31 - b) & 1u) ^ flip) << (31 - b);
     }
@@ -210,10 +210,10 @@ TEST(Sampler, SetsDimensionsPixelsAndSeedsDoNotCorrelate) {
 }
 
 TEST(Sampler, PlanesAcrossSetsAreFilledEvenly) {
-  // Counts in 8 x 8 cells of one dimension of a set against one of another. Within a pixel,
-  // scrambled samples come in correlated pairs, so that one pixel's chi-square scatters far (up to
-  // 160 with a perfect Owen scramble in place of the hash) about a mean of some 56; over pixels it
-  // must average to about 63.
+  // Counts in 8 x 8 cells, one dimension of a set against a dimension of another. Within a pixel,
+  // scrambled samples come in correlated pairs. A single pixel's chi-square therefore varies widely
+  // around a mean of about 56 (up to 160 even with a perfect Owen scramble in place of the hash);
+  // over pixels it must average about 63.
   constexpr uint32_t kN = 4096, kPixels = 40;
   for (const SamplerKind kind : {SamplerKind::kSobol, SamplerKind::kIndependent}) {
     for (const auto& [first, second] : {std::pair{0u, 1u}, {1u, 2u}, {2u, 3u}, {0u, 9u}}) {
@@ -241,7 +241,7 @@ TEST(Sampler, PlanesAcrossSetsAreFilledEvenly) {
 }
 
 TEST(Sampler, PixelsAverageToUniform) {
-  // The first sample of many pixels: uniform over each dimension.
+  // First samples of many pixels are uniform in each dimension.
   for (const SamplerKind kind : {SamplerKind::kSobol, SamplerKind::kIndependent}) {
     std::vector<int> count[4];
     for (auto& c : count) c.assign(100, 0);
@@ -263,7 +263,7 @@ TEST(Sampler, PixelsAverageToUniform) {
 }
 
 TEST(Sobol, ConvergesFasterThanRandom) {
-  // Mean square error of the integral of x y over pixels: far below that of independent samples.
+  // Mean square error of the integral of x y over pixels is far below that of independent samples.
   const auto error = [](SamplerKind kind, uint32_t n) {
     double sum = 0;
     for (uint32_t pixel = 0; pixel < 200; ++pixel) {
@@ -278,7 +278,7 @@ TEST(Sobol, ConvergesFasterThanRandom) {
   };
   EXPECT_LT(error(SamplerKind::kSobol, 256), 0.02 * error(SamplerKind::kIndependent, 256));
   EXPECT_LT(error(SamplerKind::kSobol, 1024),
-            error(SamplerKind::kSobol, 256) / 20);  // n^-3, n^-1 by chance
+            error(SamplerKind::kSobol, 256) / 20);  // n^-3 instead of n^-1
 }
 
 TEST(Sampler, SetsOfAPathAreDistinct) {
@@ -290,7 +290,7 @@ TEST(Sampler, SetsOfAPathAreDistinct) {
   EXPECT_LT(vertex_set(VertexSet::kBsdf, kSetDepths - 1), vertex_set(VertexSet::kFlight, 0));
 }
 
-/// Pictures of before there were others than these two are the same still.
+/// Sample sets of light and BSDF have not changed since more sets were added.
 TEST(Sampler, SetsOfLightAndBsdfStandWhereTheyStood) {
   for (const uint32_t depth : {0u, 1u, 2u, 7u, 4096u}) {
     EXPECT_EQ(vertex_set(VertexSet::kLight, depth), 1 + 2 * depth);
@@ -298,8 +298,8 @@ TEST(Sampler, SetsOfLightAndBsdfStandWhereTheyStood) {
   }
 }
 
-/// Numbers of two sets of a vertex know nothing of one another: sums of products are as those of
-/// independent numbers, 0 within 4.5 standard errors of 1 / (12 sqrt n).
+/// Two sample sets of a vertex are independent: the sums of products are 0 within 4.5 standard
+/// errors of 1 / (12 sqrt n).
 TEST(Sampler, SetsOfAVertexAreIndependent) {
   constexpr uint32_t n = 1u << 14;
   const VertexSet names[] = {VertexSet::kLight, VertexSet::kBsdf, VertexSet::kFlight,

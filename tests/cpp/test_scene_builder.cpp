@@ -8,7 +8,7 @@ namespace {
 
 using namespace scene_testing;
 
-/// Expects Error of one line that holds `words`.
+/// Expects an Error with a one-line message that contains `words`.
 void expect_error(const std::function<void(SceneBuilder&)>& use, const std::string& words) {
   SceneBuilder b;
   try {
@@ -32,7 +32,7 @@ MeshData triangle() {
   m.triangle(0, 1, 2);
   return m;
 }
-/// A triangle after `change`, named /World/bad.
+/// Adds a triangle named /World/bad, modified by `change`.
 std::function<void(SceneBuilder&)> mesh_with(const std::function<void(MeshData&)>& change) {
   return [change](SceneBuilder& b) {
     MeshData m = triangle();
@@ -232,7 +232,7 @@ TEST(SceneBuilder, RefusesCyclesOfGroups) {
         b.build();
       },
       "holds itself");
-  // The same group twice side by side, or on two ways down, is no cycle.
+  // The same group twice as siblings, or along two paths of the hierarchy, is not a cycle.
   SceneBuilder b;
   const uint32_t leaf = b.add_group("leaf"), twig = b.add_group("twig"),
                  bough = b.add_group("bough");
@@ -246,7 +246,7 @@ TEST(SceneBuilder, RefusesCyclesOfGroups) {
 }
 
 TEST(SceneBuilder, ManyLevelsOfSharedGroupsDoNotHang) {
-  // A ladder without meshes: 2^40 ways down, none of which holds anything.
+  // A ladder of groups without meshes: 2^40 paths, none of which contains a mesh.
   SceneBuilder b;
   uint32_t above = 0;
   for (int i = 0; i < 40; ++i) {
@@ -273,7 +273,7 @@ TEST(SceneBuilder, DeepChainsOfGroups) {
   EXPECT_EQ(scene->instances()[0].to_world.t.x, kLevels);
 }
 
-/// The same product in double precision.
+/// The same product of transforms in double precision.
 struct Affine64 {
   double a[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
   Affine64() = default;
@@ -310,13 +310,13 @@ TEST(SceneBuilder, NestedGroupsFlatten) {
   const Affine c[2] = {rotate(1, 50) * translate(1, 0, 2), scale(0.5f, 0.5f, -0.5f)};
   const Affine t[2] = {translate(10, 0, 0), rotate(2, 70) * scale(3, 1, 1)};
   b.add_instance(branch, leaf, l[0]);                // inherits
-  b.add_instance(branch, leaf, l[1], materials[1]);  // its own
+  b.add_instance(branch, leaf, l[1], materials[1]);  // separate material
   b.add_instance(tree, branch, c[0], materials[0]);
   b.add_instance(tree, branch, c[1]);
   b.add_instance(0, tree, t[0], materials[2]);
   b.add_instance(0, tree, t[1]);
   const auto scene = b.build();
-  // Per tree: two branches with a mesh, and two leaves each.
+  // Per tree: two branches with a mesh each, and two leaves per branch.
   ASSERT_EQ(scene->instances().size(), 12u);
   EXPECT_EQ(scene->unique_triangles(), 2u);
   EXPECT_EQ(scene->instanced_triangles(), 12u);
@@ -350,7 +350,7 @@ TEST(SceneBuilder, SingularInstancesAreLeftOut) {
   b.add_instance(0, group, scale(0, 0, 0));
   b.add_instance(0, group, translate(1, 2, 3) * scale(1, 2, -3));
   b.add_instance(0, group, Affine{{{1, 2, 3}, {2, 4, 6}, {0, 0, 1}}, {0, 0, 0}});
-  // A product that overflows.
+  // A transform product that overflows.
   const uint32_t huge = b.add_group("/World/huge");
   b.add_instance(huge, group, scale(1e30f, 1e30f, 1e30f));
   b.add_instance(0, huge, scale(1e30f, 1e30f, 1e30f));
@@ -406,7 +406,7 @@ TEST(SceneBuilder, BuildLeavesTheBuilderEmpty) {
   const auto second = b.build();
   EXPECT_EQ(second->unique_triangles(), 0u);
   EXPECT_EQ(second->lights().size(), 0u);
-  // And the first is whole.
+  // The first scene is unchanged.
   EXPECT_EQ(first->groups()[0].meshes.size(), 1u);
   EXPECT_EQ(first->view().material_program[0], static_cast<uint32_t>(ProgramId::kMetal));
 }
@@ -445,7 +445,7 @@ TEST(SceneBuilder, EmissiveFacesBecomeLights) {
   lamp.emission = {0, 0, 0};
   const uint32_t off = b.add_material(lamp);
   Material glossy = make_material(ProgramId::kDiffuse);
-  glossy.emission = {5, 5, 5};  // a diffuse program does not emit
+  glossy.emission = {5, 5, 5};  // diffuse programs do not emit
   const uint32_t diffuse = b.add_material(glossy);
   const uint32_t group = b.add_group("group");
   b.add_to_group(group, b.add_mesh(make_mesh(triangle(), dull)));
@@ -453,7 +453,7 @@ TEST(SceneBuilder, EmissiveFacesBecomeLights) {
   two.triangle(2, 1, 0);
   two.face_materials = {dull, glow};
   b.add_to_group(group, b.add_mesh(make_mesh(two)));
-  b.add_to_group(group, b.add_mesh(make_mesh(triangle())));  // what the instance says
+  b.add_to_group(group, b.add_mesh(make_mesh(triangle())));  // the instance's material
   b.add_instance(0, group, translate(0, 0, 5), glow);
   b.add_instance(0, group, scale(2, 2, 2), off);
   b.add_to_group(0, b.add_mesh(make_mesh(triangle(), diffuse)));
@@ -472,7 +472,7 @@ TEST(SceneBuilder, EmissiveFacesBecomeLights) {
     const LightSet& set = scene->light_set();
     return set.triangles[light_of(inst, geom) + face - set.first_triangle()];
   };
-  EXPECT_EQ(record(1, 1, 0).pick_pdf, 0);  // the dull face is there but never chosen
+  EXPECT_EQ(record(1, 1, 0).pick_pdf, 0);  // the non-emissive face exists but is never selected
   EXPECT_GT(record(1, 1, 1).pick_pdf, 0);
   EXPECT_FLOAT_EQ(std::fabs(record(1, 1, 1).m[2]), 0.5f);
   EXPECT_FLOAT_EQ(std::fabs(record(2, 1, 1).m[2]), 2.f);

@@ -10,7 +10,7 @@
 namespace wavecomb {
 namespace {
 
-/// The message that check() throws, or "".
+/// Returns the message that check() throws, or "".
 std::string complaint(const Settings& s) {
   try {
     s.check();

@@ -43,7 +43,7 @@ TEST(SettingsTable, SettingsThatChangeTheExpectationAreMarked) {
       marked.insert(setting.name);
       EXPECT_TRUE(setting.changes_picture) << setting.name;
     }
-  // A setting that is added has to be thought about, and named here if it is marked.
+  // A new setting that changes the expectation of the image must be listed here.
   const std::set<std::string> known = {
       "alpha",        "clamp_indirect", "crop",   "filter",    "filter_width",
       "firefly",      "fresnel",        "height", "max_depth", "overscan",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textures that say nothing are constants, and what textures and graphs cannot give is no part of a
-// material: neither shows in the picture.
+// Material simplification: constant textures become constants, and features that textures and
+// graphs cannot reach are dropped. Neither changes the image.
 #include "wavecomb/scene/settled_material.h"
 
 #include "range_testing.h"
@@ -17,11 +17,11 @@ TEST(SettledMaterial, WhatIsTheSameAllOverIsAConstant) {
   at(m, Input::kMetallic) = use(0);
   at(m, Input::kRoughness) = use(1, 0);
   at(m, Input::kClearcoat) = use(2);
-  at(m, Input::kClearcoatRoughness) = use(3);                 // below 0 all over
-  at(m, Input::kOpacity) = use(4);                            // above 1 all over
+  at(m, Input::kClearcoatRoughness) = use(3);                 // below 0 everywhere
+  at(m, Input::kOpacity) = use(4);                            // above 1 everywhere
   at(m, Input::kBaseColor) = scaled_use(5, 4, 0.5f, 0.125f);  // fma
   at(m, Input::kSpecularColor) = use(5, 1);                   // green for all
-  at(m, Input::kEmission) = scaled_use(5, 4, 1e25f, -1e24f);  // beyond what may shine
+  at(m, Input::kEmission) = scaled_use(5, 4, 1e25f, -1e24f);  // exceeds the limit of emission
   at(m, Input::kNormal) = use(1);
   const Material s = settled(m, {}, textures);
   EXPECT_EQ(s.metallic, 0.f);
@@ -38,7 +38,7 @@ TEST(SettledMaterial, WhatIsTheSameAllOverIsAConstant) {
     EXPECT_EQ(s.has_texture(input), input == Input::kClearcoat || input == Input::kNormal)
         << kInputNames[i];
   }
-  // What a texture alone can tell is not told by a constant that it hides.
+  // An input that keeps its texture also keeps the constant which the texture hides.
   EXPECT_EQ(s.clearcoat, m.clearcoat);
 }
 
@@ -46,7 +46,7 @@ TEST(SettledMaterial, ASingleTexelIsEnoughToStay) {
   const auto textures = make_textures(true);
   Material m = make_material(ProgramId::kPrincipled);
   at(m, Input::kOpacity) = use(6);
-  at(m, Input::kMetallic) = use(4);  // a NaN counts as 0
+  at(m, Input::kMetallic) = use(4);  // NaN counts as 0
   Material s = settled(m, {}, textures);
   EXPECT_TRUE(s.has_texture(Input::kOpacity) && s.has_texture(Input::kMetallic));
   at(m, Input::kOpacity) = scaled_use(6, 0, 1.f, 1.f);
@@ -131,11 +131,11 @@ TEST(SettledMaterial, OpacityAndEmissionOfGraphsToo) {
   EXPECT_EQ(variant, "principled");
 }
 
-// ---- pictures ---------------------------------------------------------------------------------
+// ---- images -----------------------------------------------------------------------------------
 
-/// A ball of `m` over a floor under a lamp and a sky. Textures: 0: 0.375 all over; 1: the same but
-/// for a texel far from (0, 0); 2: a picture; 3: 0 all over; 4: 0 but for a texel far off; 5 and 6:
-/// likewise of 1.
+/// A ball of `m` above a floor, under a light and a dome. Textures: 0: constant 0.375; 1: the same
+/// except for a texel far from (0, 0); 2: an image; 3: constant 0; 4: 0 except for a distant texel;
+/// 5 and 6: as 3 and 4, with value 1.
 ScenePtr scene_of(const Material& m, const Graph* graph = nullptr) {
   SceneBuilder b;
   const auto grey = [&](float value, float other) {
@@ -179,7 +179,7 @@ void expect_same_pictures(const Material& a, const Material& b, const std::strin
   expect_same_pictures(scene_of(a), scene_of(b), what);
 }
 
-/// A use that sees the lower left corner of its texture alone, sharp.
+/// A texture use that reads only the lower left corner of its texture, without filtering.
 TextureUse corner_of(uint32_t texture) {
   TextureUse u = use(texture);
   u.uv = {0, 0, 0.1f, 0, 0, 0.1f};
@@ -208,7 +208,7 @@ TEST(SettledMaterial, PicturesAreThoseOfTheTextureAndOfTheConstant) {
     for (const Case& c : kCases) {
       Material m = make_material(program, {0.7f, 0.5f, 0.4f}, 0.3f);
       if (c.input == Input::kClearcoatRoughness) m.clearcoat = 0.5f;
-      // Another texture, so that all three are seen in the same frame.
+      // Another texture, so that all three variants use the same frame.
       at(m, c.input == Input::kBaseColor ? Input::kSpecularColor : Input::kBaseColor) = use(2);
       Material same = m, other = m, constant = m;
       at(same, c.input) = corner_of(c.constant);
@@ -242,7 +242,7 @@ TEST(SettledMaterial, CutOutsThatAreWholeAreNone) {
   }
 }
 
-/// Of graphs that read the lower left corner of an image.
+/// Graphs that read the lower left corner of an image.
 TEST(SettledMaterial, PicturesOfGraphsAreTheSame) {
   struct Case {
     const char* parameter;

@@ -11,16 +11,16 @@ namespace wavecomb {
 namespace {
 
 using Q = ShadingQueue;
-constexpr size_t kWords = 8;  // of a row
+constexpr size_t kWords = 8;  // per row
 
-/// A record as it arrived: its columns, its row's words, and what is noted by arrival.
+/// A record as it arrived: its columns, the words of its row, and values stored by arrival index.
 struct Record {
   std::array<uint32_t, Q::kColumns> column;
   std::array<uint32_t, kWords> row;
   uint32_t slot, outcome;
 };
 
-/// Fills the queue with n random records (any bits, so NaN too) and gives it a random order.
+/// Fills the queue with n random records (arbitrary bits, including NaN) in random order.
 std::vector<Record> fill(ShadingQueue& queue, size_t n, uint32_t seed) {
   std::mt19937 rng(seed);
   const auto random = [&] { return static_cast<uint32_t>(rng()); };
@@ -42,7 +42,7 @@ std::vector<Record> fill(ShadingQueue& queue, size_t n, uint32_t seed) {
   return records;
 }
 
-/// Expects that the records stand in the given order of arrival.
+/// Expects the records to be in the given order of arrival.
 void expect_records(const ShadingQueue& queue, const std::vector<Record>& records,
                     const std::vector<uint32_t>& order) {
   ASSERT_EQ(queue.size, order.size());
@@ -51,7 +51,7 @@ void expect_records(const ShadingQueue& queue, const std::vector<Record>& record
     for (uint32_t c = 0; c < Q::kColumns; ++c)
       ASSERT_EQ(queue.uints(static_cast<Q::Column>(c))[i], r.column[c]) << c << ", " << i;
     ASSERT_EQ(std::memcmp(queue.row(i), r.row.data(), sizeof(r.row)), 0) << i;
-    // By arrival, wherever the record stands.
+    // Indexed by arrival, wherever the record is.
     ASSERT_EQ(queue.slot[i], records[i].slot);
     ASSERT_EQ(queue.outcome[i], records[i].outcome);
   }
@@ -68,9 +68,9 @@ TEST(ShadingQueue, MaterializeMovesColumnsAndRows) {
       EXPECT_FALSE(queue.ordered);
       EXPECT_TRUE(queue.moved);
       expect_records(queue, records, order);
-      // Where each record arrived is known still.
+      // The arrival index of each record is still known.
       EXPECT_EQ(std::vector<uint32_t>(queue.sorted_indices, queue.sorted_indices + n), order);
-      // In order already: nothing moves.
+      // Already in order: nothing moves.
       const float* before = queue.row(0);
       queue.materialize();
       EXPECT_EQ(queue.row(0), before);
@@ -112,7 +112,7 @@ TEST(ShadingQueue, ColumnsAreAlignedAndApart) {
       EXPECT_TRUE(other < begin || other >= begin + 4 * (a.words + SoaBlock::kPad));
     }
   }
-  // Records twice, since they are moved from one block to another.
+  // Records count twice, because they are moved from one block to another.
   EXPECT_GE(queue.bytes(), 4u * 100 * (2u * Q::kColumns + 2u * kWords + 3u));
 }
 

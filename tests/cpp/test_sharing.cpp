@@ -12,7 +12,7 @@ namespace {
 
 TEST(Sharing, EachThreadTakesTheNextGroup) {
   Sharing sharing;
-  // Two threads: 3 | 1 2, then 2 | 2. The second pass begins when the first has ended.
+  // Two threads: 3 | 1 2, then 2 | 2. The second pass starts when the first has ended.
   sharing.add_pass(std::array{3.0f, 1.0f, 2.0f, 2.0f});
   sharing.add_pass(std::array{0.5f});
   EXPECT_EQ(sharing.groups(), 5u);

@@ -46,7 +46,7 @@ TEST(Soa, Moves) {
   EXPECT_EQ(SoaBlock().bytes(), 0u);
 }
 
-/// Expects that the columns lie apart, with room for a packet past the end.
+/// Expects columns that do not overlap, with room for a packet past the end.
 void expect_apart(const std::vector<const void*>& columns, size_t capacity) {
   for (size_t i = 0; i < columns.size(); ++i) {
     const auto a = reinterpret_cast<uintptr_t>(columns[i]);

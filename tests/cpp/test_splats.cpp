@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of integers, and a light tracer that splats into the film.
+// Fixed-point sums, and a light tracer that adds light splats to the film.
 #include <random>
 #include <thread>
 
@@ -29,7 +29,7 @@ TEST(FixedPoint, RoundsCutsAndForgivesNan) {
   EXPECT_EQ(unit.from(3e38f), FixedPoint::kMost);
   EXPECT_EQ(unit.to_double(24), 1.5);
   EXPECT_EQ(FixedPoint{3}.from(20.f), 2) << "2.5, and ties go to even";
-  // The most summands of the largest size that are promised to fit.
+  // The guaranteed number of maximum summands does not overflow.
   EXPECT_GE(std::numeric_limits<int64_t>::max() / FixedPoint::kMost, int64_t{1} << 21);
 }
 
@@ -43,7 +43,7 @@ TEST(SplatList, IsAsLongAsItWasMade) {
   EXPECT_TRUE(list.add({3, 1, 1, 1}));
 }
 
-/// Sums in floating point would depend on the order; these do not.
+/// Floating-point sums would depend on the order; these do not.
 TEST(SplatLayer, OrderAndThreadsDoNotShow) {
   constexpr uint32_t kPixels = 64, kLists = 40;
   std::mt19937 rng(3);
@@ -90,11 +90,11 @@ ScenePtr floor_and_point() {
   return b.build();
 }
 
-/// Traces a path from the light for each sample of a pixel, and connects where it lands to the
-/// camera:
-///   I_j += 4 pi I / N  rho / pi  cos_theta_p / (r^2 cos^3_alpha A_j)
-/// where A_j is the area of pixel j in the camera's window at distance 1, whose points are seen
-/// under alpha from the axis. The floor is convex and nothing is in the way.
+/// Light tracer for tests. Traces one path from the light per sample of a pixel, and connects its
+/// hit to the camera:
+///    I_j += 4 pi I / N  rho / pi  cos_theta_p / (r^2 cos^3_alpha A_j)
+/// where A_j is the area of pixel j in the camera's window at distance 1, and alpha is the angle
+/// between its points and the axis. The floor is convex, so nothing is occluded.
 class LightTracer final : public Integrator {
  public:
   LightTracer(const EmbreeAccelerator& accel, const CameraSetup& camera, const Camera& description,
@@ -155,7 +155,7 @@ struct Traced {
   std::vector<SplatLayer::Sum> sums;
 };
 
-/// A picture by the light tracer, in tasks of `pixels` pixels, dealt to `workers` threads.
+/// Renders by light tracing, in tasks of `pixels` pixels on `workers` threads.
 Traced light_traced(const ScenePtr& scene, const Settings& s, uint32_t workers, uint32_t pixels,
                     bool backwards) {
   const EmbreeAccelerator accel(scene, 1);
@@ -214,8 +214,8 @@ TEST(Splats, LightTracingIsOnePictureForAllSchedules) {
       }
 }
 
-/// Pixel by pixel the two ways give one picture. 64 of them, 4.6 standard errors of a Poisson count
-/// each: one false alarm in 3,000 (Sidak).
+/// Light tracing and path tracing agree in each of 64 pixels. With 4.6 standard errors of a Poisson
+/// count each, one run in 3,000 fails by chance (Sidak).
 TEST(Splats, LightTracingAgreesWithPathTracing) {
   const ScenePtr scene = floor_and_point();
   const Settings s = light_settings();
@@ -226,7 +226,7 @@ TEST(Splats, LightTracingAgreesWithPathTracing) {
   const double paths = 1.0 * s.spp * s.width * s.height;
   for (size_t i = 0; i < path.beauty.size(); i += 3) {
     const double expected = double{path.beauty[i]};
-    // Splats of one pixel are nearly alike, so their number says how well their sum is known.
+    // Light splats of a pixel are nearly equal, so their number determines the error of the sum.
     const double one = double{4 * kPi * kIntensity * kAlbedo * kInvPi} / (3 * 3 * 0.15 * 0.15);
     const double count = std::max(1.0, expected * paths / one);
     EXPECT_NEAR(light.picture.beauty[i], expected,
@@ -236,7 +236,7 @@ TEST(Splats, LightTracingAgreesWithPathTracing) {
   EXPECT_NEAR(mean_of(light.picture).mean, mean_of(path).mean, kSanitized ? 0.02 : 0.004);
 }
 
-/// What was splatted lies in the blocks that checkpoints keep, and counts as room.
+/// Light splats are stored in the blocks that checkpoints save, and count as memory of the film.
 TEST(Splats, GoWithTheFilm) {
   Film film(2, 1, {AovSet{0}});
   const size_t plain = film.bytes(), blocks = film.blocks().size();

@@ -43,7 +43,7 @@ TEST(Subdivision, CountsOfEveryLevel) {
 }
 
 TEST(Subdivision, MovesNoPointOfASurfaceWhenItIsCutBySeams) {
-  // Every face its own texture coordinates: the points at its edges are there once for each.
+  // Separate texture coordinates per face: points on face edges are duplicated.
   std::vector<int32_t> indices(24);
   std::vector<float> uvs(48);
   for (size_t i = 0; i < 24; ++i) {
@@ -75,7 +75,7 @@ TEST(Subdivision, DisplacementOfOneFaceIsSharedAtItsEdges) {
     for (size_t k = 0; k < 3; ++k)
       square += std::pow(double{moved.positions[i + k]} - still.positions[i + k], 2);
     const double distance = std::sqrt(square);
-    // None, all, or the share of the faces around: a half at edges, a third at corners.
+    // None, all, or the fraction of adjacent faces: a half at edges, a third at corners.
     double nearest = 1;
     for (const double share : {0.0, 1.0 / 3, 0.5, 1.0})
       nearest = std::min(nearest, std::abs(distance - 0.5 * share));
@@ -130,7 +130,7 @@ TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
 }
 
 TEST(Subdivision, ManyFacesOnOneEdgeAreKeptSharp) {
-  // A book of 5 pages.
+  // Five quads that share an edge, like pages of a book.
   SurfaceDesc desc;
   std::vector<float> points = {0, 0, 0, 0, 0, 1};
   std::vector<int32_t> corners;
@@ -150,11 +150,11 @@ TEST(Subdivision, ManyFacesOnOneEdgeAreKeptSharp) {
   EXPECT_EQ(mesh.faces.size(), size_t{5 * 128});
   for (size_t i = 0; i < mesh.normals.size(); i += 3) {
     EXPECT_NEAR(std::hypot(mesh.normals[i], mesh.normals[i + 1], mesh.normals[i + 2]), 1.0, 1e-5);
-    EXPECT_NEAR(mesh.normals[i + 2], 0.0, 1e-5);  // pages stand upright
+    EXPECT_NEAR(mesh.normals[i + 2], 0.0, 1e-5);  // the pages are vertical
   }
 }
 
-/// Everything of a mesh as one list of bits.
+/// Returns the bits of all arrays of a mesh.
 std::vector<uint32_t> bits_of(const SurfaceMesh& mesh) {
   std::vector<uint32_t> out;
   const auto add = [&](const auto& values) {
@@ -227,12 +227,12 @@ TEST(EdgePixels, OfASquareBeforeTheCamera) {
   view.pixels = 100;
   std::array<double, 16> placed = view.to_camera;
   placed[14] = -100;
-  // Edges of 2, their middles at a distance of sqrt(100^2 + 1).
+  // Edges of length 2, with midpoints at a distance of sqrt(100^2 + 1).
   const double seen = edge_pixels(square, sizes, corners, placed.data(), view);
   EXPECT_NEAR(seen, 2 * 100 / std::sqrt(10001.0), 1e-9);
   placed[14] = 100;
   EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen / 8, 1e-9);
-  // Without perspective as large at any distance; in all directions, behind the camera, too.
+  // Orthographic: the same size at any distance. All directions visible: also behind the camera.
   view.is_parallel = true;
   view.half[0] = view.half[1] = 2;
   placed[14] = -1000;
@@ -242,7 +242,7 @@ TEST(EdgePixels, OfASquareBeforeTheCamera) {
   placed[14] = 100;
   EXPECT_NEAR(edge_pixels(square, sizes, corners, placed.data(), view), seen, 1e-9);
   view.is_all_round = false;
-  // All round the camera: finite.
+  // The quad surrounds the camera: the size stays finite.
   placed[14] = 0;
   EXPECT_LE(edge_pixels(square, sizes, corners, placed.data(), view), 200.0);
 }

@@ -46,7 +46,7 @@ V3 map_vector(const Affine& m, const V3& v) {
 V3 map_point(const Affine& m, const V3& p) {
   return map_vector(m, p) + wide(m.t);
 }
-/// The cofactor matrix times the determinant's sign, applied to n.
+/// Transforms n by the cofactor matrix and the sign of the determinant.
 V3 map_normal(const Affine& m, const V3& n) {
   const V3 r0 = wide(m.row[0]), r1 = wide(m.row[1]), r2 = wide(m.row[2]);
   const double sign = dot3(r0, cross3(r1, r2)) < 0 ? -1 : 1;
@@ -63,13 +63,13 @@ std::vector<Affine> all_transforms() {
           translate(3e4f, 1e4f, -2e4f) * scale(-0.3f, -0.3f, -0.3f)};
 }
 
-/// A soup with random normals and texture coordinates at vertices or corners.
+/// Random triangles with random normals and texture coordinates, per vertex or per corner.
 MeshData attributed_soup(Attribute normals_at, Attribute uvs_at, uint32_t seed) {
   MeshData m = soup(40, seed);
   std::mt19937 rng(seed + 100);
   std::uniform_real_distribution<float> uniform(-1, 1);
   if (normals_at != Attribute::kNone) {
-    // About the face's normal, longer or shorter.
+    // Around the face's normal, of various lengths.
     for (size_t f = 0; f < 40; ++f) {
       const auto p = [&](size_t k) {
         const float* q = &m.positions[9 * f + 3 * k];
@@ -173,7 +173,7 @@ TEST(Surface, NormalsOfMirroredInstancesLookOutwards) {
 }
 
 TEST(Surface, ShadingNormalsAreSeen) {
-  // However the vertex normals lean, the viewer never sees one from behind.
+  // However the vertex normals are tilted, the shading normal always faces the viewer.
   SceneBuilder b;
   MeshData m = quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   m.normals = {0.99f, 0, 0.1f, -0.99f, 0, 0.1f, 0, 0.99f, 0.05f, 0, -1, 0.01f};
@@ -230,7 +230,7 @@ OneHit trace_one(const EmbreeAccelerator& accel, const Vec3<float>& o, const Vec
   return h;
 }
 
-/// A unit vector on n's side whose cosine is 10^-k or so.
+/// Random unit vector on n's side with a cosine of about 10^-k.
 V3 direction(const V3& n, std::mt19937& rng) {
   std::uniform_real_distribution<double> uniform(0, 1);
   const double cosine = std::pow(10.0, -4 * uniform(rng)), phi = 2 * kPiD * uniform(rng);
@@ -242,8 +242,8 @@ V3 direction(const V3& n, std::mt19937& rng) {
 struct SpawnCounts {
   size_t rays = 0, self_hits = 0, leaks = 0;
 };
-/// Shoots at a closed convex mesh (geometry 0 of instance `inst`) from all around and leaves it
-/// again to both sides. Faces 2k and 2k + 1 share a plane where `pairs`.
+/// Traces rays to a closed convex mesh (geometry 0 of instance `inst`) from all around, and spawns
+/// rays from the hits to both sides. With `pairs`, faces 2k and 2k + 1 are coplanar.
 SpawnCounts spawn_around(const Scene& scene, const EmbreeAccelerator& accel, uint32_t inst,
                          const V3& centre, double size, bool pairs, size_t n, uint32_t seed) {
   const DenormalsOff denormals_off;
@@ -261,7 +261,7 @@ SpawnCounts spawn_around(const Scene& scene, const EmbreeAccelerator& accel, uin
     if (h.inst != inst) continue;
     const Surface<float> s =
         setup_surface<float>(scene.view(), {h.inst, mesh, h.prim, h.u, h.v}, d, false, true, true);
-    // Within roundings of the body's edge either side is right.
+    // Within rounding errors of an edge of the body either side is correct.
     const float edge = std::min({h.u, h.v, 1 - h.u - h.v});
     if (edge * size < 32.0 * static_cast<double>(s.offset)) continue;
     for (int k = 0; k < 4; ++k) {
@@ -299,7 +299,7 @@ TEST(Surface, SpawnedRaysNeitherHitTheirOwnSurfaceNorLeak) {
       for (const float shift : {0.f, 10.f, 1000.f})
         for (const bool instanced : {false, true}) {
           if (shift == 1000 && c.pairs && c.mesh.positions[1] != -1)
-            continue;  // thinner than float
+            continue;  // thinner than float precision
           const Affine m = translate(shift * s, -0.7f * shift * s, 0.3f * shift * s) *
                            rotate(0, 33) * rotate(2, 21) * scale(s, s, s);
           SceneBuilder b;
@@ -348,7 +348,7 @@ TEST(Surface, HugeGroundNextToSmallObjects) {
   const uint32_t ground_mesh = scene->groups()[0].meshes[0];
   size_t covered = 0;
   for (size_t i = 0; i < size_for_build(20000, 4); ++i) {
-    // Points of the ground near and far, seen at all angles, also under the box.
+    // Near and far points of the ground, seen at all angles, also under the box.
     const double far = i % 2 ? 0.4 : 3000;
     const V3 at{12 + far * uniform(rng), 0, -7 + far * uniform(rng)};
     const V3 from =
@@ -364,7 +364,7 @@ TEST(Surface, HugeGroundNextToSmallObjects) {
     const Vec3<float> leave = narrow(out);
     const OneHit next = trace_one(accel, spawn_origin<float>(s, leave), leave);
     EXPECT_NE(next.inst, 0u) << "hit the ground again";
-    // Straight up under the box, it is met.
+    // A ray straight up hits the underside of the box.
     const Vec3<float> up{0, 1, 0};
     const OneHit above = trace_one(accel, spawn_origin<float>(s, up), up);
     if (i % 2 && std::hypot(s.p.x - 12, s.p.z + 7) < 0.45) {
@@ -411,7 +411,7 @@ TEST(Surface, LanesAgreeWhateverTheirNeighboursAre) {
     const V3 dir = unit({uniform(rng), uniform(rng), uniform(rng)});
     for (size_t c = 0; c < 3; ++c) d[c][i] = static_cast<float>(dir[c]);
   }
-  // `order` says which record stands where; the tail beyond `count` is inactive rubbish.
+  // `order` gives the record of each lane; lanes from `count` on are inactive and hold garbage.
   const auto run = [&]<typename F>(const std::vector<uint32_t>& order, size_t count, bool with_uv,
                                    bool with_terminator) {
     std::vector<std::vector<float>> out(kFloats, std::vector<float>(kCount + 16)), placed = out;
@@ -449,7 +449,7 @@ TEST(Surface, LanesAgreeWhateverTheirNeighboursAre) {
           for (size_t c = 0; c < kFloats; ++c)
             lane_testing::expect_same(scalar[c], packets[c], "surface");
         }
-        // A tail of 7 lanes, or fewer.
+        // A partial packet of up to 7 lanes.
         const auto tail = run.template operator()<F>(random_order, 39, with_uv, with_terminator);
         for (size_t c = 0; c < kFloats; ++c)
           for (size_t i = 0; i < 39; ++i)
@@ -483,7 +483,7 @@ TEST(Facing, BentNormalsAreSeenAndMirrorWhatIsAboveTheSurface) {
       EXPECT_NEAR(dot3(b, b), 1, 1e-5);
       EXPECT_GT(side * dot3(w, b), 0) << i;
       EXPECT_GT(side * dot3(mirrored, wide(ng)), 0.8 * std::min(0.9 * c, 0.01) - 1e-6) << i;
-      // What mirrors above the surface stays as it is.
+      // Directions that reflect above the surface are unchanged.
       const V3 f{lane(facing.x, 0), lane(facing.y, 0), lane(facing.z, 0)};
       const V3 before = 2 * dot3(w, f) * f - w;
       if (side * dot3(before, wide(ng)) > 0.011) {

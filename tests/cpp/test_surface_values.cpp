@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The room `surface`: what rays and lights read of a hit is what shading reads there.
+// Folder `surface`: rays, lights and shading read the same values at a hit.
 #include "curve_testing.h"
 #include "lane_testing.h"
 #include "wavecomb/graph/hit_point.h"
@@ -13,8 +13,9 @@ namespace {
 using namespace curve_testing;
 using lane_testing::same_bits;
 
-/// Meshes with texture coordinates at vertices, corners and nowhere, and curves of all kinds, with
-/// and without; placed plainly, turned and mirrored; materials of faces, meshes and instances.
+/// Meshes with texture coordinates per vertex, per corner and without, and curves of all kinds with
+/// and without them; untransformed, rotated and mirrored instances; materials of faces, meshes and
+/// instances.
 std::shared_ptr<const Scene> all_kinds() {
   SceneBuilder b;
   std::mt19937 rng(2);
@@ -47,7 +48,7 @@ std::shared_ptr<const Scene> all_kinds() {
   return b.build();
 }
 
-/// Hits all over a scene.
+/// Hits distributed over a scene.
 struct Hits {
   static constexpr size_t kCount = 1024;
   uint32_t inst[kCount], mesh[kCount], prim[kCount];
@@ -122,7 +123,7 @@ TEST(SurfaceValues, MaterialsAreOfTheFaceTheMeshOrTheInstance) {
   });
 }
 
-/// All that a graph may ask of a point.
+/// All inputs that a graph can read at a point.
 template <typename F>
 std::array<F, 15> values_of(const GraphPoint<F>& at) {
   return {at.uv.x,
@@ -151,7 +152,7 @@ TEST(SurfaceValues, PointsAtRestAreThoseOfShading) {
   const auto scene = all_kinds();
   const Hits hits(*scene);
   SceneView view = scene->view();
-  view.materials.graphs.inputs = ~0u;  // all of them are asked for
+  view.materials.graphs.inputs = ~0u;  // request all inputs
   for (size_t i = 0; i < Hits::kCount; ++i) {
     const MeshHit<float> hit = hits.at<float>(i);
     const auto rest = values_of<float>(rest_of<float>(view, hit));
@@ -161,7 +162,7 @@ TEST(SurfaceValues, PointsAtRestAreThoseOfShading) {
       ASSERT_TRUE(same_bits(rest[0], s.uv.x) && same_bits(rest[1], s.uv.y));
       continue;
     }
-    s.ns = s.ng;  // the plane's, not bent towards the viewer
+    s.ns = s.ng;  // geometric normal, without adjustment towards the viewer
     const auto shaded = values_of<float>(graph_point<float>(view, hit, s, dir, 0.f, true));
     for (size_t k = 0; k < rest.size(); ++k) ASSERT_NEAR(rest[k], shaded[k], 1e-5f) << k;
   }

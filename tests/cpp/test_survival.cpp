@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Roulette by what bounces are worth: one picture, the same mean whatever is believed of them, and
-/// what paths without roulette say of paths with it.
+/// Efficiency-aware Russian roulette: one image for all schedules, an unbiased mean for any
+/// estimates, and the moments that paths without roulette predict for paths with it.
 #include "chi_square.h"
 #include "wave_testing.h"
 #include "wavecomb/learn/guide_field.h"
@@ -13,7 +13,7 @@ using namespace scene_testing;
 using namespace wave_testing;
 using chi_square::Random;
 
-/// A field that knows nothing: directions, costs, moments and the picture's brightness are made up.
+/// A field with arbitrary values for directions, costs, moments and image brightness.
 class AbsurdField {
  public:
   AbsurdField(const Scene& scene, uint32_t seed) : random_(seed) {
@@ -93,7 +93,7 @@ TEST(Survival, IsOnePictureForAllSchedules) {
   }
 }
 
-/// Whatever is believed of bounces and of light, the mean is that of plain paths.
+/// The mean equals that of plain paths for any estimates of bounces and light.
 TEST(Survival, HasTheSameMeanForAbsurdCostsAndFields) {
   for (const ScenePtr& scene : {cornell(), mixed()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 1u);
@@ -126,10 +126,11 @@ TEST(Survival, HasTheSameMeanForAbsurdCostsAndFields) {
   }
 }
 
-/// Roulette at the second vertex: by the formula, and by playing it.
+/// Roulette at the second vertex: formula against simulation.
 TEST(Survival, PathsWithoutRouletteTellOfItsMoments) {
   for (const double q : {0.25, 0.6, 1.0}) {
-    // A bounce leaves half and meets 2; the next one leaves a third and meets x, 0 or 6 alike.
+    // A bounce halves the throughput and contributes 2; the next leaves a third and contributes x,
+    // which is 0 or 6 with equal probability.
     const double ray = 1, vertex = 2;
     double squared = 0, cost = 0, played = 0, played_cost = 0;
     for (const double x : {0.0, 6.0}) {
@@ -156,7 +157,7 @@ TEST(Survival, PathsWithoutRouletteTellOfItsMoments) {
   }
 }
 
-/// A path that ends costs nothing more, and one that is cut short what is told of its tail.
+/// A path that ends has no further cost; a truncated path has the given cost of its tail.
 TEST(Survival, EndsOfPathsHaveTheirCosts) {
   BounceWorth worth[2];
   const PathStep ended[] = {{1, 0.5, 1, 1, 2}, {0.5, 0, 0, 0.5, 2}};

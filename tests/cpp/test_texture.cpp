@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures: conversions, mip pyramids and lane lookups against naive double precision.
+/// Textures: conversions, mip pyramids and lane lookups, compared with naive double precision.
 #include "wavecomb/texture/texture.h"
 
 #include <functional>
@@ -50,7 +50,7 @@ TEST(Half, RoundsToNearestEven) {
       continue;
     }
     ASSERT_EQ(float_to_half(x), half);
-    // Half way to the next: the even one wins, and either side of half way is clear.
+    // Half-way to the next value rounds to even; either side of half-way is unambiguous.
     const double next = half_value(static_cast<uint16_t>(h + 1));
     if ((h & 0x7fff) >= 0x7bff || !std::isfinite(next)) continue;
     const auto middle = static_cast<float>((static_cast<double>(x) + next) / 2);
@@ -78,7 +78,7 @@ TEST(Srgb, TableAndItsInverse) {
 }
 
 TEST(Srgb, RoundsAtEveryStep) {
-  // Bisects for the float at which the value changes: half a step above, by the exact curve.
+  // Finds by bisection the float at which the value changes: half a step above, on the exact curve.
   for (int i = 0; i < 255; ++i) {
     float below = kSrgbToLinear[static_cast<size_t>(i)],
           above = kSrgbToLinear[static_cast<size_t>(i + 1)];
@@ -92,7 +92,7 @@ TEST(Srgb, RoundsAtEveryStep) {
   }
 }
 
-/// An image in all the forms that Texture takes, with the linear values that it stands for.
+/// An image in all forms that Texture accepts, with the linear values that it represents.
 struct Image {
   TextureDesc desc;
   std::vector<unsigned char> bytes;
@@ -162,7 +162,7 @@ TEST(Texture, StoresEveryTexel) {
       }
 }
 
-/// The box filter of `image` at half its size, exactly.
+/// Exact box filter of `image` to half its size.
 Image shrink(Image& image) {
   const uint32_t w = image.desc.width, h = image.desc.height;
   Image out;
@@ -230,7 +230,8 @@ TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {
                 const auto t = texel_at(view, n, x, y);
                 for (size_t c = 0; c < 4; ++c) {
                   const double exact = level.at(x, y)[c];
-                  if (format == TexelFormat::kU8 && srgb && c < 3) {  // half a step as encoded
+                  // half a step in encoded values
+                  if (format == TexelFormat::kU8 && srgb && c < 3) {
                     const auto code = static_cast<double>(linear_to_srgb(t[c]));
                     ASSERT_GE(exact, srgb_decode((code - 0.501) / 255) - 1e-7);
                     ASSERT_LE(exact, srgb_decode((code + 0.501) / 255) + 1e-7);
@@ -247,7 +248,7 @@ TEST(Texture, PyramidIsTheBoxFilterInLinearLight) {
         }
 }
 
-/// Index of a tap, or -1 for black.
+/// Index of a filter tap, or -1 for black.
 int64_t wrap_tap(Wrap wrap, int64_t i, int64_t n) {
   switch (wrap) {
     case Wrap::kRepeat:
@@ -264,7 +265,7 @@ int64_t wrap_tap(Wrap wrap, int64_t i, int64_t n) {
   return 0;
 }
 
-/// Bilinear lookup by the book, out of the texels as stored.
+/// Textbook bilinear lookup in the stored texels.
 Color4 reference(const TextureView& view, uint32_t level, double s, double t) {
   const int64_t w = view.levels[level].width, h = view.levels[level].height;
   const double x = s * static_cast<double>(w) - 0.5, y = (1 - t) * static_cast<double>(h) - 0.5;
@@ -295,7 +296,7 @@ Color4 reference(const TextureView& view, double s, double t, double width) {
   return sum;
 }
 
-/// Looks up all points at lane type F; returns r, g, b, a after one another.
+/// Looks up all points with lane type F; returns all r, then g, b and a.
 template <typename F>
 std::vector<float> look_up(const TextureView& view, const std::vector<float>& s,
                            const std::vector<float>& t, const std::vector<float>& width) {
@@ -311,7 +312,7 @@ std::vector<float> look_up(const TextureView& view, const std::vector<float>& s,
   return out;
 }
 
-/// The same by one texel each, chosen by `bits`.
+/// Looks up one stochastically chosen texel per point; `bits` are the random bits.
 template <typename F>
 std::vector<float> look_up_one(const TextureView& view, const std::vector<float>& s,
                                const std::vector<float>& t, const std::vector<float>& width,
@@ -328,7 +329,7 @@ std::vector<float> look_up_one(const TextureView& view, const std::vector<float>
   return out;
 }
 
-/// Random numbers for as many lookups.
+/// Random bits for n lookups.
 std::vector<uint32_t> random_bits(size_t n, uint32_t seed) {
   std::vector<uint32_t> bits(n);
   for (size_t i = 0; i < n; ++i)
@@ -352,8 +353,8 @@ TEST(Lookup, OneTexelIsTheSameAtEveryWidthOfLanes) {
     }
 }
 
-/// Each texel is chosen as often as it weighs: numbers in a grid, the middle of each of 64 x 64
-/// places and 16 levels, have the filter's mean to the grid's step.
+/// Each texel is chosen with the probability of its filter weight. Random values on a grid, the
+/// centres of 64 x 64 cells and 16 levels, reproduce the filtered mean up to the grid's resolution.
 TEST(Lookup, OneTexelHasTheMeanOfTheFilter) {
   constexpr uint32_t kPlaces = 64, kLevels = 16;
   const auto s = padded({0.f, 1.f, 0.5f}, 41, -2.2f, 3.2f, 41);
@@ -375,8 +376,8 @@ TEST(Lookup, OneTexelHasTheMeanOfTheFilter) {
           }
       mean /= kLevels * kPlaces * kPlaces;
       const double filtered = double{lookup<float>(view, s[i], t[i], width[i], true).r};
-      // The shares of two levels are rounded to half of the grid's step, those of two texels of
-      // both axes, too; texels are 4 apart at most.
+      // Weights of the two levels, and of two texels per axis, are rounded to half of the grid's
+      // resolution; texels differ by 4 at most.
       EXPECT_NEAR(mean, filtered, 4 * (0.5 / kLevels + 1.0 / kPlaces)) << i;
     }
   }
@@ -412,7 +413,7 @@ TEST(Lookup, AgreesWithTheReferenceInAllFormatsAndWraps) {
 }
 
 TEST(Lookup, FinestLevelAloneGivesTheSameBits) {
-  // A packet with no coarse lane takes a short cut, one with a coarse lane does not.
+  // Packets without coarse lanes take a fast path; packets with one do not.
   Image image = make_image(64, 32, 4, TexelFormat::kU8, true);
   const Texture texture = make_texture(image);
   const auto s = padded({}, 512, -1.f, 2.f, 31), t = padded({}, 512, -1.f, 2.f, 32);
@@ -487,7 +488,7 @@ TEST(Lookup, IdPerLane) {
   std::vector<uint32_t> id(4096);
   std::mt19937 rng(54);
   for (size_t i = 0; i < id.size(); ++i) {
-    id[i] = i < 1024 ? 3u : static_cast<uint32_t>(rng()) % 6u;  // the first are uniform
+    id[i] = i < 1024 ? 3u : static_cast<uint32_t>(rng()) % 6u;  // the first packets have equal ids
     if (id[i] == 5) id[i] = kNoTexture;
   }
   std::vector<float> expected;
@@ -510,13 +511,13 @@ TEST(Lookup, IdPerLane) {
       }
     }
     expect_same(expected, result, "lookup by id");
-    // Inactive lanes may hold ids that do not exist.
+    // Inactive lanes may hold invalid ids.
     const Mask<F> none_active(false);
     lookup<F>(views.data(), UInt<F>(12345u), F(0.f), F(0.f), F(0.f), none_active);
   });
 }
 
-/// Tiles 1001, 1002 and 1100 of different sizes and formats.
+/// Makes tiles 1001, 1002 and 1100 of different sizes and formats.
 Texture make_tiles(std::vector<std::pair<uint32_t, TexturePtr>>& tiles) {
   for (const uint32_t number : {1001u, 1002u, 1100u}) {
     Image image = make_image(8 + number % 7, 9, 1 + number % 4, kFormats[number % 3],
@@ -541,7 +542,7 @@ TEST(Tiles, AreLookedUpWhereTheyLie) {
         EXPECT_EQ(std::tie(one.r, one.g, one.b, one.a), std::tie(all.r, all.g, all.b, all.a));
       }
   }
-  // Tile 1003 and all that is outside is missing.
+  // Tile 1003 and everything outside is missing.
   for (const auto& [s, t] : {std::pair{2.5f, 0.5f}, {-0.5f, 0.5f}, {0.5f, -1e30f}, {10.f, 0.5f}}) {
     const auto none = lookup<float>(texture.view(), s, t, 0.25f, true);
     EXPECT_EQ(std::tie(none.r, none.g, none.b, none.a), std::make_tuple(0.25f, 0.5f, 0.75f, 1.f));
@@ -625,7 +626,7 @@ TEST(Texture, KeepsItsFormatInMemory) {
 }
 
 TEST(Texture, AnyOrderOfWorkGivesTheSameBits) {
-  // Backwards, and what it leaves in memory beyond the edges too.
+  // In reverse order; the result must also match in the memory beyond the image edges.
   const ForEach backwards = [](size_t n, const std::function<void(size_t)>& body) {
     while (n > 0) body(--n);
   };

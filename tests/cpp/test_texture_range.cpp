@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Between what lookups of textures lie: no filter, level, wrap or width of lanes leaves it.
+/// Value ranges of textures: no filter, level, wrap mode or lane width returns a value outside.
 #include <cstring>
 
 #include "lane_testing.h"
@@ -16,7 +16,7 @@ using namespace lane_testing;
 constexpr TexelFormat kFormats[] = {TexelFormat::kU8, TexelFormat::kF16, TexelFormat::kF32};
 constexpr Wrap kWraps[] = {Wrap::kRepeat, Wrap::kClamp, Wrap::kMirror, Wrap::kBlack};
 
-/// A texture of values, stored as `format` holds them.
+/// Makes a texture of values, stored as `format`.
 TexturePtr texture_of(const std::vector<float>& values, uint32_t width, uint32_t channels,
                       TexelFormat format, Wrap wrap = Wrap::kRepeat, bool srgb = false) {
   std::vector<std::byte> bytes;
@@ -45,8 +45,8 @@ std::vector<float> random_values(size_t n, float low, float high, uint32_t seed)
   return values;
 }
 
-/// The least and the largest that some thousand lookups give: whole filters and single texels, of
-/// all levels, on the image and off it, in each width of lanes.
+/// Minimum and maximum of several thousand lookups: filtered and single texels, all levels, inside
+/// and outside the image, at each lane width.
 TexelRange seen(const Texture& texture, uint32_t seed) {
   TexelRange range{{kInf, kInf, kInf, kInf}, {-kInf, -kInf, -kInf, -kInf}};
   for_each_lane_type([&]<typename F>() {
@@ -95,7 +95,7 @@ TEST(TextureRange, NoLookupLeavesIt) {
 }
 
 TEST(TextureRange, IsThatOfTheTexels) {
-  // Blocks of 8 x 8: coarser levels have the same values again.
+  // Blocks of 8 x 8, so that coarser levels have the same values.
   std::vector<float> values(24 * 16 * 4);
   for (size_t i = 0; i < values.size(); ++i) {
     const size_t texel = i / 4, block = texel / 24 / 8 * 3 + texel % 24 / 8;
@@ -115,7 +115,7 @@ TEST(TextureRange, IsThatOfTheTexels) {
     one[i] = 1.f;
     EXPECT_EQ(texture_of(one, 30, 1, TexelFormat::kU8)->range().high[0], 1.f * (1.f + 1e-6f));
   }
-  // Alpha that an image has not is 1, and that of black beyond the image is 0.
+  // A missing alpha channel is 1; alpha of black outside the image is 0.
   const std::vector<float> grey(64, 1.f);
   EXPECT_EQ(texture_of(grey, 8, 1, TexelFormat::kU8)->range(),
             (TexelRange{{1, 1, 1, 1}, {1, 1, 1, 1}}));
@@ -129,7 +129,7 @@ TEST(TextureRange, WhatIsTheSameAllOverIsExact) {
     for (const float value : {0.f, 1.f, 55.f / 255.f})
       for (const bool srgb : {false, true})
         for (const uint32_t width : {1u, 8u, 21u}) {
-          // Boxes of odd sizes round where texels are floats: not all levels are the same then.
+          // Boxes of odd sizes round differently for float texels, so levels differ.
           if (format == TexelFormat::kF32 && width == 21 && value != 0) continue;
           const TexturePtr texture = texture_of(std::vector<float>(width * 8 * 3, value), width, 3,
                                                 format, Wrap::kMirror, srgb);
@@ -138,8 +138,8 @@ TEST(TextureRange, WhatIsTheSameAllOverIsExact) {
         }
 }
 
-/// a + (b - a) t is off by its roundings: the filter of 1 and 1e-9 gives 0 somewhere. It never
-/// passes 0, so that what is at least 0, or at most, stays so.
+/// a + (b - a) t has rounding errors: filtering 1 and 1e-9 gives 0 in places. It never crosses 0,
+/// so non-negative values stay non-negative and non-positive values non-positive.
 TEST(TextureRange, FiltersRoundButNeverPass0) {
   std::vector<float> values(64 * 64);
   for (size_t i = 0; i < values.size(); ++i) values[i] = i % 2 == 0 ? 1.f : 1e-9f;
@@ -153,7 +153,7 @@ TEST(TextureRange, FiltersRoundButNeverPass0) {
   const TexturePtr below = texture_of(values, 64, 1, TexelFormat::kF32);
   EXPECT_EQ(below->range().high[0], 0.f);
   expect_within(seen(*below, 4), below->range(), "below");
-  // Of the largest texels nothing overflows.
+  // The largest texels do not overflow.
   for (size_t i = 0; i < values.size(); ++i) values[i] = i % 3 == 0 ? 3e38f : -3e38f;
   const TexturePtr huge = texture_of(values, 64, 1, TexelFormat::kF32);
   EXPECT_TRUE(std::isfinite(huge->range().high[0]) && std::isfinite(huge->range().low[0]));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures within a limit of memory: what is read back, what is in memory, what goes first.
+/// The tile store, which keeps textures within a memory limit: contents, resident memory, and order
+/// of eviction.
 #include "wavecomb/texture/tile_store.h"
 
 #include <gtest/gtest.h>
@@ -27,11 +28,11 @@ namespace wavecomb {
 namespace {
 
 constexpr uint64_t kLimit = 2'000'000;
-constexpr size_t kSize = 700'001;  ///< of a texture; not whole pages
+constexpr size_t kSize = 700'001;  ///< size of a texture; not a multiple of the page size
 
 using State = TileQueue::State;
 
-/// Loads an absent tile, as a store does.
+/// Loads an absent tile, as the store does.
 void load(TileQueue& queue, uint32_t tile, size_t room) {
   queue.begin(tile);
   EXPECT_EQ(queue.state(tile), State::kLoading);
@@ -61,16 +62,16 @@ TEST(TileQueue, WhatIsMissedSoonStaysLonger) {
   EXPECT_EQ(queue.state(0), State::kAbsent);
   load(queue, 0, 8);
   EXPECT_EQ(queue.state(0), State::kSecond);
-  // A scan of what is read once does not push it out.
+  // A sequential scan does not evict tiles that are in repeated use.
   for (uint32_t tile = 10; tile < 90; ++tile) {
     load(queue, tile, 8);
     ASSERT_EQ(queue.resident(), 8u);
   }
   EXPECT_EQ(queue.state(0), State::kSecond);
-  // What went long ago counts as new.
+  // A tile that was evicted long ago counts as new.
   load(queue, 10, 8);
   EXPECT_EQ(queue.state(10), State::kFirst);
-  // The second queue does not take all room.
+  // The second queue does not take all memory.
   for (int round = 0; round < 5; ++round)
     for (uint32_t tile = 20; tile < 30; ++tile)
       if (queue.state(tile) == State::kAbsent) load(queue, tile, 8);
@@ -102,7 +103,7 @@ std::vector<std::byte> content(uint32_t seed, size_t size = kSize) {
   return bytes;
 }
 
-/// Bytes in memory of a range, as the kernel has it.
+/// Resident bytes of a range, reported by the kernel.
 size_t resident(const std::byte* at, size_t bytes) {
   const size_t pages = (bytes + page_bytes() - 1) / page_bytes();
   std::vector<unsigned char> there(pages);
@@ -174,7 +175,8 @@ TEST_F(TileStoreTest, ManyReadersSeeAllOfItWithinTheLimit) {
   EXPECT_LE(s.peak_bytes, kLimit);
   EXPECT_GT(s.peak_bytes, kLimit * 95 / 100);
   EXPECT_EQ(s.resident_bytes / 100'000, s.peak_bytes / 100'000);
-  // While one walks from page to page others may load what it has not come to: a little more.
+  // While one thread counts page by page, others may load pages that it has not reached yet, hence
+  // the tolerance.
   EXPECT_LE(most, kLimit * 105 / 100);
   EXPECT_LE(all_resident(), kLimit);
   EXPECT_GE(s.file_bytes, 12 * kSize);
@@ -192,7 +194,7 @@ TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
   store->keep_grid(&grid, kGrid);
   add(0);
   EXPECT_EQ(store->statistics().file_bytes, 0u);
-  add(1);  // fits into the limit, but for the grid
+  add(1);  // fits into the limit, except for the grid
   EXPECT_GT(store->statistics().file_bytes, 0u);
   const auto read_all = [&] {
     for (size_t i = 0; i < places.size(); ++i) EXPECT_TRUE(is_intact(i));
@@ -200,7 +202,7 @@ TEST_F(TileStoreTest, GridsLeaveLessForTextures) {
   read_all();
   EXPECT_EQ(store->statistics().grid_bytes, kGrid);
   EXPECT_LE(all_resident() + kGrid, kLimit);
-  // One that comes later makes its way, down to some tiles where it is larger than the limit.
+  // A later grid makes room for itself, down to a few tiles if it is larger than the limit.
   store->keep_grid(&other, 10 * kLimit);
   EXPECT_LE(all_resident(), 32 * TileStore::kTileBytes);
   read_all();
@@ -270,7 +272,7 @@ TEST_F(TileStoreTest, ATextureThatIsExpectedFindsRoom) {
   store->set_waiting(kLimit - 2 * kSize - 100'000);
   store->expect(kSize, 0);
   EXPECT_EQ(store->statistics().file_bytes, 0u);
-  // What is decoded and what lies ready count too.
+  // Decoded data and prefetched tiles count as well.
   store->expect(kSize, 100'000);
   EXPECT_GT(store->statistics().file_bytes, 0u);
   EXPECT_EQ(all_resident(), 0u);
@@ -286,7 +288,7 @@ std::string message(const std::function<void()>& body) {
   return "";
 }
 
-/// Makes UFFDIO_COPY fail with ENOMEM on this thread and on those that it starts from now on.
+/// Makes UFFDIO_COPY fail with ENOMEM on this thread and on threads that it starts later.
 bool take_memory_away() {
   sock_filter program[] = {
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
@@ -306,7 +308,8 @@ TEST_F(TileStoreTest, NoMemoryForATileIsSaidAndReadersGoOn) {
   std::string refused;
   std::thread([&] {
     filters = take_memory_away();
-    // In memory: who adds is told. Then the store goes to its file, and starts threads.
+    // In memory: the caller of add gets the error. Then the store switches to its file and starts
+    // threads.
     const auto small = content(3, 100'000);
     refused = message([&] { store->add(small.data(), small.size()); });
     add(4);
@@ -315,7 +318,8 @@ TEST_F(TileStoreTest, NoMemoryForATileIsSaidAndReadersGoOn) {
   EXPECT_EQ(refused,
             "texture limit: no memory for textures (Cannot allocate memory); give a smaller limit");
   EXPECT_NO_THROW(store->check());
-  // Without its thread's care the process would end here, or the readers wait for ever.
+  // Without handling in the store's thread, the process would end here or the readers would wait
+  // forever.
   std::vector<std::thread> readers;
   std::atomic<int> sum = 0;
   for (size_t i = 0; i < 3; ++i)
@@ -332,7 +336,7 @@ TEST_F(TileStoreTest, SaysWhatIsWrongWithALimitOrAFolder) {
   const auto bytes = content(1, 3'000'000);
   const std::string m = message([&] { nowhere.add(bytes.data(), bytes.size()); });
   EXPECT_NE(m.find("/nowhere (No such file or directory); set TMPDIR"), std::string::npos) << m;
-  // It goes on with what fits.
+  // The store continues with textures that fit.
   const std::byte* small = nowhere.add(bytes.data(), 1000);
   EXPECT_EQ(std::memcmp(small, bytes.data(), 1000), 0);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What Transport::kAuto makes of trials, and which scenes it does not try.
+// Decisions of Transport::kAuto from pilot renders, and scenes for which no pilot is rendered.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,8 +21,8 @@ using namespace scene_testing;
 constexpr uint32_t kSide = 32;
 constexpr uint64_t kRays = 100'000, kRecords = 50'000;
 
-/// A picture of brightness 1, and `light` more that a share of light paths finds, of parts with
-/// noise of these deviations. Light paths cost what camera paths cost.
+/// Makes a pilot render of brightness 1 plus `light` found by light paths, with the given standard
+/// deviations of noise. Light paths cost the same as camera paths.
 TransportTrial trial(uint32_t seed, LightPathShare share, float camera_noise, float light_noise,
                      float light) {
   std::mt19937 rng(seed);
@@ -41,8 +41,8 @@ TransportTrial trial(uint32_t seed, LightPathShare share, float camera_noise, fl
   return out;
 }
 
-/// Trials of all shares. `left`: the deviation of eight samples of a pixel, of what light paths
-/// find.
+/// Makes pilots for all ratios. `left` is the standard deviation over eight samples of a pixel of
+/// the light that light paths find.
 TransportTrials trials_of(float left, float camera_noise, float light_noise, float light) {
   TransportTrials trials;
   for (size_t k = 0; k < kTriedShares.size(); ++k)
@@ -66,7 +66,7 @@ TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
 }
 
 TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
-  // v 1 + 3 without, (1 + 1) at s = 1.
+  // Variance 1 + 3 without light paths, and 1 + 1 at s = 1.
   const TransportGain gain = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
   const double path = kRays + 0.7 * kRecords, joint = kRays + 0.8 * kRecords;
   EXPECT_EQ(gain.share.exponent, 0);
@@ -106,9 +106,9 @@ TEST(TransportGain, CountsLightThatCameraPathsDoNotFind) {
   EXPECT_LT(gain_of(1e6f, 0.05f, 0.f, 0.001f).gain, 1) << "and this is hardly seen";
 }
 
-/// What light paths tell of the noise of camera paths, against that noise.
+/// The noise of camera paths as estimated from light paths, compared with the actual noise.
 TEST(CameraSquares, AreTheVarianceOfCameraPaths) {
-  // A lamp in the floor shines on a rough mirror above, and that on the floor.
+  // A light in the floor illuminates a rough mirror above, which reflects onto the floor.
   SceneBuilder b;
   const uint32_t floor = b.add_material(make_material(ProgramId::kDiffuse, {0.7f, 0.7f, 0.7f}));
   const uint32_t metal = b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.9f, 0.9f}, 0.2f));

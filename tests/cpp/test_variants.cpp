@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which variant of its program a material gets, and that pictures do not show it.
+// Selection of program variants for materials; the selection does not change the image.
 #include <set>
 
 #include "wave_testing.h"
@@ -19,7 +19,7 @@ std::string variant_of(const Material& m, const GraphSet& graphs = {}) {
   return kVariants[least_variant(m.program, parts_of(m, graphs, {}))].name;
 }
 
-/// A material of a program, changed.
+/// Makes a material of a program, modified by `edit`.
 template <typename Edit>
 Material edited(ProgramId program, Edit edit) {
   Material m = make_material(program, {0.6f, 0.5f, 0.4f}, 0.4f);
@@ -53,7 +53,7 @@ TEST(Variants, MaterialsGetTheLeastThatShowsAll) {
   EXPECT_EQ(principled([](Material& m) { m.opacity = 0.9f; }), "principled");
   EXPECT_EQ(principled([](Material& m) { at(m, Input::kOpacity).texture = 0; }), "principled");
   EXPECT_EQ(principled([](Material& m) { m.emission = {0, 0, 1}; }), "principled");
-  // Cut-outs are none of the BSDF's.
+  // Presence is not part of the BSDF.
   EXPECT_EQ(principled([](Material& m) { m.opacity = 0.9f, m.presence = true; }), "gloss");
   EXPECT_EQ(principled([](Material& m) {
               at(m, Input::kOpacity).texture = 0, m.opacity_threshold = 0.5f;
@@ -79,7 +79,7 @@ TEST(Variants, MaterialsGetTheLeastThatShowsAll) {
   }
 }
 
-/// A graph that gives `parameter` a constant.
+/// Makes a graph that sets `parameter` to a constant.
 GraphSet graph_driving(const char* parameter) {
   GraphSet graphs;
   GraphProgram program{};
@@ -100,7 +100,7 @@ TEST(Variants, WhatAGraphDrivesMayBeAnything) {
   EXPECT_EQ(driven(ProgramId::kPrincipled, "metallic"), "textured_metal");
 }
 
-/// Spheres of all variants, two kinds of each, before a wall.
+/// Spheres with all variants, two materials each, in front of a wall.
 ScenePtr all_variants() {
   SceneBuilder b;
   const uint32_t picture = add_texture(b, 8, 8, 3, random_texels(64 * 3, 0.1f, 0.9f, 1));
@@ -154,7 +154,7 @@ TEST(Variants, NoVariantShowsInThePicture) {
   }
 }
 
-/// Paths from lights have plain kernels of their own, of both kinds of paths.
+/// Light paths and the camera paths combined with them use separate plain kernels.
 TEST(Variants, NoneShowsWhereLightIsJoined) {
   WavefrontRenderer renderer(all_variants());
   Settings s;

@@ -10,7 +10,7 @@ namespace {
 using namespace lane_testing;
 using V = Vec3<float>;
 
-/// Unit vectors all over the sphere, the axes and near-poles first.
+/// Unit vectors all over the sphere, starting with axes and directions near the poles.
 std::vector<V> directions() {
   std::vector<V> all;
   for (const float s : {-1.f, 1.f}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Volumes that velocities move: where fields are read, and what bounds them.
+// Volumes that move by their velocity fields: lookup positions and bounds.
 #include "lane_testing.h"
 #include "volume_testing.h"
 #include "wavecomb/medium/volume_emission.h"
@@ -18,7 +18,7 @@ Volume moving(Volume v, const VolumeField& wind, float open, float close) {
   return v;
 }
 
-/// Density 1 + x on 17 voxels from 0 to 1, in a wind of (0.5, 0.25, -1) from -4 to 4.
+/// Makes a density 1 + x on 17 voxels from 0 to 1, in a velocity of (0.5, 0.25, -1) from -4 to 4.
 Volume ramp(float open, float close) {
   Volume v;
   v.density = between(make_grid(17, [](int x, int, int) { return 1 + static_cast<float>(x) / 16; }),
@@ -44,8 +44,8 @@ TEST(VolumeMotion, FieldsAreReadWhereTheyCameFrom) {
   }
 }
 
-/// A ray across the ramp sees exp(-(1 + x) L) at the place that x has come to, also beyond the
-/// grid's own box.
+/// A ray across the moving ramp has transmittance exp(-(1 + x) L) at the position that x has moved
+/// to, also outside the grid's original box.
 TEST(VolumeMotion, TransmittanceIsThatOfThePlaceAtTheTime) {
   Volume v = ramp(0.f, 2.f);
   v.extinction = {1, 0.5f, 0.25f};
@@ -68,7 +68,7 @@ TEST(VolumeMotion, TransmittanceIsThatOfThePlaceAtTheTime) {
       squares += x * x;
     }
     const double mean = sum / kCount, error = std::sqrt((squares / kCount - mean * mean) / kCount);
-    // Sixteen steps of a voxel, and one at either end that goes down to 0.
+    // Sixteen steps of a voxel, plus one at each end that falls to 0.
     EXPECT_NEAR(mean, std::exp(-0.5 * 1.5 * 17. / 16), 4.2 * error + 1e-5) << time;
     EXPECT_LT(error, 3e-3);
   }

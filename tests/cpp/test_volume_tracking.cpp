@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lookups in grids, and flights, transmittance and emission along one way, against closed forms.
+// Grid lookups, and free flights, transmittance and emission along a ray, compared with closed
+// forms.
 #include "bsdf_testing.h"
 #include "lane_testing.h"
 #include "volume_testing.h"
@@ -14,7 +15,7 @@ namespace {
 
 using namespace volume_testing;
 
-/// Records of volumes, and what kernels need of them.
+/// Records of volumes and the view that kernels need.
 struct Records {
   explicit Records(const std::vector<Volume>& volumes) {
     for (const Volume& v : volumes) {
@@ -49,7 +50,7 @@ TEST(VolumeGrid, InterpolatesLinearlyAndEndsAtItsVoxels) {
       const float expected = 1 + (p.x + 16) + 0.5f * (p.y + 16) + 0.25f * (p.z + 16);
       EXPECT_NEAR(value_at(field, p), expected, 2e-5f * expected);
     }
-    // Half a voxel beyond the last one it is half as much; a voxel beyond, nothing.
+    // Half a voxel beyond the last one the value is halved; one voxel beyond it is 0.
     EXPECT_NEAR(value_at(field, {3.5f, 0, 0}), 0.5f * (20 + 8 + 4), 1e-3f);
     EXPECT_NEAR(value_at(field, {-16.5f, 0, 0}), 0.5f * (1 + 8 + 4), 1e-3f);
     EXPECT_EQ(value_at(field, {4.f, 0, 0}), 0.f);
@@ -114,9 +115,9 @@ TEST(VolumeGrid, BadGridsAreRefused) {
   EXPECT_THROW(check_volume(make_box({0, 0, 0}, {1, 1, 1}, {1, -1, 1})), Error);
 }
 
-VolumeCounts counts;  ///< nobody reads
+VolumeCounts counts;  ///< not evaluated
 
-/// The means by channel, with their standard errors, of what one(key) gives.
+/// Means of one(key) per channel, with standard errors.
 struct Means {
   double mean[3], error[3];
 };
@@ -138,7 +139,8 @@ Means means_of(uint32_t n, const One& one) {
   }
   return m;
 }
-/// With 4.2 standard errors one comparison in 37,000 fails with other numbers; there are some 50.
+/// With 4.2 standard errors one comparison in 37,000 fails with other random numbers; there are
+/// about 50.
 void expect_means(const Means& m, const std::array<double, 3>& expected, const std::string& what) {
   for (size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(m.mean[k], expected[k], 4.2 * m.error[k] + 1e-5) << what << ", channel " << k;
@@ -146,7 +148,7 @@ void expect_means(const Means& m, const std::array<double, 3>& expected, const s
   }
 }
 
-/// Volumes, and the optical depth of a ray's first `t` along x from (-1, 0.3, 0.4) in each.
+/// Volumes, and the optical depth of the first `t` of a ray along x from (-1, 0.3, 0.4) in each.
 struct Case {
   std::string name;
   std::vector<Volume> volumes;
@@ -170,7 +172,7 @@ std::vector<Case> cases() {
                    const double a = overlap(t, 0, 1), b = 0.4 * overlap(t, 0.5, 2);
                    return std::array{0.3 * a + b, a + b, 1.5 * a + b};
                  }});
-  // Density 3 x from 0 to 1, on 33 voxels, then down to 0 within one voxel.
+  // Density 3 x from 0 to 1 on 33 voxels, then falling to 0 within one voxel.
   Volume wedge;
   wedge.density = between(
       make_grid(33, [](int x, int, int) { return 3.f * static_cast<float>(x) / 32; }), 33, 0, 1);
@@ -202,7 +204,7 @@ TEST(VolumeTracking, TransmittanceIsTheExponential) {
   }
 }
 
-/// One beside the ways of the cases, and one beyond their end.
+/// One light beside the rays of the cases, and one beyond their end.
 std::shared_ptr<const Scene> two_lamps() {
   SceneBuilder b;
   for (const float x : {0.6f, 2.5f}) {
@@ -230,7 +232,7 @@ TEST(Equiangular, DrawsByItsDensity) {
   }
   const auto none = lamp_way<float>(scene->view().lights, o, d, 2, 1, 0.5f, {}, true);
   EXPECT_EQ(none.share, 0.f);
-  // Where the medium swallows what the lamp sends, distances go by density.
+  // Where the medium absorbs most of the light, distances are sampled by density.
   const auto thick =
       lamp_way<float>(scene->view().lights, o, d, 1, 2.4f, 50.f, {0.9f, 0.3f, 0.8f, 0.f}, true);
   EXPECT_EQ(thick.share, 0.f);
@@ -266,7 +268,7 @@ TEST(VolumeTracking, FlightsPassAndStopAsOftenAsTheySay) {
                               }),
                      {1 - pass(0), 1 - pass(1), 1 - pass(2)}, c.name + ", stops");
       }
-      // Where: the mean of exp(-x), as an integral by parts on a fine mesh.
+      // Position: the mean of exp(-x), integrated on a fine grid.
       std::array<double, 3> expected{};
       constexpr int n = 20000;
       for (int i = 0; i < n; ++i) {
@@ -289,7 +291,7 @@ TEST(VolumeTracking, EmissionIsTheIntegral) {
   for (Case& c : cases()) {
     c.volumes[0].emission = {1, 2, 0.5f};
     const Records r(c.volumes);
-    // int_0^t eps(x) exp(-depth(x)) dx; the first volume glows by its density.
+    // int_0^t eps(x) exp(-depth(x)) dx; the first volume emits in proportion to its density.
     const auto density = [&](double t) {
       if (c.name != "wedge") return t > 1 && t < 2 ? 1.0 : 0.0;
       if (t < 1 || t > 2 + 1 / 32.) return 0.0;
@@ -321,7 +323,7 @@ TEST(HenyeyGreenstein, SamplesFollowTheDensity) {
   chi_square::Battery battery("phase functions");
   for (const float g : {-0.85f, -0.2f, 0.f, 5e-4f, 0.3f, 0.9f}) {
     const VolumeBsdf<float> phase(Color<float>(0.7f), g);
-    // The density integrates to 1 over the sphere, its cosine to g.
+    // The phase function integrates to 1 over the sphere, its mean cosine is g.
     double sum = 0, mean = 0;
     constexpr int n = 200000;
     for (int i = 0; i < n; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures through volumes.
+// Images of volumes.
 #include "volume_testing.h"
 #include "wave_testing.h"
 
@@ -9,8 +9,8 @@ namespace {
 using namespace volume_testing;
 using namespace wave_testing;
 
-/// Smoke of a coarse random grid with a tint and a glow, over a floor, under a lamp and a dome, and
-/// a coloured box that overlaps it. The smoke may move while the shutter is open.
+/// Smoke of a coarse random grid with colour and emission, over a floor, with a light and a dome,
+/// and an overlapping coloured box. With `moves`, the smoke moves while the shutter is open.
 std::shared_ptr<const Scene> smoky(bool moves) {
   SceneBuilder b;
   const uint32_t grey = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.5f, 0.4f}));
@@ -91,7 +91,8 @@ TEST_P(OnePicture, WhateverRendersIt) {
       }
 }
 
-/// Walls of radiance 1 around volumes that lose nothing, even where they overlap: 1 everywhere.
+/// White furnace: walls of radiance 1 around volumes without absorption give 1 everywhere, also
+/// where volumes overlap.
 TEST(Volumes, FurnaceGainsAndLosesNothing) {
   for (const float anisotropy : {0.f, 0.7f, -0.5f}) {
     SceneBuilder b;

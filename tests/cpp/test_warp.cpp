@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Warps: where samples go (chi-square), what a step in the square becomes (Jacobian), lanes.
+/// Warps from the unit square: densities (chi-square), Jacobians, and lanes.
 #include "wavecomb/core/warp.h"
 
 #include "bsdf_testing.h"
@@ -15,7 +15,7 @@ using chi_square::Draw;
 using chi_square::Place;
 using chi_square::Random;
 
-/// A warp to a place of charts, on each of which it has a density.
+/// A warp to charts with a given density.
 template <typename Density, typename Map>
 chi_square::Case warp_case(std::string name, std::vector<chi_square::Chart> charts,
                            const Density& density, const Map& map) {
@@ -26,7 +26,7 @@ chi_square::Case warp_case(std::string name, std::vector<chi_square::Chart> char
   };
   return c;
 }
-/// (x, angle of (a, b) in turns).
+/// Point (x, angle of (a, b) in turns).
 Place with_turn(double x, double a, double b) {
   return {0, x, std::atan2(b, a) / (2 * kPiD) + 0.5};
 }
@@ -35,7 +35,7 @@ TEST(Warp, SamplesFollowTheirDensity) {
   chi_square::Battery battery("warps");
   const std::vector<chi_square::Chart> square{{0, 1, 0, 1}};
   const auto even = [](const Place&) { return 1.0; };
-  // Equal areas: equal steps in r^2.
+  // Equal areas are equal steps in r^2.
   battery.run(warp_case("disk", square, even, [](float u, float v) {
     const auto d = square_to_disk(u, v);
     const double x = d.x, y = d.y;
@@ -52,13 +52,13 @@ TEST(Warp, SamplesFollowTheirDensity) {
     battery.run(
         warp_case("cone of " + std::to_string(one_minus_cos), square, even, [=](float u, float v) {
           const auto w = square_to_cone(u, v, static_cast<float>(one_minus_cos));
-          // 1 - cos from the sine, for narrow cones: h (2 - h) = sin^2.
+          // 1 - cos from the sine, which is accurate for narrow cones: h (2 - h) = sin^2.
           const double x = w.x, y = w.y, sin2 = x * x + y * y;
           const double h = w.z > 0 ? sin2 / (1 + std::sqrt(std::max(0.0, 1 - sin2)))
                                    : 1 - static_cast<double>(w.z);
           return with_turn(h / one_minus_cos, x, y);
         }));
-  // Of equal triangles: P(b1 + b2 < s) = s^2, and b1 / (b1 + b2) is uniform.
+  // Uniform in area: P(b1 + b2 < s) = s^2, and b1 / (b1 + b2) is uniform.
   battery.run(warp_case("triangle", square, even, [](float u, float v) {
     const auto b = square_to_triangle(u, v);
     const double b1 = b.x, b2 = b.y, sum = b1 + b2;
@@ -70,7 +70,7 @@ TEST(Warp, SamplesFollowTheirDensity) {
   EXPECT_FLOAT_EQ(cosine_hemisphere_pdf(1.f), kInvPi);
 }
 
-/// Area of the image of a small square around (u, v), by its two edges, over the square's.
+/// Area of the image of a small square at (u, v), relative to the square, by its two edges.
 template <typename Map>
 double jacobian(const Map& map, double u, double v) {
   constexpr double kStep = 1.0 / 256;

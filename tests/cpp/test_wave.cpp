@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first promise: any schedule gives the same picture, bit for bit.
+// Reproducibility: all schedules give bitwise the same image.
 #include <bit>
 
 #include "curve_testing.h"
@@ -18,7 +18,7 @@ Picture reference(const ScenePtr& scene, const Settings& settings,
   return run.picture();
 }
 
-/// Expects that all schedules give the reference integrator's picture.
+/// Expects all schedules to give the image of the reference integrator.
 void expect_one_picture(const ScenePtr& scene, Settings settings) {
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
   const Picture expected = reference(scene, settings, accel);
@@ -174,7 +174,7 @@ TEST(Wave, ThreadsDoNotShow) {
       s.light_weights = weights;
       s.threads = 1;
       s.integrator = IntegratorKind::kReference;
-      // Without a renderer lights have their shares by power.
+      // Without a renderer, lights have their shares by power.
       const Picture expected =
           weights == LightWeights::kPower ? reference(scene, s, accel) : renderer.render(s);
       for (const uint32_t threads : {1u, 2u, 3u}) {
@@ -248,7 +248,7 @@ TEST(Wave, DepthZeroSeesEmittersOnly) {
   const Picture picture = WavefrontRenderer(cornell()).render(s);
   size_t lit = 0;
   for (size_t i = 0; i < picture.depth.size(); ++i) {
-    // The light's red is 12; a pixel has five samples, some of which see it.
+    // The light's red is 12; some of a pixel's five samples see it.
     const double seen = picture.beauty[3 * i] / 12.0 * s.spp;
     EXPECT_NEAR(seen, std::round(seen), 1e-4);
     lit += seen > 0;
@@ -303,7 +303,7 @@ TEST(Wave, PartsAndLightGroupsAddUp) {
         parts[2] += r[i];
       }
       for (const double part : parts) EXPECT_GT(part, 0);
-      // All but the first are of lights that were put there.
+      // All light groups but the first contain lights of this scene.
       for (size_t g = 1; g < lit.size(); ++g) {
         EXPECT_GT(lit[g], 0) << scene->light_groups()[g];
       }
@@ -352,7 +352,7 @@ TEST(Wave, IdsAndPlacesOfASimpleScene) {
     EXPECT_EQ(pairs[12 * i + 3], 0);
     EXPECT_GT(layer(p, "cost").values[i], 0);
   }
-  // The nearest sample of five is within a pixel of where the centre of its pixel looks.
+  // The nearest of five samples is within a pixel of the point at the pixel centre.
   const size_t middle = s.width / 2 + size_t{s.height / 2} * s.width;
   const float pixel = position[3 * (middle + 1)] - position[3 * middle];
   EXPECT_LT(std::abs(position[3 * middle]), 1.5f * std::abs(pixel));
@@ -365,7 +365,7 @@ TEST(Wave, AovsOfASimpleScene) {
   b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
   const Picture p = WavefrontRenderer(b.build()).render(small_settings());
   for (size_t i = 0; i < p.depth.size(); ++i) {
-    EXPECT_NEAR(p.depth[i], 5, 1e-5);  // along the axis, at every pixel
+    EXPECT_NEAR(p.depth[i], 5, 1e-5);  // along the camera's axis, at every pixel
     EXPECT_FLOAT_EQ(p.albedo[3 * i], 0.8f);
     EXPECT_FLOAT_EQ(p.albedo[3 * i + 1], 0.2f);
     EXPECT_NEAR(p.normal[3 * i], 0, 1e-6);

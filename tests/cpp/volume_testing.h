@@ -15,8 +15,8 @@ using namespace scene_testing;
 
 using Voxels = std::function<float(int, int, int)>;
 
-/// The grid of value(x, y, z) at the voxels 0 <= x, y, z < size, as bricks; `components`: r, g, b
-/// are 1, 2 and 3 times that.
+/// Makes a grid of value(x, y, z) at the voxels 0 <= x, y, z < size, as bricks. With 3 components,
+/// r, g and b are 1, 2 and 3 times the value.
 inline std::shared_ptr<const VolumeGrid> make_grid(int size, const Voxels& value,
                                                    uint32_t components = 1, bool is_half = false,
                                                    int first = 0) {
@@ -42,7 +42,8 @@ inline std::shared_ptr<const VolumeGrid> make_grid(int size, const Voxels& value
       GridBricks{"grid", origins, voxels, halves, components, 0.f});
 }
 
-/// Velocities value(x, y, z) at the voxels 0 <= x, y, z < size, a multiple of 8.
+/// Makes a velocity grid of value(x, y, z) at the voxels 0 <= x, y, z < size; size is a multiple of
+/// 8.
 inline std::shared_ptr<const VolumeGrid> make_wind(
     int size, const std::function<Vec3<float>(int, int, int)>& value, bool is_half = false) {
   std::vector<int32_t> origins;
@@ -66,7 +67,7 @@ inline std::shared_ptr<const VolumeGrid> make_wind(
   return std::make_shared<const VolumeGrid>(bricks);
 }
 
-/// Voxels 0 ... size - 1 between lo and hi along each axis.
+/// Places voxels 0 to size - 1 between lo and hi along each axis.
 inline VolumeField between(std::shared_ptr<const VolumeGrid> grid, int size, float lo, float hi) {
   const float step = (hi - lo) / static_cast<float>(size - 1);
   Affine map = scale(step, step, step);

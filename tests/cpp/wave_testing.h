@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Waves run by hand, without renderer and threads.
+/// Running waves by hand, without the renderer and threads.
 #pragma once
 
 #include "scene_testing.h"
@@ -15,7 +15,7 @@ namespace wavecomb::wave_testing {
 
 inline constexpr uint32_t kReferenceLanes = 0;
 
-/// What is to be run: settings, kernels (0: the reference integrator) and packets of rays.
+/// Parameters of a run: settings, kernel lanes (0 for the reference integrator) and width of ray packets.
 struct WaveCase {
   Settings settings;
   uint32_t lanes = kReferenceLanes;
@@ -25,7 +25,7 @@ struct WaveCase {
 /// A scene, its accelerator and a film, ready to run waves on this thread.
 class WaveRun {
  public:
-  /// `histories` gets the vertices of paths.
+  /// `histories` receives the vertices of paths.
   WaveRun(std::shared_ptr<const Scene> scene, const WaveCase& wave_case,
           std::shared_ptr<const EmbreeAccelerator> accel = nullptr,
           HistoryReader* histories = nullptr)
@@ -39,7 +39,7 @@ class WaveRun {
         aovs_(*scene_, case_.settings),
         film_(case_.settings.width, case_.settings.height, aovs_.layout),
         pixels_(morton_pixel_order(case_.settings.rendered())) {
-    // "adaptive" chooses among all others.
+    // "adaptive" selects among all others.
     for (const std::string& name : policy_names())
       if (name != "adaptive" &&
           (case_.settings.policy == "adaptive" || case_.settings.policy == name))
@@ -76,13 +76,13 @@ class WaveRun {
   WaveRun(const WaveRun&) = delete;
   WaveRun& operator=(const WaveRun&) = delete;
 
-  /// Runs all samples in waves of at most `wave_size` paths, in passes of at most `pass` samples.
+  /// Runs all samples in waves of at most `wave_size` paths and passes of at most `pass` samples.
   void all(uint32_t wave_size, uint32_t pass = 16) {
     if (case_.lanes != kReferenceLanes) reserve(wave_size);
     each_task(wave_size, pass, [&](const WaveTask& task) { run(task); });
   }
 
-  /// Runs one(task) for the tasks of all samples.
+  /// Calls one(task) for the tasks of all samples.
   template <typename One>
   void each_task(uint32_t wave_size, uint32_t pass, const One& one) {
     const DenormalsOff denormals_off;
@@ -96,7 +96,7 @@ class WaveRun {
                      std::min(pass, s.spp - first)});
   }
 
-  /// Nanoseconds that shading synthetic hits of one material takes, by kernels of W lanes.
+  /// Nanoseconds to shade synthetic hits of one material with kernels of W lanes.
   template <size_t W>
   double time_material(const CalibrationHits& hits) {
     const DenormalsOff denormals_off;
@@ -118,7 +118,7 @@ class WaveRun {
     return picture;
   }
   const Wave& wave() const { return *wave_; }
-  /// Buffers with room for waves of `size` paths.
+  /// Allocates buffers for waves of `size` paths.
   Wave& reserve(uint32_t size) {
     if (!wave_ || size > capacity_) {
       wave_ = std::make_unique<Wave>(size, context_);
@@ -127,7 +127,7 @@ class WaveRun {
     return *wave_;
   }
   const WaveContext& context() const { return context_; }
-  /// Bounces are guided by a field. Contract: before buffers are reserved; outlives the run.
+  /// Enables guiding. Contract: call before reserve; the field must outlive the run.
   void guide(const GuideView& view) { context_.guide = &view; }
   Film& film() { return film_; }
   const Counts& reference_counts() const { return *reference_->worker(0).counts; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Arrays that make up a guiding field, as kernels read them through GuideView.
+/// Arrays of a guiding field in the device layout of GuideView.
 #pragma once
 
 #include <cstddef>
