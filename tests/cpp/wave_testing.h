@@ -15,7 +15,7 @@ namespace wavecomb::wave_testing {
 
 inline constexpr uint32_t kReferenceLanes = 0;
 
-/// Parameters of a run: settings, kernel lanes (0 for the reference integrator) and width of ray packets.
+/// Parameters of a run: settings, kernel lanes (0 for the reference integrator), and packet width.
 struct WaveCase {
   Settings settings;
   uint32_t lanes = kReferenceLanes;

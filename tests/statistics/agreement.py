@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether two renderers give the same picture, as far as their noise lets one tell.
+"""Test whether two renderers produce the same image, within their noise.
 
-Each picture comes as independent renders ("batches", (n, height, width, 3)); means and variances
-are taken across them, so nothing is assumed of the noise within a render. The test is Welch's t for
-each pixel and channel; p-values are turned into normal deviates z, which are tested three ways:
+Each image comes as independent renders ("batches", (n, height, width, 3)). Means and variances are
+computed across batches, so the noise within a render may have any distribution. Welch's t is
+computed for each pixel and channel and converted to a normal deviate z. There are three tests:
 
-- pixels: at least 99.75 % have p above the level that Sidak's correction leaves of 0.01 (Mitsuba's
+- pixels: at least 99.75 % have p above the level that Sidak's correction gives for 0.01 (Mitsuba's
   rule);
-- blocks of 8 x 8 pixels, which see an eighth of the noise: all of them, corrected the same way;
-- the mean of z over blocks, channel by channel, which finds a small bias everywhere, and the mean
-  relative difference, by Welch's t across batches. (The mean of z over single pixels would not do:
-  skewed noise, which differs from renderer to renderer, shifts it, since a bright sample also
-  raises the variance that it is measured by.)
+- blocks of 8 x 8 pixels, which have an eighth of the noise: all must pass, with the same
+  correction;
+- bias: the mean of z over blocks per channel, which detects a small bias everywhere, and the mean
+  relative difference, by Welch's t across batches. The mean of z over single pixels is not used: a
+  bright sample raises the estimated variance of its pixel as well, so skewed noise, which differs
+  between renderers, would shift it.
 """
 
 from __future__ import annotations
@@ -35,23 +36,23 @@ BLOCK = 8
 
 
 def batches(render: Callable[[int], NDArray[np.float32]], count: int, first_seed: int = 0) -> Array:
-    """Renders of ``count`` seeds, (count, height, width, 3)."""
+    """Render with ``count`` seeds and return the images, (count, height, width, 3)."""
     return np.stack([np.asarray(render(first_seed + k), np.float64) for k in range(count)])
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """What the tests found.
+    """Result of the tests.
 
     Attributes:
-        accepted: Share of pixels and channels that pass.
-        blocks: Likewise of blocks.
-        mean_z: Mean deviate of blocks per channel, in its own standard errors.
-        excess: Mean relative difference of the first picture to the second, per channel.
+        accepted: Fraction of pixels and channels that pass.
+        blocks: Fraction of blocks and channels that pass.
+        mean_z: Mean z of blocks per channel, in units of its standard error.
+        excess: Mean relative difference of the first image to the second, per channel.
         excess_error: Standard error of ``excess``.
         excess_z: ``excess`` as a normal deviate.
-        z: Deviates, (height, width, 3); NaN where both pictures have no noise.
-        quiet: Largest relative difference where both have none.
+        z: Deviates, (height, width, 3); NaN where both images have no noise.
+        quiet: Largest relative difference where both images have no noise.
     """
 
     accepted: float
@@ -77,7 +78,7 @@ class Agreement:
 
 
 def welch(a: Array, b: Array, tolerance: Array | float, noisy: NDArray[np.bool_]) -> Array:
-    """Welch's t of batches along axis 0 as a normal deviate; NaN where not ``noisy``."""
+    """Welch's t of batches along axis 0, converted to a normal deviate; NaN where not ``noisy``."""
     va, vb = a.var(axis=0, ddof=1) / len(a), b.var(axis=0, ddof=1) / len(b)
     difference = a.mean(axis=0) - b.mean(axis=0)
     difference = np.sign(difference) * np.maximum(np.abs(difference) - tolerance, 0.0)
@@ -90,7 +91,7 @@ def welch(a: Array, b: Array, tolerance: Array | float, noisy: NDArray[np.bool_]
 
 
 def _deviates(a: Array, b: Array, tolerance: float) -> tuple[Array, Array]:
-    """z, NaN where there is no noise, and the relative difference."""
+    """Return z, NaN where there is no noise, and the relative difference."""
     mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)
     level = np.maximum(np.maximum(np.abs(mean_a), np.abs(mean_b)), 1e-6)
     error2 = a.var(axis=0, ddof=1) / len(a) + b.var(axis=0, ddof=1) / len(b)
@@ -107,7 +108,7 @@ def _accepted(z: Array) -> float:
 
 
 def _blocks(a: Array) -> Array:
-    """Means over blocks, (n, height / 8, width / 8, 3); a rest at the edges is left out."""
+    """Means over blocks, (n, height / 8, width / 8, 3); incomplete blocks are dropped."""
     n, height, width, channels = a.shape
     rows, columns = height // BLOCK, width // BLOCK
     cut = a[:, : rows * BLOCK, : columns * BLOCK]
@@ -115,12 +116,12 @@ def _blocks(a: Array) -> Array:
 
 
 def agreement(a: Array, b: Array, tolerance: float = 0.0) -> Agreement:
-    """Compares two pictures given as batches.
+    """Compare two images given as batches.
 
     Args:
         a: (n, height, width, 3).
         b: (m, height, width, 3).
-        tolerance: Relative difference that is no difference; for models that differ by design.
+        tolerance: Relative difference to ignore, for models that differ by design.
     """
     z, relative = _deviates(a, b, tolerance)
     noisy = np.isfinite(z)
@@ -129,7 +130,7 @@ def agreement(a: Array, b: Array, tolerance: float = 0.0) -> Agreement:
     seen = np.isfinite(block_z)
     mean_z = np.where(seen, block_z, 0.0).sum(axis=(0, 1))
     mean_z /= np.sqrt(np.maximum(seen.sum(axis=(0, 1)), 1))
-    # Each block weighs by its brightness, so that dark ones count, too.
+    # Normalise by the brightness of each block, so that dark blocks count equally.
     level = np.maximum(0.5 * (block_a + block_b).mean(axis=0), 1e-4 * b.mean())
     share_a, share_b = ((x / level).mean(axis=(1, 2)) for x in (block_a, block_b))
     excess = share_a.mean(axis=0) - share_b.mean(axis=0)
@@ -149,12 +150,12 @@ def agreement(a: Array, b: Array, tolerance: float = 0.0) -> Agreement:
 
 
 def assert_agree(name: str, a: Array, b: Array, *, tolerance: float = 0.0) -> Agreement:
-    """Fails, with pictures in out/statistics, where two pictures differ by more than noise.
+    """Fail if two images differ by more than noise; save them in out/statistics.
 
     Args:
-        name: Of the pictures.
-        a: Batches of ours.
-        b: Batches of the other.
+        name: Name of the images.
+        a: Batches of Wavecomb.
+        b: Batches of the other renderer.
         tolerance: As in ``agreement``.
     """
     found = agreement(a, b, tolerance)
@@ -170,7 +171,7 @@ def assert_agree(name: str, a: Array, b: Array, *, tolerance: float = 0.0) -> Ag
 
 
 def save_pictures(name: str, a: Array, b: Array, z: Array) -> Path:
-    """Writes a, b and z (grey: 0, red: a brighter, blue: darker; ±5) side by side."""
+    """Write a, b and z side by side (z: grey is 0, red a brighter, blue a darker, range ±5)."""
     OUT.mkdir(parents=True, exist_ok=True)
     path = OUT / f"{name.replace(' ', '-')}.png"
     picture_of(path, a, b, z)
@@ -178,7 +179,7 @@ def save_pictures(name: str, a: Array, b: Array, z: Array) -> Path:
 
 
 def picture_of(path: Path, a: Array, b: Array, z: Array) -> None:
-    """Writes a, b and z as ``save_pictures`` says."""
+    """Write a, b and z, see ``save_pictures``."""
     from wavecomb.picture.image import write_png
 
     mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the statistical tests share."""
+"""Fixtures of the statistical tests."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def mitsuba() -> ModuleType:
-    """Mitsuba 3, or a skip that says why not."""
+    """Mitsuba 3; skips the test if it is not available."""
     try:
         from mitsuba_bridge import load_mitsuba
 
@@ -33,7 +33,7 @@ def mitsuba() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def generated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Writes a generated stage, small, once; gives its path."""
+    """Function that writes a small generated stage once and returns its path."""
     folder = tmp_path_factory.mktemp("generated")
 
     def stage(name: str) -> Path:
@@ -52,7 +52,7 @@ Render = Callable[..., NDArray[np.float32]]
 
 @pytest.fixture(scope="session")
 def beauty() -> Render:
-    """Renders with the plainest settings: box filter, independent sampler, no roulette."""
+    """Function that renders with plain settings: box filter, independent sampler, no roulette."""
 
     def render(scene: Any, size: int = 64, spp: int = 64, **settings: Any) -> NDArray[np.float32]:
         import wavecomb
@@ -76,16 +76,16 @@ def beauty() -> Render:
     ]
 )
 def fewer(request: pytest.FixtureRequest) -> int:
-    """What samples are divided by: in `make test`, and in `make test-long`, which sees half of it.
+    """Divisor of sample counts for `make test`; in `make test-long` it is half of that.
 
-    Welch's t makes its level of the noise that there is, so fewer samples fail no more often.
+    The noise determines the level of Welch's t, so fewer samples do not cause more failures.
     """
     return int(request.param)
 
 
 @pytest.fixture
 def recorded(tmp_path: Path) -> Callable[..., RecordingBuilder]:
-    """Writes prims to a stage, loads it, keeps the record of it."""
+    """Function that writes prims to a stage, loads it and returns the recorded scene."""
 
     def make(*prims: str) -> RecordingBuilder:
         from recording import record

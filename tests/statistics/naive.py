@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random scenes by the wave and by the naive integrator (tests/naive), which shares no sampling.
+"""Compare random scenes with the naive integrator (tests/naive), which shares no sampling code.
 
-    .venv/bin/python tests/statistics/naive.py 17                    # one seed, with its pictures
+    .venv/bin/python tests/statistics/naive.py 17                    # one seed, with its images
     .venv/bin/python tests/statistics/naive.py --from 0 --count 500  # many; exit code 1 on a fault
 
-Both render batches of other random numbers. Means over blocks of 4 x 4 pixels and over the picture,
-by channel, are compared by Welch's t. What looks odd (|z| of 3.3 or more) is rendered again with
-other numbers, twelve times as many, and what still does with sixty times as many. Only what is too
-far each time is a fault, at the level that Sidak's correction leaves of 1 % for all scenes of a
-run: light that uniform directions seldom find makes a mean that is mostly too low, the less so the
-more samples there are.
+Both integrators render batches with different random numbers. Means over blocks of 4 x 4 pixels and
+over the image are compared per channel by Welch's t. Suspicious results (|z| of 3.3 or more) are
+rendered again with new random numbers and 12 times the samples, and if still suspicious with 60
+times. Only a difference beyond the limit each time is a fault; the level is Sidak's correction of 1
+% for all scenes of a run. Repetition is needed because light that uniform directions seldom find
+mostly gives a mean that is too low, less so with more samples.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from scipy import stats  # noqa: E402
 
 SIZE, BLOCK, BATCHES = 12, 4, 10
 SPP, SAMPLES, DIRECTIONS = 96, 12, 4
-"""Of a batch: ours, and of the naive integrator with its directions at the first vertex."""
+"""Samples per batch: Wavecomb's, the naive integrator's, and its directions at the first vertex."""
 SUSPICION = 3.3
 MORE = (12, 60)
 LEVEL = 0.01
 TRIES = 64
-"""Numbers by which the naive integrator looks for delta lobes."""
+"""Number of sample values with which the naive integrator searches for delta lobes."""
 
 
 def naive_module() -> ModuleType:
-    """The naive integrator of this build.
+    """Import the naive integrator of this build.
 
     Raises:
         ImportError: It is not built, or older than the core.
@@ -56,7 +56,7 @@ def naive_module() -> ModuleType:
         for module in folder.glob("wavecomb_naive*.so"):
             core = folder.parents[1] / "libwavecomb.a"
             if core.exists() and core.stat().st_mtime > module.stat().st_mtime:
-                # It would take scenes of another layout.
+                # Its scenes could have a different memory layout.
                 raise ImportError("is older than the core: make build-test-tools")
             sys.path.insert(0, str(folder))
             return importlib.import_module("wavecomb_naive")
@@ -65,14 +65,14 @@ def naive_module() -> ModuleType:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two pictures of one scene, as batches, and how far they are apart.
+    """Images of one scene by both integrators, as batches, and their differences.
 
     Attributes:
-        ours: (n, height, width, 3), the wave's.
-        naive: The naive integrator's.
-        z: Deviates of blocks and of the whole picture, flat; positive: ours is brighter.
-        difference: Relative difference of the whole picture, by channel.
-        error: Its standard error.
+        ours: Images of Wavecomb, (n, height, width, 3).
+        naive: Images of the naive integrator.
+        z: Deviates of blocks and of the whole image, flat; positive if Wavecomb is brighter.
+        difference: Relative difference of the mean image per channel.
+        error: Standard error of ``difference``.
     """
 
     ours: Array
@@ -83,15 +83,15 @@ class Comparison:
 
     @property
     def worst(self) -> float:
-        """The largest magnitude of z."""
+        """Largest magnitude of z."""
         return float(np.abs(self.z).max())
 
     def of_mean(self) -> Comparison:
-        """The comparison of the whole pictures alone."""
+        """The comparison of the image means only."""
         return replace(self, z=self.z[-3:])
 
     def is_fault(self, scenes: int) -> bool:
-        """Whether it is too far for chance, being one of so many scenes."""
+        """Whether the difference exceeds chance, given the number of scenes tested."""
         return self.worst > limit(self.z.size * scenes)
 
     def __str__(self) -> str:
@@ -101,12 +101,12 @@ class Comparison:
 
 
 def limit(tests: int) -> float:
-    """|z| that is too large for that many tests, by Sidak's correction."""
+    """Limit of |z| for this number of tests, by Sidak's correction."""
     return float(stats.norm.isf((1.0 - (1.0 - LEVEL) ** (1.0 / tests)) / 2.0))
 
 
 def judge(ours: Array, naive: Array, *, tolerance: float = 0.0) -> Comparison:
-    """Compares two pictures given as batches; ``tolerance``: relative difference that is none."""
+    """Compare two images given as batches; ``tolerance`` is a relative difference to ignore."""
 
     def tested(x: Array) -> Array:
         n, height, width, _ = x.shape
@@ -120,7 +120,7 @@ def judge(ours: Array, naive: Array, *, tolerance: float = 0.0) -> Comparison:
     noisy = error2 > (1e-5 * level) ** 2
     z = welch(a, b, tolerance * level, noisy)
     relative = (a.mean(axis=0) - b.mean(axis=0)) / level
-    # Without noise there is nothing to wait for: rounding is all that may differ.
+    # Without noise, only rounding may differ.
     z = np.where(
         noisy, z, np.where(np.abs(relative) > tolerance + 1e-3, 99.0 * np.sign(relative), 0.0)
     )
@@ -128,7 +128,7 @@ def judge(ours: Array, naive: Array, *, tolerance: float = 0.0) -> Comparison:
 
 
 def compare(scene: RandomScene, *, more: int = 1, first_seed: int = 0) -> Comparison:
-    """Renders a scene both ways, with ``more`` times as many samples."""
+    """Render a scene with both integrators, with ``more`` times as many samples."""
     import wavecomb
 
     module = naive_module()
@@ -170,7 +170,7 @@ def compare(scene: RandomScene, *, more: int = 1, first_seed: int = 0) -> Compar
 
 
 def examine(scene: RandomScene) -> Comparison:
-    """Compares; and again, with more and other samples, what looks odd."""
+    """Compare, and repeat with more samples and new random numbers if the result is suspicious."""
     found = compare(scene)
     for turn, more in enumerate(MORE, 1):
         if found.worst < SUSPICION:
@@ -180,7 +180,7 @@ def examine(scene: RandomScene) -> Comparison:
 
 
 def save(found: Comparison, folder: Path) -> None:
-    """Writes both pictures as EXR files, and side by side with z as PNG."""
+    """Write both images as EXR files, and side by side with z as a PNG."""
     from agreement import picture_of
 
     from wavecomb.picture.exr import write_exr
@@ -195,7 +195,7 @@ def save(found: Comparison, folder: Path) -> None:
 
 
 def main() -> int:
-    """The command."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("seed", nargs="?", type=int, help="of one scene")
     parser.add_argument("--from", dest="first", type=int, default=0, metavar="SEED")

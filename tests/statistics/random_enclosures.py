@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Enclosures of random scenes: shells around lights, thin walls, nested glass, touching lights.
 
-Light transport through a closed surface is where sampling techniques disagree most easily: shadow
-rays start at offset points, end on lights that are near, and cross boundaries of media.
+Sampling techniques disagree most easily where light passes through a closed surface: shadow rays
+start at offset origins, end on close lights, and cross boundaries of media.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from random_materials import Materials, colour, number
 from stages import box, matrix, moved, quad, sphere, turned
 
 KINDS = ("lit shell", "thin wall", "lit subsurface", "nested glass", "touching light")
-"""Kinds of enclosures. Consecutive seeds have one each in turn, and every sixth seed has none."""
+"""Kinds of enclosures. Consecutive seeds cycle through them; every sixth seed has none."""
 
 
 class Enclosures:
-    """Makes enclosures at random and keeps their text.
+    """Generates random enclosures as USD text.
 
     Attributes:
         prims: USD text of the objects and lights.
@@ -44,7 +44,7 @@ class Enclosures:
         return float(self.random.uniform(low, high))
 
     def add(self, kind: str, centre: Any) -> None:
-        """Adds an enclosure of a kind of ``KINDS`` about a point."""
+        """Add an enclosure of a kind in ``KINDS`` around a point."""
         self.features.append(kind)
         {
             "lit shell": self.lit_shell,
@@ -55,7 +55,7 @@ class Enclosures:
         }[kind](np.asarray(centre, np.float64))
 
     def light(self, kind: str, at: Any, size: float, power: float, spin: Any = None) -> None:
-        """Adds a light of about this size; its radiance makes up for a small area."""
+        """Add a light of about this size; its radiance compensates for a small area."""
         place = (np.eye(4) if spin is None else spin) @ moved(*at)
         radiance = colour(self.random.uniform(0.5, 1.0, 3) * power / size**2)
         extent = {
@@ -74,7 +74,7 @@ class Enclosures:
         self.lights += 1
 
     def inner_light(self, at: Any, size: float, power: float = 0.7) -> None:
-        """Adds a light of any kind, or an emissive ball, inside an object."""
+        """Add a light of any kind, or an emissive ball, inside an object."""
         if self.chance(0.15):
             self.features.append("emissive ball inside")
             value = colour(self.random.uniform(0.5, 1.0, 3) * power / size**2)
@@ -87,7 +87,7 @@ class Enclosures:
     def closed(
         self, material: str, centre: Any, size: float, *, smooth: bool | None = None
     ) -> None:
-        """Adds a closed shape: a smooth or faceted ball, or a box."""
+        """Add a closed shape: a smooth or faceted ball, or a box."""
         name = f"E{len(self.prims)}"
         smooth = self.chance(0.6) if smooth is None else smooth
         if smooth or self.chance(0.5):
@@ -100,7 +100,7 @@ class Enclosures:
         self.prims.append(box(name, low, high, material))
 
     def thin(self) -> str:
-        """A thin-walled material that lets light through."""
+        """A thin-walled material that transmits light."""
         inputs = {
             "bool geometry_thin_walled": "true",
             "float specular_weight": number(self.between(0.0, 1.0)),
@@ -114,7 +114,7 @@ class Enclosures:
         return self.materials.open_pbr_of(inputs)
 
     def glass(self, *, absorbs: bool) -> str:
-        """Rough or smooth glass, of OpenPBR where it absorbs."""
+        """Rough or smooth glass; OpenPBR if it absorbs."""
         smooth = self.chance(0.25)
         self.delta = self.delta or smooth
         rough = "0" if smooth else number(self.between(0.3, 0.8))
@@ -137,14 +137,14 @@ class Enclosures:
         return self.materials.open_pbr_of(inputs)
 
     def lit_shell(self, centre: Any) -> None:
-        """A closed shell of thin wall or rough glass around a light, like a lampshade."""
+        """Add a closed thin-walled or rough glass shell around a light, like a lampshade."""
         size = self.between(0.5, 0.7)
         material = self.thin() if self.chance(0.6) else self.glass(absorbs=False)
         self.closed(material, centre, size, smooth=self.chance(0.75))
         self.inner_light(centre + self.random.uniform(-0.1, 0.1, 3), self.between(0.1, 0.25))
 
     def thin_wall(self, centre: Any) -> None:
-        """A thin panel, or several, close before a light."""
+        """Add one or several thin panels close to a light."""
         material = self.thin()
         for k in range(int(self.random.integers(1, 3))):
             place = turned(*self.random.uniform(-30, 30, 3)) @ moved(
@@ -157,7 +157,7 @@ class Enclosures:
         self.inner_light(behind, self.between(0.1, 0.3), 1.0)
 
     def lit_subsurface(self, centre: Any) -> None:
-        """A closed body with subsurface random walks, and a light, a body or both inside."""
+        """Add a closed body with subsurface scattering that contains a light, a body or both."""
         size = self.between(0.5, 0.7)
         inputs = {
             "float specular_weight": number(self.between(0.0, 0.6)),
@@ -178,7 +178,7 @@ class Enclosures:
         return self.materials.write("diffuse", {"color3f diffuseColor": self.materials.tint()}, {})
 
     def nested_glass(self, centre: Any) -> None:
-        """An object, opaque or of glass, inside absorbing glass, and at times a light."""
+        """Add an opaque or glass object inside absorbing glass, sometimes with a light."""
         size = self.between(0.55, 0.75)
         self.closed(self.glass(absorbs=True), centre, size)
         inner = self.opaque() if self.chance(0.6) else self.glass(absorbs=self.chance(0.6))
@@ -188,7 +188,7 @@ class Enclosures:
             self.inner_light(centre + np.array((0.0, 0.33, 0.0)), 0.12, 0.5)
 
     def touching_light(self, centre: Any) -> None:
-        """A light that touches or cuts a surface, or lies close above it."""
+        """Add a light that touches or cuts a surface, or lies just above it."""
         way = str(self.random.choice(["tangent", "sunk", "edge", "close", "cut"]))
         self.features.append(f"light {way}")
         x, _, z = centre
@@ -201,7 +201,7 @@ class Enclosures:
             spin = turned(y=self.between(-180, 180))
             self.light("Rect", (x, size, z), size, 1.0, spin)
         elif way == "close":
-            # Above the floor by a thousandth of its size, shining up or down.
+            # Above the floor by a thousandth of its size, facing up or down.
             spin = turned(x=90.0 if self.chance(0.5) else -90.0)
             self.light("Disk", (x, 1e-3, z), size, 0.7, spin)
         else:

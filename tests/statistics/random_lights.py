@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights of random scenes: all of UsdLux, large, since nothing but chance finds them."""
+"""Lights of random scenes: all kinds of UsdLux, large enough to be found by chance."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
 
 class Lights:
-    """Makes lights by chance and keeps their text.
+    """Generates random lights as USD text.
 
     Attributes:
-        prims: The text of all that were made.
-        features: What is special about them.
-        linked: Objects that links may name.
+        prims: USD text of the lights.
+        features: Names of the special features that were chosen.
+        linked: Objects that light linking may refer to.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Lights:
         return float(self.random.uniform(low, high))
 
     def add(self) -> None:
-        """One light of any kind."""
+        """Add a light of a random kind."""
         kinds = {
             "Dome": 0.18, "Rect": 0.14, "Disk": 0.09, "Sphere": 0.1, "Cylinder": 0.08,
             "Distant": 0.08, "Sun": 0.05, "Point": 0.05, "Panel": 0.15, "MeshLight": 0.08,
@@ -61,7 +61,7 @@ class Lights:
         return colour(self.random.uniform(0.3, 1.0, 3) * scale)
 
     def above(self) -> Any:
-        """A place that looks down at the objects."""
+        """A random transform above the objects that faces down."""
         angle, reach = self.between(0, 2 * np.pi), self.between(0.3, 1.6)
         eye = (reach * np.cos(angle), self.between(2.2, 2.8), reach * np.sin(angle))
         return look_at(eye, (self.between(-0.5, 0.5), 0.2, self.between(-0.5, 0.5)))
@@ -114,7 +114,7 @@ class Lights:
         return self.write(kind, name, lines, apis, shaped=shaped)
 
     def panel(self, name: str, *, light: bool) -> str:
-        """A square that glows: by its material alone, or as a mesh light."""
+        """Add an emissive square: by its material only, or as a mesh light."""
         cut = not light and self.chance(0.55)
         half = self.between(0.7, 1.2)
         corners = [(-half, half, 0), (half, half, 0), (half, -half, 0), (-half, -half, 0)]
@@ -141,7 +141,7 @@ class Lights:
     def write(
         self, kind: str, name: str, lines: list[str], apis: list[str], *, shaped: bool
     ) -> str:
-        """The prim, with what lights of any kind may have."""
+        """The prim with random attributes that all kinds of lights have."""
         if shaped:
             apis = [*apis, "ShapingAPI"]
             lines = lines + self.shaping()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of random scenes: any program, textures, presence, glow; rough enough to be met.
+"""Materials of random scenes: any program, textures, presence, emission; with wide lobes.
 
-A lobe narrower than roughness 0.4 is left to chi-square tests: uniform directions hardly find it.
-Smooth ones are there: the naive integrator follows each by itself.
+Lobes narrower than roughness 0.4 are left to the chi-square tests, since uniform directions hardly
+find them. Perfectly smooth lobes are included: the naive integrator follows each one explicitly.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ def colour(values: Any) -> str:
 
 
 class Materials:
-    """Makes materials by chance and keeps their text.
+    """Generates random materials as USD text.
 
     Attributes:
-        prims: The text of all that were made.
-        features: What is special about them.
-        delta: Whether some lobe is perfectly narrow.
+        prims: USD text of the materials.
+        features: Names of the special features that were chosen.
+        delta: Whether a material has a perfectly smooth lobe.
     """
 
     def __init__(self, random: Generator, folder: Path, depth: int) -> None:
@@ -39,8 +39,8 @@ class Materials:
         self.prims: list[str] = []
         self.features: list[str] = []
         self.delta = False
-        # A later vertex reads textures as blurred as its own lobe's bounce made the ray, which
-        # uniform directions do not know; and what is driven by a texture is not linear.
+        # Later vertices filter textures by the ray cone of the sampled lobe, which the naive
+        # integrator's uniform directions do not have; and textured parameters are not linear.
         self.plain = depth > 1
 
     def chance(self, p: float) -> bool:
@@ -56,20 +56,20 @@ class Materials:
         return number(self.between(0.4, 1.0))
 
     def image(self, texels: int, low: float, high: float) -> str:
-        """A file of random texels."""
+        """Write a file of random texels."""
         path = self.folder / f"{len(list(self.folder.glob('*.png')))}.png"
         pixels = self.random.uniform(255 * low, 255 * high, (texels, texels, 3))
         write_png_codes(path, pixels.astype(np.uint8))
         return path.name
 
     def surface(self) -> str:
-        """The path of a material of any kind."""
+        """Add a material of a random kind and return its path."""
         kinds = ["diffuse", "metal", "dielectric", "plastic", "principled", "openpbr"]
         weights = [0.22, 0.13, 0.12, 0.16, 0.22, 0.15]
         return self.of(str(self.random.choice(kinds, p=weights)))
 
     def of(self, program: str) -> str:
-        """The path of a material of a program."""
+        """Add a material of a program and return its path."""
         self.features.append(program)
         if program == "openpbr":
             return self.open_pbr()
@@ -83,7 +83,7 @@ class Materials:
                 self.features.append(f"smooth {program}")
                 self.delta = True
         if program in ("dielectric", "plastic"):
-            # Rough glass of an index near 1 is as narrow as a mirror.
+            # Rough glass with an index near 1 has a lobe as narrow as a mirror's.
             low = 1.45 if program == "dielectric" and not smooth else 1.2
             inputs["float ior"] = number(self.between(low, 2.0))
         if program == "dielectric":
@@ -96,7 +96,7 @@ class Materials:
         return self.write(program, inputs, nodes)
 
     def principled(self, inputs: dict[str, str], nodes: dict[str, tuple[str, str]]) -> None:
-        """Layers of UsdPreviewSurface."""
+        """Choose the layers of UsdPreviewSurface."""
         if self.chance(0.3):
             inputs["float metallic"] = number(self.between(0.2, 1.0))
         if self.chance(0.3):
@@ -116,7 +116,7 @@ class Materials:
     def opacity(
         self, inputs: dict[str, str], nodes: dict[str, tuple[str, str]], *, may_transmit: bool
     ) -> None:
-        """Cut-outs by presence or by threshold, or transparency."""
+        """Choose a cut-out by presence or threshold, or transparency."""
         ways = ["presence", "presence", "threshold", "transparent"]
         way = str(self.random.choice(ways if may_transmit else ways[:3]))
         self.features.append(way)
@@ -135,7 +135,7 @@ class Materials:
     def glow(
         self, inputs: dict[str, str], nodes: dict[str, tuple[str, str]], strength: float
     ) -> None:
-        """Makes a material shine."""
+        """Make a material emissive."""
         self.features.append("glow")
         inputs["color3f emissiveColor"] = colour(self.random.uniform(0.3, 1.0, 3) * strength)
         if self.chance(0.3):
@@ -143,7 +143,7 @@ class Materials:
             nodes["color3f emissiveColor"] = (self.image(2, 0.1, 1.0), "rgb")
 
     def glowing(self, *, cut: bool) -> str:
-        """The path of a material that shines, part of which may not be there."""
+        """Add an emissive material, with cut-outs if ``cut``; return its path."""
         inputs: dict[str, str] = {"color3f diffuseColor": self.tint(), "float roughness": "0.6"}
         nodes: dict[str, tuple[str, str]] = {}
         self.glow(inputs, nodes, 3.0)
@@ -156,7 +156,7 @@ class Materials:
         return self.write("principled", inputs, nodes)
 
     def open_pbr(self) -> str:
-        """MaterialX's open_pbr_surface."""
+        """Add a MaterialX open_pbr_surface with random inputs; return its path."""
         inputs = {
             "color3f base_color": self.tint(),
             "float base_diffuse_roughness": number(self.between(0.0, 1.0)),
@@ -187,7 +187,7 @@ class Materials:
         return self.open_pbr_of(inputs)
 
     def open_pbr_of(self, inputs: dict[str, str]) -> str:
-        """Adds an open_pbr_surface with these inputs, "type name" to value; returns its path."""
+        """Add an open_pbr_surface with these inputs ("type name" to value); return its path."""
         name = f"M{len(self.prims)}"
         lines = "\n".join(
             f"{key.split()[0]} inputs:{key.split()[1]} = {value}" for key, value in inputs.items()
@@ -203,7 +203,7 @@ class Materials:
         return name
 
     def write(self, program: str, inputs: dict[str, str], nodes: dict[str, tuple[str, str]]) -> str:
-        """Adds a UsdPreviewSurface; ``nodes``: image and channel by input."""
+        """Add a UsdPreviewSurface; ``nodes`` maps inputs to image and channel."""
         name = f"M{len(self.prims)}"
         lines, readers = [], []
         for key, value in inputs.items():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small random scenes in which features meet: a floor, some objects, some lights, some settings.
+"""Small random scenes that combine features: a floor, some objects, lights and settings.
 
-Everything is a function of the seed. Lights are large and near and lobes wide, so that uniform
-directions find them; pictures are tiny, paths short.
+Everything is a function of the seed. Lights are large and close and lobes are wide, so that uniform
+directions find them; images are tiny and paths short.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class RandomScene:
     Attributes:
         stage: The file.
         load: Options of ``wavecomb.load``.
-        settings: Of the render: those that may change noise, but no mean.
+        settings: Render settings that may change noise but not the mean.
         depth: max_depth.
-        schlick: Whether Fresnel is by Schlick's formula.
-        delta: Whether some lobe is perfectly narrow.
-        features: What meets here.
-        single_light: Whether a single light, hidden or not, may give one image: an area light
-            without other emitters, lobes that are not perfectly narrow, a path of one scattering.
+        schlick: Whether Schlick's approximation replaces exact Fresnel.
+        delta: Whether a material has a perfectly smooth lobe.
+        features: Names of the features that the scene combines.
+        single_light: Whether hiding the only light leaves the image unchanged: an area light
+            without other emitters, no perfectly smooth lobes, and one scattering event at most.
     """
 
     stage: Path
@@ -48,7 +48,7 @@ class RandomScene:
 
 
 class Objects:
-    """Makes objects by chance and keeps their text."""
+    """Generates random objects as USD text."""
 
     def __init__(self, random: Generator, materials: Materials) -> None:
         self.random = random
@@ -63,7 +63,7 @@ class Objects:
         return bool(self.random.random() < p)
 
     def add(self, centre: Any) -> None:
-        """An object about a place."""
+        """Add an object at a point."""
         name = f"O{len(self.names)}"
         self.names.append(name)
         kinds = ["ball", "smooth ball", "box", "panel", "cage", "instances", "points", "gprim"]
@@ -99,7 +99,7 @@ class Objects:
         )
 
     def body(self, kind: str, name: str, material: str) -> str:
-        """The prim about the origin, without its place."""
+        """The prim at the origin, before its transform."""
         size = float(self.random.uniform(0.5, 0.7))
         if kind in ("ball", "smooth ball"):
             return sphere(name, material, radius=size, rings=8, smooth=kind == "smooth ball")
@@ -133,7 +133,7 @@ class Objects:
         return text
 
     def instances(self, text: str, name: str, centre: Any) -> str:
-        """The prim as the prototype of two instances."""
+        """The prim as prototype of two instances."""
         rows = [
             turned(*self.random.uniform(-40, 40, 3)) @ moved(*(np.asarray(centre) + shift))
             for shift in ((-0.3, 0.0, 0.0), (0.3, 0.2, -0.4))
@@ -148,7 +148,7 @@ class Objects:
 
 
 def view(random: Generator, features: list[str], *, moves: bool) -> tuple[str, dict[str, Any]]:
-    """A camera that sees all objects, and the options that belong to it."""
+    """A camera that sees all objects, and its render options."""
     load: dict[str, Any] = {}
     angle = random.uniform(-0.6, 0.6)
     eye = (6 * np.sin(angle), random.uniform(2, 4), 6 * np.cos(angle))
@@ -170,7 +170,7 @@ def view(random: Generator, features: list[str], *, moves: bool) -> tuple[str, d
 
 
 def settings(random: Generator, features: list[str]) -> dict[str, Any]:
-    """Settings that change noise, but no mean."""
+    """Random settings that change noise but not the mean."""
 
     def one(*values: Any) -> Any:
         return values[int(random.integers(len(values)))]
@@ -179,7 +179,8 @@ def settings(random: Generator, features: list[str]) -> dict[str, Any]:
         "sampler": one("independent", "independent", "sobol"),
         "roulette": one("off", "off", "throughput", "cost-aware"),
         "roulette_depth": 1,
-        # As the naive integrator does: one texel has another mean where shading is not linear.
+        # Matches the naive integrator: stochastic texel lookups change the mean where shading is
+        # not linear.
         "texture_filter": "whole",
         "light_selection": one("auto", "tree", "power"),
         "cosine_sampling": bool(random.random() < 0.15),
@@ -196,10 +197,10 @@ def settings(random: Generator, features: list[str]) -> dict[str, Any]:
 def enclosed(
     seed: int, materials: Materials, objects: Objects, places: list[Any], depth: int
 ) -> tuple[Enclosures, int, bool]:
-    """Adds the enclosure of a seed for comparisons of settings.
+    """Add the enclosure of a seed, for comparisons of settings.
 
     Returns:
-        The enclosure, the max_depth of the stage, and whether its light is the only one.
+        The enclosure, the max_depth of the stage, and whether it contains the only light.
     """
     random = np.random.default_rng((53, seed))
     enclosures = Enclosures(random, materials)
@@ -207,18 +208,20 @@ def enclosed(
     if kind < len(KINDS):
         enclosures.add(KINDS[kind], places[int(random.integers(len(places)))])
     objects.prims += enclosures.prims
-    # Textures need paths of one scattering at most, as in the stages without enclosures.
+    # Textures need paths of one scattering event at most, as in stages without enclosures.
     depths, shares = ([0, 1], [0.25, 0.75]) if depth == 1 else ([2, 3, 6], [0.4, 0.3, 0.3])
     alone = enclosures.lights > 0 and bool(random.random() < 0.5)
     return enclosures, int(random.choice(depths, p=shares)), alone
 
 
 def make_scene(seed: int, folder: Path, *, enclosure: bool = False) -> RandomScene:
-    """Writes the stage of a seed, with its files, to an empty folder.
+    """Write the stage of a seed and its files to an empty folder.
 
     Args:
-        enclosure: Adds an enclosure of ``random_enclosures`` to the stage, which only settings are
-            compared on: the naive integrator has no subsurface and would miss small lights.
+        seed: Determines everything in the scene.
+        folder: The empty folder.
+        enclosure: Add an enclosure of ``random_enclosures``. Such stages only serve to compare
+            settings: the naive integrator has no subsurface and would miss small lights.
     """
     random = np.random.default_rng(seed)
     depth = int(random.choice([1, 2, 3], p=[0.6, 0.32, 0.08]))
@@ -272,7 +275,7 @@ def make_scene(seed: int, folder: Path, *, enclosure: bool = False) -> RandomSce
 
 
 def is_single(lights: Lights, materials: Materials, added: Enclosures) -> bool:
-    """Whether hiding the lights of a stage changes only what sees them directly."""
+    """Whether hiding the lights of a stage changes only camera rays that hit them."""
     area = {"rect light", "disk light", "sphere light", "cylinder light"}
     outside = [word for word in lights.features if word.endswith(" light")]
     emissive = "glow" in materials.features or "emissive ball inside" in added.features

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference images of Mitsuba, kept on disk by a hash of all that they depend on.
+"""Disk cache of Mitsuba's reference images, keyed by a hash of everything that they depend on.
 
-The hash covers the recorded scene, the settings, the number of samples, the seed, Mitsuba's version
-and variant, and the sources that translate a scene. Images are in build/references;
-`WAVECOMB_REFERENCES=0` renders each anew, and `make clean` removes them.
+The hash covers the recorded scene, settings, number of samples, seed, Mitsuba's version and
+variant, and the sources that translate a scene. Images are in build/references;
+`WAVECOMB_REFERENCES=0` renders each one anew, and `make clean` removes them.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "references"
 MOST_BYTES = 300_000_000
-"""Above this the images that were used longest ago are removed."""
+"""Size of the cache; beyond it, the least recently used images are removed."""
 
 Image = NDArray[np.float32]
 
 
 class Cache:
-    """Arrays in a folder by their keys."""
+    """Arrays stored in a folder by key."""
 
     def __init__(self, folder: Path, most_bytes: int = MOST_BYTES) -> None:
         self._folder = folder
         self._most_bytes = most_bytes
 
     def get(self, key: str, make: Callable[[], Image]) -> Image:
-        """The array of a key, which is made if it is not there or cannot be read."""
+        """Return the array of a key; make it if it is missing or unreadable."""
         path = self._folder / f"{key}.npy"
         try:
             found: Image = np.load(path)
@@ -52,7 +52,7 @@ class Cache:
             pass
         made = make()
         self._folder.mkdir(parents=True, exist_ok=True)
-        # Whole or absent: workers of pytest share the folder.
+        # Write to a temporary file first: pytest workers share the folder.
         handle, part = tempfile.mkstemp(dir=self._folder, suffix=".part")
         with os.fdopen(handle, "wb") as file:
             np.save(file, made)
@@ -77,10 +77,10 @@ class Cache:
 
 
 def key_of(*values: Any) -> str:
-    """A hash of values: numbers, texts, bytes, arrays, and what holds such.
+    """Hash of numbers, texts, bytes, arrays, and containers of them.
 
     Raises:
-        TypeError: A value is of another type, whose content is not known.
+        TypeError: A value has another type, whose content cannot be hashed.
     """
     told = hashlib.sha256()
 
@@ -116,14 +116,14 @@ def key_of(*values: Any) -> str:
 
 @cache
 def _sources() -> str:
-    """A hash of what translates a scene."""
+    """Hash of the sources that translate a scene."""
     peers = ROOT / "benchmarks" / "peers"
     files = [peers / "recorded.py", *sorted(peers.glob("mitsuba_*.py"))]
     return key_of({file.name: file.read_bytes() for file in files})
 
 
 class Reference:
-    """A recorded scene as Mitsuba renders it; Mitsuba gets it when an image is not kept."""
+    """A recorded scene as Mitsuba renders it. Mitsuba is only used if an image is not cached."""
 
     def __init__(
         self,
@@ -133,14 +133,14 @@ class Reference:
         kind: type[MitsubaScene] | None = None,
         about: object = (),
     ) -> None:
-        """Takes the arguments of a ``MitsubaScene``.
+        """Take the arguments of a ``MitsubaScene``.
 
         Args:
             mitsuba: The module.
             recorded: The scene.
-            settings: Size and depth.
-            kind: A class derived from ``MitsubaScene``, with what ours has no words for.
-            about: All that such a class adds.
+            settings: Image size and path depth.
+            kind: Class derived from ``MitsubaScene`` that adds features which cannot be recorded.
+            about: All parameters of such a class; part of the key.
         """
         from mitsuba_bridge import MitsubaScene
         from recorded import Recorded
@@ -151,10 +151,10 @@ class Reference:
         self._is_kept = "WAVECOMB_REFERENCES" not in os.environ or is_on("WAVECOMB_REFERENCES")
         self._key = ""
         if self._is_kept:
-            # Not what only the recording has, such as the scene that it built.
+            # Skip attributes that only the recording has, such as the scene that it built.
             names = [one.name for one in dataclasses.fields(Recorded)]
             content = {name: getattr(recorded, name) for name in names}
-            # A texture's name is the path of its file, which lies in a temporary folder.
+            # The name of a texture is its file path, in a temporary folder.
             content["textures"] = [
                 {key: value for key, value in one.items() if key != "name"}
                 for one in recorded.textures
@@ -163,7 +163,7 @@ class Reference:
             self._key = key_of(tool, content, settings, about)
 
     def render(self, spp: int, seed: int = 0) -> Image:
-        """The image of some samples a pixel."""
+        """Render ``spp`` samples per pixel, or return the cached image."""
         if not self._is_kept:
             return self._render(spp, seed)
         key = key_of(self._key, spp, seed)

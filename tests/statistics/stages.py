@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small USD stages as text, for tests that know what they should look like."""
+"""Small USD stages as text, for tests with known results."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 
 
 def write_stage(path: Path, *prims: str) -> Path:
-    """Writes prims, given as text, to a Y-up stage."""
+    """Write prims, given as text, to a Y-up stage."""
     header = '#usda 1.0\n(\ndefaultPrim = "World"\nmetersPerUnit = 1\nupAxis = "Y"\n)\n'
     path.write_text(header + 'def Xform "World" {\n' + "\n".join(prims) + "\n}\n")
     return path
 
 
 def numbers(values: Any) -> str:
-    """A tuple, or a list of tuples, as USD writes it."""
+    """Format a tuple, or a list of tuples, as USD text."""
     array = np.asarray(values, np.float64)
     if array.ndim == 1:
         return "(" + ", ".join(f"{v:.9g}" for v in array) + ")"
@@ -30,7 +30,7 @@ def numbers(values: Any) -> str:
 
 
 def matrix(rows: Array) -> str:
-    """The transform op of a prim, row vectors."""
+    """Transform op of a prim, for row vectors."""
     inner = ", ".join("(" + ", ".join(f"{v:.17g}" for v in row) + ")" for row in rows)
     return (
         f"matrix4d xformOp:transform = ( {inner} )\n"
@@ -39,7 +39,7 @@ def matrix(rows: Array) -> str:
 
 
 def look_at(eye: Vector, target: Vector) -> Array:
-    """The transform of what looks (or shines) from eye to target along its -z."""
+    """Transform of a camera or light at ``eye`` that points at ``target`` along its -z."""
     back = np.subtract(eye, target).astype(np.float64)
     back /= np.linalg.norm(back)
     up = np.array((0.0, 1.0, 0.0)) if abs(back[1]) < 0.99 else np.array((0.0, 0.0, -1.0))
@@ -53,7 +53,7 @@ def look_at(eye: Vector, target: Vector) -> Array:
 def camera(
     eye: Vector, target: Vector, half: float = 0.3, lens: str = "", clip: Vector = (1e-3, 1e6)
 ) -> str:
-    """A camera whose picture is 2 x ``half`` wide at distance 1."""
+    """Camera whose image is 2 x ``half`` wide at distance 1."""
     aperture = 2.0 * half * 50.0
     return f"""def Camera "Camera" {{
         float focalLength = 50
@@ -75,7 +75,7 @@ def mesh(
     normals: Any = None,
     transform: Array | None = None,
 ) -> str:
-    """A polygon mesh; normals and uv are of its points."""
+    """Polygon mesh; normals and uv are per point."""
     lines = [
         f"point3f[] points = {numbers(points)}",
         f"int[] faceVertexCounts = {[len(face) for face in faces]}",
@@ -95,7 +95,7 @@ def mesh(
 
 
 def quad(name: str, corners: Any, material: str | None, **options: Any) -> str:
-    """One face of four corners, counter-clockwise from the front."""
+    """A face of four corners, counter-clockwise seen from the front."""
     return mesh(name, corners, [[0, 1, 2, 3]], material, **options)
 
 
@@ -107,7 +107,7 @@ def ground(material: str, half: float = 4.0, height: float = 0.0) -> str:
 
 
 def box(name: str, low: Vector, high: Vector, material: str) -> str:
-    """A closed box, outside out."""
+    """A closed box with outward winding."""
     points = [
         (x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])
     ]
@@ -125,7 +125,7 @@ def sphere(
     smooth: bool = False,
     transform: Array | None = None,
 ) -> str:
-    """A sphere of flat faces, or of many with smooth normals."""
+    """A faceted sphere, or a fine one with smooth normals."""
     theta = np.linspace(0.0, np.pi, rings + 1)[1:-1]
     count = 2 * rings
     phi = 2.0 * np.pi * np.arange(count) / count
@@ -173,7 +173,7 @@ def material(
     k: Vector | None = None,
     **inputs: Any,
 ) -> str:
-    """A UsdPreviewSurface with a program; texture: of diffuseColor, clamped, raw."""
+    """UsdPreviewSurface with a program. ``texture`` is a file for diffuseColor: clamped, raw."""
     lines = [f'custom string wavecomb:program = "{program}"']
     for key, value in (("eta", eta), ("k", k)):
         if value is not None:
@@ -218,7 +218,7 @@ def light(
     transform: Array | None = None,
     **inputs: Any,
 ) -> str:
-    """A UsdLux light: kind "Rect", "Sphere", "Distant", "Dome", "Disk"."""
+    """UsdLux light of kind "Rect", "Sphere", "Distant", "Dome" or "Disk"."""
     lines = [f"color3f inputs:color = {numbers(colour)}", "float inputs:intensity = 1"]
     for key, value in inputs.items():
         if key == "texture":
@@ -233,14 +233,14 @@ def light(
 
 
 def moved(x: float, y: float, z: float) -> Array:
-    """A translation, row vectors."""
+    """Translation, for row vectors."""
     out = np.eye(4)
     out[3, :3] = (x, y, z)
     return out
 
 
 def turned(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
-    """Turns by degrees about x, then y, then z, row vectors."""
+    """Rotation in degrees about x, then y, then z, for row vectors."""
     out = np.eye(4)
     for axis, degrees in enumerate((x, y, z)):
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
@@ -252,9 +252,9 @@ def turned(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
 
 
 def latlong_directions(height: int) -> Array:
-    """Directions of the pixels of a latlong image of OpenEXR's convention, (h, 2 h, 3).
+    """Directions of the pixels of a latlong image in OpenEXR's convention, (h, 2 h, 3).
 
-    The centre looks at +z, the left quarter's edge (s = 1/4) at +x, the top row up.
+    The centre points along +z, s = 1/4 along +x, the top row up.
     """
     t = (np.arange(height) + 0.5) / height
     s = (np.arange(2 * height) + 0.5) / (2 * height)
@@ -267,7 +267,7 @@ def latlong_directions(height: int) -> Array:
 
 
 def sky(directions: Array) -> Array:
-    """A smooth environment without any symmetry, (..., 3), from 0.1 to 2.5."""
+    """Smooth environment without symmetry, (..., 3), from 0.1 to 2.5."""
     x, y, z = np.moveaxis(directions, -1, 0)
     red = np.exp(1.5 * (0.8 * x + 0.5 * y + 0.33 * z - 0.4))
     green = 0.5 + 0.4 * z + 0.05 * x
@@ -276,7 +276,7 @@ def sky(directions: Array) -> Array:
 
 
 def write_sky(folder: Path, height: int = 128) -> Path:
-    """``sky`` as an EXR file."""
+    """Write ``sky`` as an EXR file."""
     from wavecomb.scenes.textures import write_image
 
     path = folder / "sky.exr"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The referee itself: it accepts noise, however skewed, and finds small faults."""
+"""Tests of the agreement test: it accepts skewed noise and detects small faults."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SHAPE = (8, 64, 64, 3)
 
 
 def noise(seed: int, spread: float = 0.3) -> np.ndarray:
-    """Pictures of level 1 with noise of a log-normal: skewed, as a path tracer's."""
+    """Images of mean 1 with log-normal noise, which is skewed like a path tracer's."""
     rng = np.random.default_rng(seed)
     skewed = rng.lognormal(-(spread**2) / 2, spread, SHAPE)
     return skewed * np.linspace(0.1, 2.0, SHAPE[2])[None, None, :, None]
@@ -27,13 +27,13 @@ def passes(a: np.ndarray, b: np.ndarray, tolerance: float = 0.0) -> bool:
 
 @pytest.mark.parametrize("spread", [0.05, 0.3, 0.8])
 def test_accepts_noise(spread: float) -> None:
-    """Of 20 equal pairs none or one fails; their noise differs as two renderers' does."""
+    """At most one of 20 equal pairs fails, although their noise differs as between renderers."""
     bad = sum(not passes(noise(k, spread), noise(100 + k, 0.6 * spread)) for k in range(20))
     assert bad <= 1
 
 
 def test_finds_one_percent_everywhere() -> None:
-    """The noise of a mean picture is 0.2 % here; in the tests it is 0.02 to 0.2 %."""
+    """The noise of the mean image is 0.2 % here; in real tests it is 0.02 to 0.2 %."""
     assert passes(noise(0), noise(1))
     assert not passes(noise(0) * 1.01, noise(1))
 

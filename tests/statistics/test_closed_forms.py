@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes with a known answer, through the whole way: USD text, loader, renderer."""
+"""Scenes with a known answer, rendered from USD text through loader and renderer."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ import wavecomb
 
 SIZE, SPP = 24, 1024
 INSIDE = slice(10, 14)
-"""Pixels in the middle."""
+"""Pixels in the middle of the image."""
 
 
 @pytest.fixture
 def shot(tmp_path: Path, beauty: Any) -> Any:
-    """Renders prims."""
+    """Function that renders prims."""
 
     def render(*prims: str, size: int = SIZE, spp: int = SPP, **settings: Any) -> Any:
         stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
@@ -44,16 +44,16 @@ def shot(tmp_path: Path, beauty: Any) -> Any:
     return render
 
 
-# ---- the furnace ---------------------------------------------------------------------------------
+# ---- white furnace -------------------------------------------------------------------------------
 
 AT_BALL = camera((0, 0, 6), (0, 0, 0), half=0.1)
 WHITE = light("Dome")
 
 
 def test_diffuse_furnace_with_all_bounces(shot: Any) -> None:
-    """Radiance 1 all around a white diffuse body: 1 everywhere.
+    """A white diffuse body in radiance 1 from all sides has radiance 1.
 
-    A flat-faced ball sees only the dome, so one bounce is all.
+    A faceted ball receives only the dome's light, so one bounce is sufficient.
     """
     picture = shot(
         AT_BALL, WHITE, material("M", "diffuse", diffuseColor=(1, 1, 1)), sphere("B", "M")
@@ -66,9 +66,9 @@ def test_diffuse_furnace_with_all_bounces(shot: Any) -> None:
 def test_mirrors_with_tilted_normals_see_the_sky(
     shot: Any, tilt: tuple[float, float], behind: bool
 ) -> None:
-    """A mirror under an even dome shows 1, however its normal map tilts it.
+    """A mirror under a uniform dome has radiance 1 for any normal map.
 
-    At 80 degrees it would mirror what is below its own surface.
+    At 80 degrees the unadjusted normal would reflect rays below the surface.
     """
     normal = (*tilt, float(np.sqrt(1.0 - np.hypot(*tilt) ** 2)))
     mirror = material(
@@ -86,7 +86,7 @@ def test_mirrors_with_tilted_normals_see_the_sky(
 
 
 def test_grey_furnace(shot: Any) -> None:
-    """A body of albedo a shows a."""
+    """A body of albedo a has radiance a."""
     albedo = np.array((0.8, 0.5, 0.2))
     body = material("M", "diffuse", diffuseColor=tuple(albedo))
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"))
@@ -96,10 +96,10 @@ def test_grey_furnace(shot: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("roulette", ["off", "throughput"])
 def test_integrating_sphere(shot: Any, roulette: str) -> None:
-    """A point light of intensity I in the middle of a diffuse cavity of radius R and albedo a.
+    """A point light of intensity I at the centre of a diffuse cavity of radius R and albedo a.
 
-    Light between any two points of a sphere is the same, so radiance is uniform: with E = I / R^2,
-    a E / pi (1 + a + a^2 ...) = a I / (pi R^2 (1 - a)).
+    The form factor between any two points of a sphere is the same, so radiance is uniform. With E =
+    I / R^2: a E / pi (1 + a + a^2 ...) = a I / (pi R^2 (1 - a)).
     """
     albedo = np.array((0.9, 0.6, 0.3))
     walls = material("M", "diffuse", diffuseColor=tuple(albedo))
@@ -109,7 +109,7 @@ def test_integrating_sphere(shot: Any, roulette: str) -> None:
                    max_depth=80, roulette=roulette)  # fmt: skip
     expected = albedo * 10.0 / (np.pi * 4.0 * (1.0 - albedo))
     assert np.abs(picture.mean(axis=(0, 1)) / expected - 1.0).max() < 5e-3
-    # Uniform, too.
+    # Uniform as well.
     assert np.abs(picture.reshape(4, 4, 4, 4, 3).mean(axis=(1, 3)) / expected - 1.0).max() < 0.06
 
 
@@ -126,14 +126,14 @@ PROGRAMS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_no_program_makes_energy(shot: Any, program: str, roughness: float) -> None:
-    """White in a white furnace: at most 1, and as much as its model keeps."""
+    """White in a white furnace: at most 1, and at least what the model conserves."""
     body = material("M", program, roughness=roughness, **PROGRAMS[program])
     depth = 32 if program == "dielectric" else 1
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"), spp=512, size=16, max_depth=depth)
     mean = picture.mean()
-    # Rough glass loses what is scattered between facets (of one crossing, tests/cpp holds it to the
-    # integral). A ball of roughness 1 is down to 0.36, and Mitsuba's to 0.35: single scattering at
-    # two interfaces and more.
+    # Rough glass loses multiple scattering between microfacets (tests/cpp compares a single
+    # interface with the integral). A ball of roughness 1 has 0.36, and Mitsuba's 0.35, by single
+    # scattering at two or more interfaces.
     lowest = {"diffuse": 0.999, "metal": 0.97, "dielectric": 0.35 if roughness > 0.6 else 0.74}
     assert lowest.get(program, 0.99) < mean < 1.003, f"{program} {roughness}: {mean:.4f}"
 
@@ -144,7 +144,7 @@ def test_clearcoat_makes_no_energy(shot: Any) -> None:
 
 
 def test_smooth_glass_keeps_all_energy(shot: Any) -> None:
-    """With the 1 / eta^2 of radiance undone on the way out: exactly 1 for all paths that end."""
+    """The radiance scaling 1 / eta^2 cancels on the way out: exactly 1 for all paths that end."""
     body = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.0, ior=1.5)
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M", rings=48, smooth=True), max_depth=200)
     assert abs(picture.mean() - 1.0) < 2e-3
@@ -154,7 +154,7 @@ def test_smooth_glass_keeps_all_energy(shot: Any) -> None:
 
 FLOOR = material("M", "diffuse", diffuseColor=(0.5, 0.5, 0.5))
 DOWN = camera((0, 5, 0), (0, 0, 0), half=0.004)
-"""Sees 4 cm around the origin from above."""
+"""Camera from above that sees 4 cm around the origin."""
 
 
 def floor_radiance(shot: Any, *lights: str) -> NDArray[np.float64]:
@@ -163,9 +163,9 @@ def floor_radiance(shot: Any, *lights: str) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("angle", [0.0, 0.53, 20.0])
 def test_distant_light(shot: Any, angle: float) -> None:
-    """Normalized: irradiance E at normal incidence whatever the angle; E cos(40°) on the floor.
+    """Normalised: irradiance E at normal incidence for any angle, and E cos(40°) on the floor.
 
-    The cosine over a cone that does not meet the horizon averages to the cosine of its axis.
+    The cosine averaged over a cone above the horizon is the cosine of its axis.
     """
     sun = light(
         "Distant", colour=(2, 1, 3), transform=turned(-90 + 40), angle=angle, normalize=True
@@ -182,7 +182,7 @@ def test_distant_light_not_normalized(shot: Any) -> None:
 
 
 def test_sphere_light(shot: Any) -> None:
-    """Over the floor at height h, radius r, wholly seen: E = pi L (r / d)^2 cos."""
+    """Sphere at height h with radius r, entirely visible from the floor: E = pi L (r / d)^2 cos."""
     lamp = light("Sphere", colour=(8, 4, 2), transform=moved(1.5, 2.0, 0), radius=0.5)
     d2 = 1.5**2 + 2.0**2
     expected = 0.5 * np.array((8, 4, 2)) * 0.25 / d2 * (2.0 / np.sqrt(d2))
@@ -190,9 +190,9 @@ def test_sphere_light(shot: Any) -> None:
 
 
 def test_disk_light(shot: Any) -> None:
-    """Above the floor, parallel, centred: E = pi L r^2 / (r^2 + h^2)."""
+    """Parallel to the floor and centred: E = pi L r^2 / (r^2 + h^2)."""
     lamp = light("Disk", colour=(8, 4, 2), transform=turned(-90) @ moved(0, 3, 0), radius=1.0)
-    # The disk is seen from above by the camera's rays only if they meet it: they start below it.
+    # The camera starts below the disk, so that its rays do not hit the disk.
     below = camera((0, 2.5, 0), (0, 0, 0), half=0.004)
     picture = shot(below, FLOOR, ground("M"), lamp, max_depth=1, spp=2048).mean(axis=(0, 1))
     expected = 0.5 * np.array((8, 4, 2)) / 10.0
@@ -213,7 +213,7 @@ def test_rect_light(shot: Any) -> None:
 
 
 def test_rect_light_shines_one_way(shot: Any) -> None:
-    """Along its -z, and is black from behind."""
+    """A rect emits along -z and is black at the back."""
     up = light("Rect", transform=turned(90) @ moved(0, 2, 0), width=1, height=1)
     below = camera((0, 1.5, 0), (0, 0, 0), half=0.004)
     assert shot(below, FLOOR, ground("M"), up, max_depth=3, spp=16).max() == 0.0
@@ -222,7 +222,7 @@ def test_rect_light_shines_one_way(shot: Any) -> None:
 
 
 def test_half_a_dome(shot: Any, tmp_path: Path) -> None:
-    """Irradiance of an image: its cosine-weighted sum, by hand."""
+    """Irradiance of a dome image equals the cosine-weighted sum of its pixels."""
     path = write_sky(tmp_path)
     image = sky(latlong_directions(512))
     d = latlong_directions(512)
@@ -232,12 +232,12 @@ def test_half_a_dome(shot: Any, tmp_path: Path) -> None:
     assert np.abs(found / expected - 1.0).max() < 5e-3
 
 
-# ---- orientation, without a bridge that could turn both alike ------------------------------------
+# ---- orientation, without a bridge that could rotate both renderers alike ------------------------
 
 
 @pytest.mark.parametrize("turn", [(0.0, 0.0), (35.0, 0.0), (0.0, 130.0), (20.0, -75.0)])
 def test_dome_orientation(shot: Any, tmp_path: Path, turn: tuple[float, float]) -> None:
-    """Looking at the dome gives the image's formula in the dome's own frame (OpenEXR's latlong)."""
+    """Camera rays that hit the dome return the image in the dome's frame (OpenEXR's latlong)."""
     path = write_sky(tmp_path)
     frame = turned(*turn)
     for towards in ((1, 0.2, 0), (-1, -0.1, 0.1), (0.1, 0.3, 1), (0, 0, -1), (0.3, 1, 0.2)):
@@ -249,7 +249,7 @@ def test_dome_orientation(shot: Any, tmp_path: Path, turn: tuple[float, float]) 
 
 
 def test_texture_orientation(shot: Any, tmp_path: Path) -> None:
-    """USD: (0, 0) is the image's lower left, v up. 2 x 2 texels on a quad that faces us."""
+    """USD: (0, 0) is the lower left of the image, v points up. 2 x 2 texels on a quad facing us."""
     from wavecomb.scenes.textures import write_image
 
     image = np.array([[(1, 0, 0), (0, 1, 0)], [(0, 0, 1), (1, 1, 0)]], np.float32)
@@ -267,7 +267,7 @@ def test_texture_orientation(shot: Any, tmp_path: Path) -> None:
 
 
 def test_row_0_is_the_top_and_x_runs_right(shot: Any) -> None:
-    # Brighter than 1, so that the loader takes it for a lamp and adds no soft dome.
+    # Brighter than 1, so that the loader counts it as a light and adds no default dome.
     lamp = material("L", "emissive", emissiveColor=(2, 2, 2))
     corners = [(0.2, 0.2, 0), (1, 0.2, 0), (1, 1, 0), (0.2, 1, 0)]
     picture = shot(camera((0, 0, 5), (0, 0, 0), half=0.2), lamp, quad("Q", corners, "L"), spp=16)
@@ -291,7 +291,9 @@ def test_exposure_intensity_and_colour(shot: Any) -> None:
 
 
 def test_point_light_shadow_edge(shot: Any) -> None:
-    """A point light behind a screen's edge: light on one side only, of inverse square."""
+    """A point light behind the edge of a screen: light on one side only, with inverse square
+    falloff.
+    """
     lamp = light("Sphere", colour=(10, 10, 10), transform=moved(0, 2, 0), radius=0.0)
     screen = quad("Screen", [(0, 1, 3), (3, 1, 3), (3, 1, -3), (0, 1, -3)], "M")
     view = camera((0, 0.9, 0), (0, 0, 0), half=0.2)
@@ -302,7 +304,7 @@ def test_point_light_shadow_edge(shot: Any) -> None:
 
 
 def test_mirror_shows_the_dome(shot: Any, tmp_path: Path) -> None:
-    """A mirror in the plane z = 0, seen at a slant: the sky where the reflected ray goes."""
+    """A mirror in the plane z = 0, seen at an angle: the sky in the reflected direction."""
     path = write_sky(tmp_path)
     silver = material("M", "metal", diffuseColor=(1, 1, 1), roughness=0.0)
     face = quad("Q", [(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)], "M")
@@ -316,7 +318,7 @@ def test_mirror_shows_the_dome(shot: Any, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_fresnel_of_a_pane(shot: Any) -> None:
-    """Straight through a pane: two interfaces, with all reflections between them."""
+    """Straight through a pane: two interfaces with all interreflections."""
     glass = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.0, ior=1.5)
     pane = box("Pane", (-9, -9, -0.1), (9, 9, 0.1), "M")
     lamp = light("Rect", transform=look_at((0, 0, -3), (0, 0, 0)), width=1, height=1)
@@ -326,11 +328,11 @@ def test_fresnel_of_a_pane(shot: Any) -> None:
     assert picture.mean() == pytest.approx((1 - r) / (1 + r), rel=5e-3)
 
 
-# ---- other layers --------------------------------------------------------------------------------
+# ---- AOVs ----------------------------------------------------------------------------------------
 
 
 def test_layers_of_a_plane(tmp_path: Path) -> None:
-    """Depth along the axis, world normals, albedo, sample counts of a slanted plane."""
+    """Depth along the axis, world normals, albedo and sample counts of a tilted plane."""
     body = material("M", "diffuse", diffuseColor=(0.2, 0.4, 0.6))
     corners = [(-9, -9, -4.5), (9, -9, -4.5), (9, 9, 4.5), (-9, 9, 4.5)]  # z = y / 2
     view = camera((0, 0, 8), (0, 0, 0), half=0.25)
@@ -340,7 +342,7 @@ def test_layers_of_a_plane(tmp_path: Path) -> None:
     assert np.abs(picture.albedo - np.array((0.2, 0.4, 0.6))).max() < 1e-5
     normal = np.array((0, -0.5, 1)) / np.hypot(0.5, 1.0)
     assert np.abs(picture.normal - normal).max() < 1e-5
-    # On the ray with slope y: z = 8 - t, y = s t = 2 z  =>  t = 16 / (s + 2).
+    # On the ray of slope y: z = 8 - t and y = s t = 2 z, so t = 16 / (s + 2).
     slope = 0.25 - 0.5 * (np.arange(16) + 0.5) / 16
     assert np.abs(picture.depth / (16.0 / (slope + 2.0))[:, None] - 1.0).max() < 2e-3
 
@@ -354,7 +356,7 @@ def test_layers_of_nothing(tmp_path: Path) -> None:
 
 
 def test_depth_counts_samples_that_hit(tmp_path: Path) -> None:
-    """At an edge, depth is that of what was hit; normals and albedo fade out."""
+    """At an edge, depth averages only samples that hit; normals and albedo fade out."""
     body = material("M", "diffuse", diffuseColor=(1, 1, 1))
     corners = [(-5, -5, 0), (0.0, -5, 0), (0.0, 5, 0), (-5, 5, 0)]
     view = camera((0, 0, 8), (0, 0, 0), half=0.25)
@@ -366,7 +368,7 @@ def test_depth_counts_samples_that_hit(tmp_path: Path) -> None:
 
 
 def test_dome_light_turns_with_the_up_axis(tmp_path: Path, beauty: Any) -> None:
-    """On a Z-up stage a DomeLight's pole stays +Y: UsdLux leaves it so."""
+    """On a Z-up stage the pole of a DomeLight stays +Y, as UsdLux requires."""
     path = write_sky(tmp_path)
     stage = tmp_path / "z.usda"
     write_stage(stage, camera((0, 0, 0), (0, 1, 0.1), half=0.001), light("Dome", texture=path))

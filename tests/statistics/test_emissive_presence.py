@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light of emissive meshes and mesh lights that are cut out: opacity times what they emit.
+"""Emissive meshes and mesh lights with opacity: they contribute opacity times their emission.
 
-A floor under a square is lit by light samples, which aim at it, and by bounces, which meet it where
-it is there. Each is also seen alone: what moves is found by bounces only, and a mesh light of mode
-independent by light samples only.
+A floor below a square is lit by light samples, which aim at the square, and by bounces, which hit
+it where it is present. Each technique is also tested alone: only bounces find moving meshes, and
+only light samples find a mesh light of mode independent.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FLOOR = material("M", "diffuse", diffuseColor=(ALBEDO,) * 3) + "\n" + ground("M"
 SHUTTER = "double shutter:open = -0.5\ndouble shutter:close = 0.5"
 AT_FLOOR = camera((4, 2, 0.5), (0, 0, 0), half=1e-3, lens=SHUTTER)
 UNDER_SQUARE = ALBEDO * 4 / np.pi * (0.5 / np.sqrt(1.25)) * np.arctan(0.5 / np.sqrt(1.25))
-"""Radiance of the floor below the middle of SQUARE of radiance 1 at height 1, by form factors."""
+"""Radiance of the floor below the centre of SQUARE of radiance 1 at height 1, by form factors."""
 
 SYNC = {
     "glow": None,
@@ -69,7 +69,7 @@ def square(
 
 
 def shown(kind: str) -> NDArray[np.float64]:
-    """What GLOW becomes in a mode."""
+    """Expected radiance of the emission ``GLOW`` in a mode."""
     return {"glow": GLOW, "tinted": GLOW * TINT, "independent": TINT}[kind]
 
 
@@ -105,7 +105,7 @@ def textured(threshold: float = 0.0) -> str:
 
 
 def driven() -> str:
-    """Opacity by a graph: 1/2 + x, x along the square in its own space."""
+    """Opacity by a graph: 1/2 + x, with x along the square in object space."""
     return f"""def Material "G" {{
         token outputs:mtlx:surface.connect = </World/G/Surface.outputs:out>
         def Shader "Surface" {{
@@ -138,7 +138,7 @@ def driven() -> str:
 
 
 def under_mask(mask: NDArray[np.float32]) -> float:
-    """As UNDER_SQUARE, with a mask over the square: bilinear, clamped; the mean of o / r^4."""
+    """As UNDER_SQUARE, with a bilinear, clamped mask over the square: the mean of o / r^4."""
     n, steps = len(mask), 400
     at = (np.arange(steps) + 0.5) / steps
     texel = np.clip(at * n - 0.5, 0, n - 1)
@@ -160,7 +160,7 @@ Shot = Callable[..., NDArray[np.float64]]
 
 @pytest.fixture
 def shot(tmp_path: Path, beauty: Any) -> Shot:
-    """Pixels of a floor below the square, direct light only."""
+    """Function that renders the floor below the square with direct light only."""
 
     def render(
         *prims: str, spp: int = 256, view: str = AT_FLOOR, floor: str = FLOOR, **settings: Any
@@ -174,9 +174,9 @@ def shot(tmp_path: Path, beauty: Any) -> Shot:
 
 
 def agree(found: NDArray[np.float64], expected: Any) -> None:
-    """The mean within 4.5 standard errors, which are small enough to tell.
+    """Expect the mean within 4.5 standard errors, which must be small enough to be significant.
 
-    ``expected`` may be pixels of another picture.
+    ``expected`` may also be the pixels of another image.
     """
     expected = np.asarray(expected, np.float64)
     error2 = found.var(axis=0, ddof=1) / len(found)
@@ -213,7 +213,7 @@ def test_textured_opacity(shot: Shot, tmp_path: Path, kind: str) -> None:
 
 
 def test_textured_opacity_with_a_threshold(shot: Shot, tmp_path: Path) -> None:
-    """A half of the square is there."""
+    """Half of the square is present."""
     write_mask(tmp_path, np.repeat([[0.0, 1.0]], 2, axis=0).astype(np.float32).repeat(8, axis=1))
     agree(shot(textured(0.5), square()), 0.5 * GLOW * UNDER_SQUARE)
 
@@ -224,14 +224,14 @@ def test_opacity_by_a_graph(shot: Shot, kind: str) -> None:
 
 
 def test_a_light_without_a_material_has_no_opacity(shot: Shot) -> None:
-    """In mode noMaterialResponse nothing of the material counts."""
+    """In mode noMaterialResponse the material has no effect."""
     lamp = square("tinted").replace("materialGlowTintsLight", "noMaterialResponse")
     agree(shot(constant(0.5), lamp), TINT * UNDER_SQUARE)
 
 
 @pytest.mark.slow
 def test_bounces_and_light_samples_alone(shot: Shot, tmp_path: Path) -> None:
-    """What moves is found by bounces alone; both together bring the same."""
+    """Moving meshes are found by bounces only; both techniques together give the same mean."""
     write_mask(tmp_path, np.random.default_rng(5).random((4, 4)).astype(np.float32))
     for surface in (constant(0.5), textured(), driven()):
         by_bounces = shot(surface, square(moves=True), spp=2048)
@@ -243,7 +243,7 @@ def test_bounces_and_light_samples_alone(shot: Shot, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("roughness", [0.2, 0.6])
 def test_on_gloss(shot: Shot, roughness: float) -> None:
-    """Where bounces and light samples share the light, as half of a whole one."""
+    """On glossy floors, where bounces and light samples share the light: half of the full value."""
     metal = material("M", "metal", diffuseColor=(0.9, 0.9, 0.9), roughness=roughness)
     scene: dict[str, Any] = {
         "view": camera((0, 1, 2), (0, 0, 1), half=0.02, lens=SHUTTER),
@@ -252,11 +252,11 @@ def test_on_gloss(shot: Shot, roughness: float) -> None:
     }
     whole = shot(constant(1.0), square(), **scene)
     agree(shot(constant(0.5), square(), **scene), 0.5 * whole)
-    agree(shot(driven(), square(), **scene), 0.5 * whole)  # 1/2 + x, seen along x = 0
+    agree(shot(driven(), square(), **scene), 0.5 * whole)  # 1/2 + x, averaged along x = 0
 
 
 def test_instances(shot: Shot) -> None:
-    """Two of one prototype, mirrored and turned, one seen through the other."""
+    """Two instances of one prototype, mirrored and rotated, one seen through the other."""
     mirrored = np.diag((-1.0, 1.0, 1.0, 1.0)) @ DOWN
     prims = f"""class "Lamps" {{
         {square(place=None)}
@@ -269,13 +269,13 @@ def test_instances(shot: Shot) -> None:
     }}"""
     corner = 0.25 / np.sqrt(1 + 0.25**2)
     above = ALBEDO * 4 / np.pi * corner * np.arctan(corner)
-    # Opacity of the upper one is 1/2 + z, and 1/2 + x of it passes the lower one. By symmetry the
+    # Opacity of the upper one is 1/2 + z, and 1/2 + x of it passes the lower one. By symmetry, the
     # mean of the product over the upper one is 1/4.
     agree(shot(driven(), prims), GLOW * (0.5 * UNDER_SQUARE + 0.25 * above))
 
 
 def test_every_way_gives_the_same_picture(tmp_path: Path) -> None:
-    """All modes and kinds of opacity, with the wave and the reference integrator."""
+    """Waves and reference integrator agree bitwise for all modes and kinds of opacity."""
     write_mask(tmp_path, np.random.default_rng(5).random((4, 4)).astype(np.float32))
     view = camera((0, 1.5, 4), (0, 0.3, 0), half=0.5)
     for surface in (constant(0.5), textured(0.4), driven()):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The project's first promise: how a picture is computed does not change a bit of it.
+"""Reproducibility: schedules do not change a bit of the image.
 
-The oracle is the reference integrator: scalar, depth first, one ray at a time.
+The reference is the scalar reference integrator: depth first, one ray at a time.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
 
 
 def differences(a: wavecomb.Picture, b: wavecomb.Picture) -> list[str]:
-    """What differs, with the places of some pixels; NaNs are equal to themselves."""
+    """Describe differing layers, with some pixels; NaNs are equal to themselves."""
     out = []
     for layer in LAYERS:
         x, y = getattr(a, layer), getattr(b, layer)
@@ -47,7 +47,7 @@ def differences(a: wavecomb.Picture, b: wavecomb.Picture) -> list[str]:
 
 @pytest.fixture(scope="module")
 def references(generated: Any) -> Any:
-    """A stage, loaded, and its reference picture."""
+    """A loaded stage and its image by the reference integrator."""
     made: dict[str, tuple[Any, wavecomb.Picture]] = {}
 
     def get(name: str) -> tuple[Any, wavecomb.Picture]:
@@ -96,7 +96,7 @@ def test_with_other_settings(references: Any, name: str, settings: dict[str, Any
 @pytest.mark.parametrize("name", ["cornell-dragon", "mixed"])
 @pytest.mark.parametrize("policy", POLICIES)
 def test_every_policy(references: Any, name: str, policy: str) -> None:
-    """With measured costs, which change from pass to pass and run to run, and every ray order."""
+    """Costs are measured and so vary between passes and runs; every ray order is covered."""
     stage, reference = references(name)
     for way in (
         {"wave_size": 512, "ray_order": "slot", "materialize": "on"},
@@ -114,7 +114,7 @@ def test_again_is_the_same(references: Any) -> None:
 
 
 def test_another_seed_is_another_picture(references: Any) -> None:
-    """Lest the tests above pass because seeds and samples do nothing."""
+    """Ensures that the tests above do not pass because seeds have no effect."""
     stage, reference = references("cornell")
     assert differences(render(stage, seed=4), reference)
     assert differences(render(stage, spp=5), reference)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair against Mitsuba 3's `hair`: a fibre, a bundle and a head agree to within noise.
+"""Hair compared with Mitsuba 3's `hair`: a fibre, a bundle and a head agree within noise.
 
-A fibre and a bundle are straight and end outside of the picture: ends differ by design. Those of a
-head's hair are in it, and taper to a tenth: round ends of all its width are 0.15 % of the picture.
+A fibre and a bundle are straight and end outside the image, because the renderers' ends differ by
+design. The hairs of the head end inside the image and taper to a tenth of their radius; round ends
+of full width would change the image by 0.15 %.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ TILT = 3.0
 
 
 def colour(absorption: float, azimuthal: float) -> float:
-    """The colour whose absorption it is (Chiang et al. 2016, eq. 9)."""
+    """Colour of hair with this absorption (Chiang et al. 2016, eq. 9)."""
     a = azimuthal
     divisor = 5.969 - 0.215 * a + 2.532 * a**2 - 10.73 * a**3 + 5.574 * a**4 + 0.245 * a**5
     return math.exp(-math.sqrt(absorption) * divisor)
 
 
 def fibres(kind: str) -> tuple[Any, Any]:
-    """Control points of cubic B-splines, (n, k, 3), and the radius of each of a spline's."""
+    """Control points of cubic B-splines, (n, k, 3), and the radius at each point of a spline."""
     points, radius = splines(kind)
     radii = np.full(points.shape[1], radius)
     if kind == "head":
@@ -57,17 +58,17 @@ def splines(kind: str) -> tuple[Any, float]:
 
 
 def line(a: Any, b: Any) -> Any:
-    """Evenly spaced points of lines from a to b, and beyond."""
+    """Evenly spaced points on lines from a to b, extended at both ends."""
     return a[:, None] + (b - a)[:, None] * np.linspace(-0.5, 1.5, 6)[None, :, None]
 
 
 def stage(kind: str, roughness: tuple[float, float]) -> Any:
-    """Fibres between a lamp in front and one behind, under a dim sky; those of a head on one."""
+    """Fibres between a front light and a back light under a dim sky; those of a head on a ball."""
     from recording import RecordingBuilder
 
     builder = RecordingBuilder()
     native = builder.native
-    # A small floor out of sight; what is recorded comes before what is not.
+    # A small hidden floor: recorded meshes come before the fibres, which are not recorded.
     grey = builder.add_material("diffuse", base_color=(0.6, 0.5, 0.4))
     corners = np.array([[-2, -3, 2], [2, -3, 2], [2, -3, -2], [-2, -3, -2]], np.float32)
     quads = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -125,7 +126,7 @@ def test_hair(
     roughness: tuple[float, float],
     depth: int,
 ) -> None:
-    """A fibre alone, smooth and rough; and light that goes from fibre to fibre, and to a head."""
+    """A single fibre, smooth and rough, and scattering between fibres and a head."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
     points, radii = fibres(kind)
@@ -138,7 +139,7 @@ def test_hair(
     file.write_text(text)
 
     class WithFibres(MitsubaScene):
-        """The stage with the fibres."""
+        """The stage with the fibres added."""
 
         def _geometry(self) -> dict[str, Any]:
             bsdf = {

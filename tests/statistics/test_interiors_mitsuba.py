@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Media inside of meshes against Mitsuba 3's `volpathmis`: pictures agree to within noise."""
+"""Media inside meshes compared with Mitsuba 3's `volpathmis`: images agree within noise."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def cube() -> tuple[Any, Any]:
 
 
 def stage(ior: float) -> Any:
-    """A cube of a medium above a floor, under an even sky."""
+    """A cube of a medium above a floor, under a uniform sky."""
     from recording import RecordingBuilder
 
     builder = RecordingBuilder()
@@ -61,7 +61,7 @@ def stage(ior: float) -> Any:
 
 @pytest.mark.parametrize("ior", [1.0, 1.4])
 def test_media_in_meshes(mitsuba: ModuleType, beauty: Any, fewer: int, ior: float) -> None:
-    """Behind a bound that does nothing, and behind one that refracts."""
+    """Behind an index-matched boundary, and behind a refracting one."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
     recorded = stage(ior)
@@ -76,7 +76,7 @@ def test_media_in_meshes(mitsuba: ModuleType, beauty: Any, fewer: int, ior: floa
     bound = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0} if ior != 1 else {"type": "null"}
 
     class WithMedium(MitsubaScene):
-        """The stage with the cube."""
+        """The stage with the cube added."""
 
         def _geometry(self) -> dict[str, Any]:
             return super()._geometry() | {

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is learned changes noise and no mean: each part, and all together, against none of it.
+"""Learning changes noise but not the mean: each learned part, and all parts, against none.
 
-A stage is rendered with many seeds in each way. Tiles of the picture are compared by Welch's t, at
-a level that Sidak's correction leaves of 1 % over all stages, ways, tiles and channels of the long
-run. Skewed noise, as of rare bright paths, makes t larger than it should be; so what is found is
-looked at once more, with twice as many seeds of its own, and only a difference of the same sign
-that is found again is one. A bias would be.
+Each stage is rendered with many seeds for each setting. Tiles of the image are compared by Welch's
+t, at a level that is Sidak's correction of 1 % over all stages, settings, tiles and channels of the
+long run. Skewed noise from rare bright paths inflates t, so a significant difference is tested
+again with new seeds, twice as many. It counts only if it is found again with the same sign, as a
+bias would be.
 """
 
 from __future__ import annotations
@@ -65,25 +65,25 @@ PUBLIC = (
     "usdlux/sphere.usda",
     "wg_test_assets/RoughnessTest/RoughnessTest.usdz",
 )
-"""Stages of others, of all kinds of lights and looks."""
+"""Third-party stages with all kinds of lights and materials."""
 
 SIZE = (64, 48)
 SPP = 48
-"""An eighth of the samples, 18,432, teaches a field; 16,384 are the fewest."""
+"""Training uses an eighth of the samples, 18,432 paths; the minimum is 16,384."""
 SEEDS = 10
 TILES = (3, 4)
 GENERATED = 23
 TESTS = (GENERATED + len(PUBLIC)) * len(WAYS) * TILES[0] * TILES[1] * 3
 LEVEL = 1.0 - (1.0 - 0.01) ** (1.0 / TESTS)
 AGAIN = 0.01
-"""The level of the second look."""
+"""Level of the second test."""
 
 FAST = ("cornell", "studio")
 Array = NDArray[np.float64]
 
 
 def tiles(scene: Any, way: dict[str, Any], seeds: range) -> Array:
-    """Means of the tiles of a picture of each seed, (seeds, 3, 4, 3)."""
+    """Means of image tiles for each seed, (seeds, 3, 4, 3)."""
     import wavecomb
 
     rows, columns = TILES
@@ -99,9 +99,9 @@ def tiles(scene: Any, way: dict[str, Any], seeds: range) -> Array:
 
 
 def deviates(a: Array, b: Array) -> tuple[Array, Array]:
-    """p-values of two-sided Welch tests (1 where there is no noise) and signs of the differences.
+    """p-values of two-sided Welch tests (1 where there is no noise), and signs of the differences.
 
-    What both have without noise has to be the same to the rounding of floats.
+    Tiles without noise must be equal up to float rounding.
     """
     va, vb = a.var(axis=0, ddof=1) / len(a), b.var(axis=0, ddof=1) / len(b)
     difference = a.mean(axis=0) - b.mean(axis=0)
@@ -116,12 +116,13 @@ def deviates(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def differences(scene: Any, ways: dict[str, dict[str, Any]], number: int) -> list[str]:
-    """What differs from everything off, a line each; prints the least p of each way.
+    """Differences from rendering without learning, one line each; prints the smallest p per
+    setting.
 
     Args:
-        scene: To be rendered.
-        ways: By name.
-        number: Of the stage: seeds are its own.
+        scene: The scene to render.
+        ways: Settings by name.
+        number: Index of the stage, which determines the seeds.
     """
     first = 100_000 * (number + 1)
     off = tiles(scene, {}, range(first, first + SEEDS))
@@ -157,7 +158,7 @@ def check(name: str, path: Path, ways: dict[str, dict[str, Any]], number: int) -
 
 @pytest.fixture
 def write(tmp_path: Path) -> Any:
-    """Writes a generated stage, small."""
+    """Function that writes a small generated stage."""
 
     def stage(name: str) -> Path:
         from wavecomb.scenes import write_scene

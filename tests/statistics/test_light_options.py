@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shaped distant lights and lights without shadows, against closed forms."""
+"""Shaped distant lights and lights without shadows, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DOWN = turned(x=-90)
 
 @pytest.fixture
 def shot(tmp_path: Path, beauty: Any) -> Any:
-    """Mean of a picture of the floor, in irradiance."""
+    """Function that renders the floor and returns its mean irradiance."""
 
     def render(*prims: str, spp: int = 256) -> float:
         stage = wavecomb.load(write_stage(tmp_path / "stage.usda", AT_FLOOR, FLOOR, *prims))
@@ -35,21 +35,21 @@ def shaped(text: str, *lines: str) -> str:
 
 
 def test_cone_of_a_distant_light(shot: Any) -> None:
-    """Of 60 degrees across, 10 off the axis are left: L pi sin^2."""
+    """Of a light 60 degrees wide, a cone of 10 degrees around the axis remains: L pi sin^2."""
     sun = shaped(light("Distant", transform=DOWN, angle=60), "float inputs:shaping:cone:angle = 10")
     expected = np.pi * np.sin(np.radians(10)) ** 2
     assert shot(sun, spp=4096) == pytest.approx(expected, rel=2e-3)
 
 
 def test_focus_of_a_distant_light(shot: Any) -> None:
-    """The integral of L cos^2 cos over the cone of half angle 30: pi / 2 (1 - cos^4)."""
+    """Integral of L cos^2 cos over a cone of half angle 30 degrees: pi / 2 (1 - cos^4)."""
     sun = shaped(light("Distant", transform=DOWN, angle=60), "float inputs:shaping:focus = 2")
     expected = np.pi / 2 * (1 - np.cos(np.radians(30)) ** 4)
     assert shot(sun, spp=4096) == pytest.approx(expected, rel=1e-3)
 
 
 def test_profile_of_a_parallel_light(shot: Any, tmp_path: Path) -> None:
-    """Angle 0: the candela along the axis, times 3."""
+    """Angle 0: the candela value on the axis, times 3."""
     (tmp_path / "lamp.ies").write_text(
         "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 3 1 1 2 0.1 0.1 0\n1 1 10\n0 45 90\n0\n7 3 0\n"
     )
@@ -59,7 +59,7 @@ def test_profile_of_a_parallel_light(shot: Any, tmp_path: Path) -> None:
 
 
 def test_shadows_may_be_off(shot: Any) -> None:
-    """What stands between is passed by, also where it is linked to cast shadows."""
+    """Occluders have no effect, even if shadow linking includes them."""
     corners = [(-0.8, 0.5, 0.8), (0.8, 0.5, 0.8), (0.8, 0.5, -0.8), (-0.8, 0.5, -0.8)]
     shade = quad("Shade", corners, "M")
     lamp = light("Disk", transform=DOWN @ moved(0, 1, 0), radius=0.5)

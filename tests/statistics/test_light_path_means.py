@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders where paths start at the lights, too, against those of camera paths alone: their layers,
-and what comes of samples that go where the noise is."""
+"""Renders with light paths compared with camera paths only: AOVs, and adaptive sampling."""
 
 from __future__ import annotations
 
@@ -35,7 +34,7 @@ ENDINGS: list[dict[str, Any]] = [
 
 @pytest.fixture(scope="module")
 def wide(caustics: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The stage of caustics under a lamp of 25 times the radius, which camera paths find."""
+    """The caustics stage under a light of 25 times the radius, which camera paths can find."""
     from pxr import Sdf, Usd, UsdLux
 
     stage = Usd.Stage.Open(str(caustics))
@@ -85,5 +84,5 @@ def test_samples_that_go_where_the_noise_is(
     assert all(one.samples.min() < one.samples.max() for one in found), "or it would show nothing"
     alone = [render(500 + seed, spp=96) for seed in range(SEEDS)]
     a, b = (np.stack([one.beauty for one in all_]).astype(np.float64) for all_ in (found, alone))
-    # A pixel that ends by chance where its error seems small is a little too dark in the mean.
+    # A pixel that stops early because its error seems small has a mean that is slightly too dark.
     assert_agree(f"{transport} {next(iter(ending))}", a, b, tolerance=0.01)

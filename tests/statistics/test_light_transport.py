@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from lights, joined to the camera's: no bias with any kind of light, lens or material, and
-closed forms where paths from the camera find nothing."""
+"""Light paths combined with camera paths: unbiased for all lights, lenses and materials, and equal
+to closed forms where camera paths find nothing.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +39,7 @@ LOOKS = (
 
 
 def corner(*prims: str) -> tuple[str, ...]:
-    """A floor, a back wall, a block and a ball; not closed, so that light of afar comes in."""
+    """A floor, a back wall, a block and a ball; open, so that infinite lights reach them."""
     wall = quad("Wall", [(-2, 0, -1.5), (2, 0, -1.5), (2, 2.5, -1.5), (-2, 2.5, -1.5)], "Blue")
     return (
         *LOOKS,
@@ -127,7 +128,7 @@ def compare(
     transport: str = "light",
     **settings: Any,
 ) -> None:
-    """Pictures with and without paths from lights."""
+    """Images with and without light paths agree."""
     plain: dict[str, Any] = {"max_depth": 4, **settings}
     joined = batches(
         lambda seed: beauty(stage, size, spp, seed=seed, transport=transport, **plain), 12
@@ -150,7 +151,7 @@ def test_connections_are_unbiased(kind: str, tmp_path: Path, beauty: Any) -> Non
 
 
 def test_connections_find_light_that_a_shade_hides(tmp_path: Path, beauty: Any) -> None:
-    """A lamp in a box that is open at its top: all light comes by way of a ceiling."""
+    """A light in a box that is open at the top: all light arrives via the ceiling."""
     shade = [
         quad("X0", [(0, 1, 0), (0, 1, 0.6), (0, 1.5, 0.6), (0, 1.5, 0)], "White"),
         quad("X1", [(0.6, 1, 0), (0.6, 1, 0.6), (0.6, 1.5, 0.6), (0.6, 1.5, 0)], "White"),
@@ -177,7 +178,7 @@ LENSES = {
         "float focalLength", 'token projection = "orthographic"\nfloat focalLength'
     ),
     "clipped": camera((0.3, 1.6, 3.4), (0.0, 0.6, 0.0), half=0.42, clip=(2.9, 4.3)),
-    # From within, with the corner behind it: what is there lies on both sides of the seam.
+    # From inside, with the corner behind: its image covers both sides of the latlong seam.
     "all round": camera((0.3, 0.7, 0.9), (0.5, 0.7, 3.0), half=0.42),
 }
 
@@ -187,7 +188,7 @@ def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
     prims = [p if "Camera" not in p else LENSES[lens] for p in corner(*lights(tmp_path)["rect"])]
     shown = {"projection": "latlong"} if lens == "all round" else {}
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims), **shown)
-    # Not at an edge: filters have tails there that camera paths do not come to.
+    # Not at the image edge, where camera paths do not cover the tails of wide filters.
     wide: dict[str, Any] = {"filter": "blackman-harris", "filter_width": 3.0}
     if lens == "clipped":
         wide = {}
@@ -199,7 +200,7 @@ def test_cameras_are_unbiased(lens: str, tmp_path: Path, beauty: Any) -> None:
 
 
 def test_connections_are_unbiased_in_motion(tmp_path: Path, beauty: Any) -> None:
-    """A ball that moves while the shutter is open: both of a pair of paths see it at one time."""
+    """A ball that moves while the shutter is open: camera and light path share a time."""
     shutter = "double shutter:open = 0\ndouble shutter:close = 1\nfloat focalLength"
     way = "double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 1: (0.5, 0, 0.3) }"
     ball = sphere("Moving", "Gloss", (-0.3, 0.6, 0.7), 0.35, rings=12)
@@ -213,7 +214,7 @@ def test_connections_are_unbiased_in_motion(tmp_path: Path, beauty: Any) -> None
 
 @pytest.mark.parametrize("ball", ["Frosted", "Clear", "Coated"])
 def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> None:
-    """A ball under a large lamp, which paths from the camera find through it, too."""
+    """A ball under a large light, which camera paths also find through the ball."""
     looks = (
         material("Clear", "dielectric", roughness=0.0, ior=1.4, diffuseColor=(0.9, 0.95, 0.9)),
         material(
@@ -241,19 +242,19 @@ def test_what_transmits_is_unbiased(ball: str, tmp_path: Path, beauty: Any) -> N
 
 
 def test_shading_normals_are_unbiased(tmp_path: Path, beauty: Any) -> None:
-    """Smooth normals on coarse facets, whose silhouettes are bent towards the camera."""
+    """Smooth normals on coarse facets, adjusted towards the viewer at silhouettes."""
     shape = sphere("Coarse", "Gloss", (-0.2, 0.6, 0.9), 0.5, rings=5, smooth=True)
     prims = corner(*lights(tmp_path)["sphere"], shape)
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
     a = batches(lambda seed: beauty(stage, 32, 16, seed=seed, max_depth=2, transport="light"), 12)
     b = batches(lambda seed: beauty(stage, 32, 32, seed=seed, max_depth=2), 12, 500)
-    # Camera paths leave the facets for the smooth surface (docs/light-paths.md).
+    # Camera paths start from the smooth surface instead of the facets (docs/light-paths.md).
     assert_agree("light paths coarse", a, b, tolerance=0.02)
 
 
 @pytest.mark.parametrize("kind", ["sun", "rect"])
 def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: Any) -> None:
-    """A ball of glass on a wide ground, under lights that camera paths find through it, too."""
+    """A glass ball on a wide ground, under lights that camera paths also find through it."""
     clear = material("Clear", "dielectric", roughness=0.0, ior=1.4, diffuseColor=(1, 1, 1))
     lamps = {
         "sun": light("Distant", colour=(20, 19, 18), transform=DOWN, angle=40.0),
@@ -275,17 +276,16 @@ def test_aiming_in_a_wide_stage_is_unbiased(kind: str, tmp_path: Path, beauty: A
 
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_light_through_a_plate_of_glass(transport: str, tmp_path: Path, beauty: Any) -> None:
-    """A point over a clear plate over a floor: no path from the camera finds it.
+    """A point light over a clear plate over a floor: camera paths cannot find it.
 
-    Under the point rays are upright, and a plate of thickness t and index n lifts the point by
-    t (1 - 1 / n). With R = ((n - 1) / (n + 1))^2, what is reflected inside m times over comes from
-    2 m t / n further:
-        E = I sum_m (1 - R)^2 R^(2 m) / (h - t (1 - 1 / n) + 2 m t / n)^2.
+    Below the point, rays are vertical, and a plate of thickness t and index n shifts the point by t
+    (1 - 1 / n). With R = ((n - 1) / (n + 1))^2, light reflected inside m times comes from 2 m t / n
+    further away: E = I sum_m (1 - R)^2 R^(2 m) / (h - t (1 - 1 / n) + 2 m t / n)^2.
     """
     height, thick, index, albedo, power = 2.0, 0.3, 1.5, 0.6, 10.0
     glass = material("Clear", "dielectric", roughness=0.0, ior=index, diffuseColor=(1, 1, 1))
     grey = material("Grey", "diffuse", diffuseColor=(albedo,) * 3)
-    # USD: a sphere of radius 0 counts as normalized, which makes the intensity a quarter.
+    # USD: a sphere of radius 0 counts as normalised, which divides the intensity by four.
     point = light("Sphere", colour=(4 * power,) * 3, transform=moved(0, height, 0), radius=0)
     prims = (
         glass,
@@ -302,14 +302,14 @@ def test_light_through_a_plate_of_glass(transport: str, tmp_path: Path, beauty: 
     expected = albedo / np.pi * power * sum(reflected)
     settings: dict[str, Any] = {"max_depth": 7, "sampler": "sobol"}
     found = beauty(stage, 48, 512, transport=transport, **settings)
-    # Some thousand paths come there; 2 % more light comes by way of floor and plate.
+    # Several thousand paths arrive; 2 % more light comes via floor and plate.
     assert found.mean() == pytest.approx(1.01 * expected, rel=0.06)
     assert beauty(stage, 16, 16, **settings).max() == 0.0
 
 
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_a_furnace_stays_white(transport: str, tmp_path: Path, beauty: Any) -> None:
-    """What reflects all and stands in an even sky is not to be told from it."""
+    """An object without absorption under a uniform sky is invisible."""
     looks = (
         material("White", "diffuse", diffuseColor=(1, 1, 1)),
         material("Ice", "dielectric", roughness=0.4, ior=1.3, diffuseColor=(1, 1, 1)),
@@ -323,7 +323,7 @@ def test_a_furnace_stays_white(transport: str, tmp_path: Path, beauty: Any) -> N
     )
     stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
     picture = beauty(stage, 24, 256, max_depth=24, transport=transport)
-    # Rough glass loses what bounces twice between facets.
+    # Rough glass loses multiple scattering between microfacets.
     assert picture[:, :12].mean() == pytest.approx(1.0, abs=0.01)
     alone = beauty(stage, 24, 256, max_depth=24)
     assert picture[:, 12:].mean() == pytest.approx(alone[:, 12:].mean(), abs=0.01)

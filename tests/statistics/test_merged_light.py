@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Caustics that are seen in mirrors and through glass: closed forms, and camera paths where these
-find them."""
+"""Caustics seen in mirrors and through glass, compared with closed forms and camera paths."""
 
 from __future__ import annotations
 
@@ -18,11 +17,11 @@ GREY = material("Grey", "diffuse", diffuseColor=(0.6,) * 3)
 
 
 def test_a_floor_under_glass(tmp_path: Path, beauty: Any) -> None:
-    """A point and the camera over a clear plate over a floor: no other technique finds it.
+    """A point light and the camera above a clear plate over a floor: only merging finds the light.
 
-    What comes to the floor is that of test_light_through_a_plate_of_glass,
-        E = I sum_m (1 - R)^2 R^(2 m) / (h - t (1 - 1 / n) + 2 m t / n)^2,
-    and on the way back the plate lets pass sum_m (1 - R)^2 R^(2 m) = (1 - R) / (1 + R).
+    The irradiance is that of test_light_through_a_plate_of_glass, E = I sum_m (1 - R)^2 R^(2 m) /
+    (h - t (1 - 1 / n) + 2 m t / n)^2, and the plate transmits sum_m (1 - R)^2 R^(2 m) = (1 - R) /
+    (1 + R) on the way back.
     """
     height, thick, index, albedo, power = 2.0, 0.3, 1.5, 0.6, 10.0
     glass = material("Clear", "dielectric", roughness=0.0, ior=index, diffuseColor=(1, 1, 1))
@@ -42,14 +41,14 @@ def test_a_floor_under_glass(tmp_path: Path, beauty: Any) -> None:
     expected = albedo / np.pi * power * sum(reflected) * (1 - r) / (1 + r)
     settings: dict[str, Any] = {"max_depth": 12, "sampler": "sobol", "transport": "light"}
     found = beauty(stage, 32, 256, merge_radius=2.0, **settings)
-    # 2 % more light comes by way of floor and plate.
+    # 2 % more light comes via floor and plate.
     assert found.mean() == pytest.approx(1.015 * expected, rel=0.06)
     assert beauty(stage, 16, 16, **settings).max() == 0.0
 
 
 @pytest.mark.parametrize("lamp", ["ball", "sun"])
 def test_what_a_mirror_shows_is_unbiased(lamp: str, tmp_path: Path, beauty: Any) -> None:
-    """A ball of glass before a mirror, by lamps that camera paths find."""
+    """A glass ball in front of a mirror, with lights that camera paths find."""
     lamps = {
         "ball": light("Sphere", colour=(30, 28, 25), transform=moved(0.9, 2.2, 0.4), radius=0.35),
         "sun": light("Distant", colour=(2, 2, 2), angle=30),
@@ -73,5 +72,5 @@ def test_what_a_mirror_shows_is_unbiased(lamp: str, tmp_path: Path, beauty: Any)
         12,
     )
     alone = batches(lambda seed: beauty(stage, 32, 48, seed=seed, **plain), 12, 500)
-    # Light is blurred by half a pixel: at edges it differs.
+    # Merging blurs light by half a pixel, so edges differ.
     assert_agree(f"merged {lamp}", merged, alone, tolerance=0.03)

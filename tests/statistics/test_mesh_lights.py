@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdLuxMeshLightAPI against closed forms, and what cameras and mirrors see of such lights."""
+"""UsdLuxMeshLightAPI compared with closed forms, and the appearance of such lights in cameras and
+mirrors.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,7 @@ ALBEDO = 0.6
 FLOOR = material("M", "diffuse", diffuseColor=(ALBEDO, ALBEDO, ALBEDO)) + "\n" + ground("M", 20)
 AT_FLOOR = camera((4, 2, 0.5), (0, 0, 0), half=1e-3)
 SQUARE = [(-0.5, 0.5, 0), (0.5, 0.5, 0), (0.5, -0.5, 0), (-0.5, -0.5, 0)]
-"""As a RectLight is: 1 x 1, facing -z, corners counter-clockwise from there."""
+"""Geometry of a RectLight: 1 x 1, facing -z, corners counter-clockwise from that side."""
 DOWN = turned(x=-90) @ moved(0, 1, 0)
 GLOW = material("G", "emissive", emissiveColor=(0.5, 1, 2))
 
@@ -60,7 +62,7 @@ ALONE = sync("noMaterialResponse")
 
 
 def under_square(half: float = 0.5, height: float = 1.0) -> float:
-    """Radiance of FLOOR under the middle of a square of radiance 1, by form factors."""
+    """Radiance of FLOOR below the centre of a square of radiance 1, by form factors."""
     x = half / height
     corner = x / np.sqrt(1 + x * x) * np.arctan(x / np.sqrt(1 + x * x)) / np.pi
     return float(ALBEDO * 4 * corner)
@@ -68,7 +70,7 @@ def under_square(half: float = 0.5, height: float = 1.0) -> float:
 
 @pytest.fixture
 def shot(tmp_path: Path, beauty: Any) -> Any:
-    """Mean colour of a picture of prims, direct light only."""
+    """Function that renders prims with direct light only and returns the mean colour."""
 
     def render(
         *prims: str, spp: int = 512, size: int = 16, load: Any = None, **settings: Any
@@ -96,7 +98,7 @@ def test_square_is_a_rect_light(shot: Any) -> None:
 
 
 def test_light_api_alone_has_no_material_response(shot: Any) -> None:
-    """Its default sync mode, also on implicit shapes, and however glaring the material is."""
+    """The default sync mode is noMaterialResponse, on implicit shapes too, for any emission."""
     mesh = lamp(bound="G", apis='"LightAPI"')
     close(shot(AT_FLOOR, FLOOR, GLOW, mesh), under_square())
     cube = f"""def Cube "Lamp" ( prepend apiSchemas = ["LightAPI"] ) {{
@@ -107,7 +109,7 @@ def test_light_api_alone_has_no_material_response(shot: Any) -> None:
 
 
 def test_glow_tints_light(shot: Any) -> None:
-    """The floor gets the glow times the light's colour; the camera sees the glow."""
+    """The floor receives emission times light colour; the camera sees the emission."""
     mesh = lamp("color3f inputs:color = (4, 1, 0.5)", bound="G")
     glow = np.array((0.5, 1, 2))
     close(shot(AT_FLOOR, FLOOR, GLOW, mesh), glow * (4, 1, 0.5) * under_square())
@@ -117,7 +119,7 @@ def test_glow_tints_light(shot: Any) -> None:
 
 
 def test_independent(shot: Any) -> None:
-    """The floor gets the light's colour; the camera sees the glow, or the plain material."""
+    """The floor receives the light colour; the camera sees the emission, or else the material."""
     mesh = lamp("color3f inputs:color = (4, 1, 0.5)", sync("independent"), bound="G")
     close(shot(AT_FLOOR, FLOOR, GLOW, mesh), np.array((4, 1, 0.5)) * under_square())
     seen = camera((0, 0.1, 0), (0, 1, 0), half=0.1)
@@ -136,7 +138,7 @@ def glossy(roughness: float) -> str:
 
 @pytest.mark.parametrize("mode", ["materialGlowTintsLight", "noMaterialResponse", "independent"])
 def test_both_halves_of_mis_tell_of_the_same_light(shot: Any, mode: str) -> None:
-    """On gloss, as much as of a rect of the same radiance."""
+    """On a glossy floor, both MIS techniques give the same as a rect light of equal radiance."""
     tint = np.array((4, 1, 0.5))
     glow = 1 if mode != "materialGlowTintsLight" else np.array((0.5, 1, 2))
     mesh = lamp(f"color3f inputs:color = {numbers(tint)}", sync(mode), bound="G")
@@ -147,7 +149,8 @@ def test_both_halves_of_mis_tell_of_the_same_light(shot: Any, mode: str) -> None
 
 
 def test_mirrors_show_what_cameras_see(shot: Any) -> None:
-    view = camera((0, 1, 2), (0, 0, 1), half=0.05)  # its mirror image meets the lamp's plane at z=0
+    # its mirror image meets the light's plane at z = 0
+    view = camera((0, 1, 2), (0, 0, 1), half=0.05)
     mesh = lamp("float inputs:intensity = 7", bound="G")
     close(shot(view, glossy(0), GLOW, mesh, spp=16), np.array((0.5, 1, 2)) * 0.9, 0.05)
     alone = lamp("float inputs:intensity = 7", ALONE)
@@ -156,7 +159,7 @@ def test_mirrors_show_what_cameras_see(shot: Any) -> None:
 
 @pytest.mark.parametrize(("scale", "scheme"), [(1.0, "none"), (3.0, "none"), (3.0, "catmullClark")])
 def test_normalize_divides_by_the_area(shot: Any, scale: float, scheme: str) -> None:
-    """In world space: what is seen of it times its area stays, subdivided or not."""
+    """In world space: radiance times area stays constant, subdivided or not."""
     place = np.diag((scale, 2 * scale, scale, 1)) @ turned(x=-90) @ moved(0, 1, 0)
     mesh = lamp(ALONE, "bool inputs:normalize = 1", "float inputs:intensity = 5", place=place,
                 scheme=scheme)  # fmt: skip
@@ -166,7 +169,7 @@ def test_normalize_divides_by_the_area(shot: Any, scale: float, scheme: str) -> 
 
 @pytest.mark.slow
 def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
-    """Normalized, from afar: radiance 1 / (4 pi r^2) over the disk of pi r^2 that is seen."""
+    """Normalised and far away: radiance 1 / (4 pi r^2) over a visible disk of pi r^2."""
     ball = sphere("Lamp", "M", (0, 30, 0), rings=48)
     ball = ball.replace('["MaterialBindingAPI"]', '["LightAPI", "MaterialBindingAPI"]')
     power = "bool inputs:normalize = 1\nfloat inputs:intensity = 100\n"
@@ -175,7 +178,7 @@ def test_sphere_of_triangles_is_a_sphere_light(shot: Any) -> None:
 
 
 def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
-    """As the same texture with the tint in its scale, without a light."""
+    """Equals the same texture with the tint in its scale, without a light."""
     pixels = np.random.default_rng(3).random((8, 8, 3)).astype(np.float32)
     out = oiio.ImageBuf(oiio.ImageSpec(8, 8, 3, "float"))
     out.set_pixels(oiio.ROI(), pixels)
@@ -200,7 +203,7 @@ def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
 
 
 def test_instances_are_lights_of_their_own(shot: Any) -> None:
-    """Two of one prototype, normalized: each by its own area."""
+    """Two normalised instances of one prototype: each is divided by its own world-space area."""
     inner = lamp(ALONE, "bool inputs:normalize = 1", place=None)
     big = np.diag((2.0, 2.0, 2.0, 1))
     prims = f"""class "Lamps" {{
@@ -245,21 +248,21 @@ def test_linking(shot: Any) -> None:
 
 
 def test_shaping(shot: Any) -> None:
-    """A cone about -z of the mesh; focus and cone act on what is seen, too."""
+    """A cone around the mesh's -z; focus and cone also affect the visible radiance."""
     for angle, expected in ((60, 1), (20, 0)):
         mesh = lamp(ALONE, f"float inputs:shaping:cone:angle = {angle}")
         view = camera((0, 0.01, 0), (0.45, 1, 0), half=0.01)  # 24 degrees off the axis
         close(shot(view, FLOOR, mesh, spp=4), expected if expected else 0, 1e-6)
     small = np.diag((0.05,) * 3 + (1,)) @ DOWN
     focused = lamp(ALONE, "float inputs:shaping:focus = 2", place=small)
-    where = camera((2, 1, 1), (1, 0, 0), half=1e-3)  # 45 degrees off, cos^2 = 1 / 2
+    where = camera((2, 1, 1), (1, 0, 0), half=1e-3)  # 45 degrees off axis, cos^2 = 1 / 2
     plain = lamp(ALONE, place=small)
     close(shot(where, FLOOR, focused), 0.5 * shot(where, FLOOR, plain), 4e-3)
 
 
 @pytest.mark.slow
 def test_moving_mesh_lights_shine(shot: Any) -> None:
-    """Found by bounces alone, with their colour."""
+    """Only bounces find moving mesh lights; the colour is correct."""
     time = "double3 xformOp:translate.timeSamples = { -1: (-1e-3, 1, 0), 1: (1e-3, 1, 0) }"
     order = (
         'float xformOp:rotateX = -90\nuniform token[] xformOpOrder = ["xformOp:translate", '
@@ -284,7 +287,7 @@ def test_hidden_lamps_are_not_seen(shot: Any) -> None:
 
 
 def test_every_way_gives_the_same_picture(tmp_path: Path) -> None:
-    """All modes, shaped and linked, on gloss and glass."""
+    """All modes, shaped and linked, on glossy surfaces and glass: bitwise equal images."""
     at = [np.diag((0.5, 0.5, 0.5, 1)) @ turned(x=-70) @ moved(x, 1, 0) for x in (-1, 0, 1)]
     prims = [
         camera((0, 1.5, 4), (0, 0.3, 0), half=0.5), GLOW, glossy(0.3),

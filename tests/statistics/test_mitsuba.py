@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavecomb against Mitsuba 3's `path`: pictures agree to within noise.
+"""Wavecomb compared with Mitsuba 3's `path`: images agree within noise.
 
-Every stage is USD text that goes through our loader; Mitsuba gets the arrays that our scene builder
-got. Orientation is therefore also tested where no bridge can hide a mistake, in
-test_closed_forms.py. Where the two models differ by design, the test says so.
+Every stage is USD text that our loader reads; Mitsuba gets the arrays that our scene builder
+received. A wrong orientation would therefore be wrong in both, so test_closed_forms.py tests it
+separately. Where the models differ by design, the test says so.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Check = Callable[..., Agreement]
 
 @pytest.fixture
 def check(mitsuba: ModuleType, beauty: Any, fewer: int) -> Check:
-    """Renders a recorded scene with both and compares."""
+    """Function that renders a recorded scene with both renderers and compares the images."""
 
     def run(
         name: str,
@@ -92,7 +92,7 @@ def test_cornell_box(check: Check, generated: Any, fewer: int, max_depth: int) -
 
 
 def test_cornell_box_with_roulette_and_sobol(check: Check, generated: Any) -> None:
-    """The defaults of a user, but the filter."""
+    """Default settings except for the filter."""
     from recording import record
 
     check(
@@ -105,7 +105,7 @@ def test_cornell_box_with_roulette_and_sobol(check: Check, generated: Any) -> No
 
 
 def test_dome_with_image(check: Check, recorded: Any, tmp_path: Path) -> None:
-    """An environment without symmetry, turned about two axes."""
+    """An environment without symmetry, rotated about two axes."""
     dome = light("Dome", texture=write_sky(tmp_path), transform=turned(25.0, 70.0))
     scene = recorded(VIEW, dome, GREY, BLUE, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)))
     check("dome", scene)
@@ -124,7 +124,8 @@ def test_dome_with_a_small_sun(check: Check, recorded: Any, tmp_path: Path) -> N
     write_image(path, image.astype(np.float32), "float")
     dome = light("Dome", texture=path)
     scene = recorded(VIEW, dome, GREY, BLUE, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)))
-    # A texel is a bilinear patch for both, but rows lie half a texel apart; the bridge resamples.
+    # Both renderers interpolate texels bilinearly, but rows are offset by half a texel; the bridge
+    # resamples the image.
     check("sun", scene, tolerance=0.004)
 
 
@@ -136,7 +137,7 @@ def test_disk_light(check: Check, recorded: Any) -> None:
 
 
 def test_instances_of_both(mitsuba: ModuleType, generated: Any) -> None:
-    """Shape groups, which benchmarks use, and flattened copies: one picture in Mitsuba."""
+    """Mitsuba renders shape groups, which benchmarks use, and flattened copies alike."""
     from mitsuba_bridge import PeerSettings
     from recording import record
 
@@ -165,7 +166,7 @@ def test_point_light(check: Check, recorded: Any) -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 12.0])
 def test_distant_light(check: Check, recorded: Any, angle: float) -> None:
-    """Mitsuba has no distant light of some angle: there it is a far sphere."""
+    """Mitsuba has no distant light with an angle; a distant sphere replaces it."""
     sun = light(
         "Distant", colour=(3, 2.5, 2), transform=turned(-50, 30), angle=angle, normalize=True
     )
@@ -174,7 +175,7 @@ def test_distant_light(check: Check, recorded: Any, angle: float) -> None:
 
 
 def test_several_lights(check: Check, recorded: Any, tmp_path: Path) -> None:
-    """Choice among lights of every kind at once."""
+    """Selection among lights of every kind."""
     lights = [
         light("Dome", "Sky", (0.4, 0.4, 0.4), texture=write_sky(tmp_path)),
         light("Sphere", "Ball", (9, 6, 3), moved(1.4, 2.2, 0.6), radius=0.2),
@@ -186,7 +187,7 @@ def test_several_lights(check: Check, recorded: Any, tmp_path: Path) -> None:
 
 
 def test_emissive_mesh(check: Check, recorded: Any) -> None:
-    """A closed lamp, since ours shine to both sides and Mitsuba's outwards only."""
+    """A closed emitter, because ours emit to both sides and Mitsuba's only outwards."""
     lamp = material("Lamp", "emissive", emissiveColor=(5, 7, 3))
     scene = recorded(
         VIEW, GREY, BLUE, lamp, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)),
@@ -197,7 +198,7 @@ def test_emissive_mesh(check: Check, recorded: Any) -> None:
 
 @pytest.mark.parametrize("smooth", [False, True])
 def test_glass(check: Check, recorded: Any, tmp_path: Path, smooth: bool) -> None:
-    """Glass of flat facets, and a ball with smooth normals."""
+    """Glass with flat facets, and a ball with smooth normals."""
     dome = light("Dome", texture=write_sky(tmp_path))
     glass = material("Glass", "dielectric", diffuseColor=(0.9, 1.0, 0.8), roughness=0.0, ior=1.5)
     ball = sphere("Ball", "Glass", (0, 1.01, 0), rings=48 if smooth else 8, smooth=smooth)
@@ -207,10 +208,10 @@ def test_glass(check: Check, recorded: Any, tmp_path: Path, smooth: bool) -> Non
 
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.2])
 def test_gold(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> None:
-    """A conductor of measured index.
+    """A conductor with measured index.
 
-    Mitsuba masks and shadows a facet separately where ours are correlated in height, and loses what
-    is scattered between facets, which we give back: not to be seen up to alpha 0.04.
+    Mitsuba's masking and shadowing are separable, ours are height-correlated; and Mitsuba omits
+    multiple scattering, which we compensate. The differences are invisible up to alpha 0.04.
     """
     dome = light("Dome", texture=write_sky(tmp_path))
     gold = material("Gold", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=roughness)
@@ -227,7 +228,9 @@ def open_pbr(name: str, **inputs: Any) -> str:
 
 @pytest.mark.parametrize("lobe", ["metal", "rough metal", "glass", "rough glass"])
 def test_openpbr(check: Check, recorded: Any, tmp_path: Path, lobe: str) -> None:
-    """Metal is Mitsuba's principled of metallic 1, glass its dielectric; see test_gold."""
+    """Metal corresponds to Mitsuba's principled with metallic 1, glass to its dielectric; see
+    test_gold.
+    """
     roughness = 0.2 if lobe.startswith("rough") else 0.0
     if lobe.endswith("metal"):
         body = open_pbr(
@@ -247,9 +250,9 @@ def test_openpbr(check: Check, recorded: Any, tmp_path: Path, lobe: str) -> None
 
 @pytest.mark.parametrize("program", ["metal", "dielectric"])
 def test_highlight(check: Check, recorded: Any, program: str) -> None:
-    """A small lamp in a rough surface: the width of the lobe (5 % of alpha would be found).
+    """A small light reflected in a rough surface: detects an error of 5 % in the lobe width.
 
-    Glass is a pane on legs of nothing, with the lamp behind it.
+    Glass is a floating pane with the light behind it.
     """
     if program == "metal":
         body = material("M", "metal", eta=GOLD_ETA, k=GOLD_K, roughness=0.2)
@@ -264,11 +267,11 @@ def test_highlight(check: Check, recorded: Any, program: str) -> None:
 def test_rough_gold_gives_back_what_single_scattering_loses(
     mitsuba: ModuleType, beauty: Any, recorded: Any
 ) -> None:
-    """At alpha 0.2 in a white furnace Mitsuba's gold loses some 7 %, ours does not.
+    """At alpha 0.2 in a white furnace Mitsuba's gold loses about 7 %, ours does not.
 
-    By hand: GGX of alpha 0.2025 loses L = 0.0837 on average (the integral of G2 / G1 over visible
-    normals); the series of further bounces gives back F^2 (1 - L) / (1 - F L) of it, with a mean
-    reflectance F = 0.97, 0.81, 0.36: 0.92, 0.64, 0.12. From afar, a ball gains that.
+    By hand: GGX of alpha 0.2025 loses L = 0.0837 on average (integral of G2 / G1 over visible
+    normals). The series of further bounces returns F^2 (1 - L) / (1 - F L) of it, with a mean
+    reflectance F = 0.97, 0.81, 0.36: 0.92, 0.64, 0.12. A distant ball gains this amount.
     """
     from mitsuba_bridge import PeerSettings
 
@@ -277,13 +280,13 @@ def test_rough_gold_gives_back_what_single_scattering_loses(
     scene = recorded(view, light("Dome"), gold, sphere("Ball", "Gold", rings=64))
     peer = Reference(mitsuba, scene, PeerSettings(32, 32, 1))
     gain = (beauty(scene.scene, 32, 256, max_depth=1) - peer.render(256)).mean(axis=(0, 1))
-    gain *= (2 * 0.0165 * 60) ** 2 / np.pi  # per area of the disk that is seen
+    gain *= (2 * 0.0165 * 60) ** 2 / np.pi  # per area of the visible disk
     assert np.abs(gain - 0.0837 * np.array((0.92, 0.64, 0.12))).max() < 0.008
 
 
 @pytest.mark.parametrize("roughness", [0.1, 0.2, 0.4])
 def test_frosted_glass(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> None:
-    """Ours has height-correlated masking, Mitsuba's is separate: not to be seen here."""
+    """Our masking is height-correlated, Mitsuba's separable: invisible here."""
     dome = light("Dome", texture=write_sky(tmp_path))
     glass = material("Glass", "dielectric", diffuseColor=(1, 1, 1), roughness=roughness, ior=1.5)
     ball = sphere("Ball", "Glass", (0, 1.01, 0), rings=8)
@@ -314,7 +317,7 @@ def test_orthographic(check: Check, recorded: Any, tmp_path: Path) -> None:
 
 
 def test_texture(check: Check, recorded: Any, tmp_path: Path) -> None:
-    """A magnified image without symmetry, bilinear, directly lit (bounces read blurred texels)."""
+    """A magnified image without symmetry, bilinear, directly lit (bounces use filtered texels)."""
     from wavecomb.scenes.textures import write_image
 
     rng = np.random.default_rng(5)
@@ -331,10 +334,10 @@ def test_texture(check: Check, recorded: Any, tmp_path: Path) -> None:
 
 
 def test_instances_and_smooth_normals(check: Check, recorded: Any, tmp_path: Path) -> None:
-    """Smooth normals under a map that stretches and turns.
+    """Smooth normals under a transform that stretches and rotates.
 
-    Rays leave our smooth surfaces from where the vertex normals say the true surface is (no shadow
-    terminator); at 64 rings that is not to be seen.
+    Our rays start from the smooth surface that the vertex normals imply, to avoid the shadow
+    terminator; with 64 rings the difference is invisible.
     """
     dome = light("Dome", texture=write_sky(tmp_path))
     stretch = np.diag([1.3, 0.6, 0.8, 1.0]) @ turned(20, 40, 10) @ moved(0, 1, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random scenes by the wave and by an integrator that shares no sampling with it (naive.py)."""
+"""Random scenes compared with an integrator that shares no sampling code (naive.py)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from random_scenes import make_scene
 from stages import camera, ground, light, material, moved, quad, turned, write_stage
 
 FEW, MANY = 30, 500
-"""Scenes in `make test` and in `make test-long`."""
+"""Number of scenes in `make test` and in `make test-long`."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -72,7 +72,7 @@ def test_everything_is_among_the_scenes(tmp_path: Path) -> None:
 
 
 def test_the_referee(module: Any) -> None:
-    """Equal means pass, two percent do not; what has no noise must be equal."""
+    """Equal means pass, a difference of 2 % fails; images without noise must be equal."""
     rng = np.random.default_rng(1)
 
     def noisy(mean: float) -> Any:
@@ -87,7 +87,7 @@ def test_the_referee(module: Any) -> None:
 
 
 def lit(module: Any, folder: Path, *prims: str, **changes: Any) -> float:
-    """What the naive integrator sees of the middle of a floor, as irradiance."""
+    """Irradiance at the centre of a floor, by the naive integrator."""
     import wavecomb
 
     floor = material("M", "diffuse", diffuseColor=(0.5, 0.5, 0.5)) + "\n" + ground("M", 20)
@@ -105,7 +105,7 @@ DOWN = turned(x=-90)
 
 @pytest.mark.slow
 def test_the_naive_integrator_is_right(module: Any, tmp_path: Path) -> None:
-    """Irradiance of a dome, a disk overhead, a sphere, a point and a sun."""
+    """Irradiance from a dome, a disk overhead, a sphere, a point and a distant light."""
     shots = {
         light("Dome"): np.pi,
         light("Disk", transform=DOWN @ moved(0, 1, 0), radius=1): np.pi / 2,
@@ -128,7 +128,7 @@ def test_the_naive_integrator_is_right(module: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("opacity", [0.5, 0.0])
 def test_glow_that_is_cut_out(module: Any, tmp_path: Path, opacity: float) -> None:
-    """By closed form: half of a square that glows gives half of its light."""
+    """Closed form: half of an emissive square gives half of its light."""
     corners = [(-1, 1, 1), (1, 1, 1), (1, 1, -1), (-1, 1, -1)]
     cut = material("G", "principled", emissiveColor=(1, 1, 1), diffuseColor=(0, 0, 0), opacity=1)
     whole = lit(module, tmp_path, cut, quad("Square", corners, "G"))

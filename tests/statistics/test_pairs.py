@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random stages by all pairs of settings that must agree in expectation (pairs.py)."""
+"""Random stages with all pairs of settings that must agree in expectation (pairs.py)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from wavecomb import _core
 pytestmark = needs("wavecomb._core")
 
 FEW = (1, 4, 12, 22, 38, 105, 342)
-"""Stages of `make test`: some that showed a fault (docs/testing.md), and three of other kinds."""
+"""Seeds for `make test`: some that revealed faults (docs/testing.md), and three of other kinds."""
 MANY = 500
 REFUSED = "does not go with"
 
@@ -75,7 +75,7 @@ def test_every_enclosure_is_among_the_stages(tmp_path: Path) -> None:
 
 
 def test_every_choice_is_among_the_variants(tmp_path: Path) -> None:
-    """Each setting that may not change a mean differs from the plain ones somewhere."""
+    """Each setting that must not change the mean differs from its plain value in a variant."""
     scene = make_scene(0, tmp_path, enclosure=True)
     met: dict[str, set[Any]] = {}
     for seed in range(40):
@@ -91,7 +91,7 @@ def test_every_choice_is_among_the_variants(tmp_path: Path) -> None:
 
 
 def test_light_that_is_lost_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A variant that is 5 % too dark is found at once, and one that is equal is not."""
+    """A variant that is 5 % too dark is detected at once; an equal one passes."""
     true = Renders.batches
 
     def darker(self: Renders, variant: Variant | None, more: int, first: int) -> Any:

@@ -36,10 +36,11 @@ def z_of(a: np.ndarray, b: np.ndarray) -> float:
 @pytest.mark.parametrize("transport", ["path", "light"])
 @pytest.mark.parametrize(("lights", "right"), [("visible", 2.597), ("hidden", 8 / 3)])
 def test_lampshade(transport: str, lights: str, right: float) -> None:
-    """A thin-walled ball of smooth normals about a light.
+    """A thin-walled ball with smooth normals around a light.
 
-    The wall passes 0.4 of the light and reflects 0.4. Irradiance inside is 4 pi / (1 - 0.4 s) with
-    s the share of reflected light that meets the wall again: 0.96 past the light's shape, else 1.
+    The wall transmits 0.4 of the light and reflects 0.4. Irradiance inside is 4 pi / (1 - 0.4 s),
+    where s is the fraction of reflected light that hits the wall again: 0.96 if the light's shape
+    is visible and blocks some of it, else 1.
     """
     stage = wavecomb.load(CASES / "lampshade.usda", lights=lights)
     settings = {"spp": 256, "max_depth": 12, "transport": transport}
@@ -48,9 +49,10 @@ def test_lampshade(transport: str, lights: str, right: float) -> None:
 
 
 def test_techniques_agree_at_lifted_origins(tmp_path: Path) -> None:
-    """A light that shines on nothing takes 99 of 100 light samples, so that bounces find the other.
+    """A light without effect takes 99 of 100 light samples, so that bounces find the other light.
 
-    Walls are coarse and smooth: terminators lift origins by a tenth of the way to the light.
+    Walls are coarse with smooth normals: ray origins are lifted by a tenth of the distance to the
+    light to avoid the shadow terminator.
     """
     settings: dict[str, Any] = {"max_depth": 2, "light_weights": "power"}
     settings["light_selection"] = "power"
@@ -85,14 +87,16 @@ def coarse_shade(folder: Path, *prims: str) -> Path:
 
 @pytest.mark.parametrize("weights", ["power", "calibrated"])
 def test_a_light_below_a_surface_is_the_walks_to_find(weights: str) -> None:
-    """It is 100 mean free paths deep: nothing comes out, whatever light sampling prefers."""
+    """The light is 100 mean free paths deep: nothing leaves, whatever light sampling prefers."""
     stage = wavecomb.load(CASES / "light_in_subsurface.usda")
     found = mean(stage, spp=32, middle=True, light_weights=weights)
     assert found == pytest.approx(0.0, abs=1e-3)
 
 
 def test_guided_bounces_by_cosine() -> None:
-    """The field is mixed with the density that samples: 15 % were missing."""
+    """The field is mixed with the density that samples bounces; 15 % of the light were missing
+    once.
+    """
     stage = wavecomb.load(CASES / "glossy_box.usda")
     settings = {"spp": 128, "max_depth": 4, "cosine_sampling": True}
     guided = seeds(stage, 4, guiding="on", **settings)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Portals: they guide the sampling of a dome and change nothing of the picture."""
+"""Portals improve the sampling of a dome without changing the mean."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ HALF, WINDOW = 2.0, 0.5
 
 
 def room() -> str:
-    """A cube about the origin, inside out, whose wall at z = 2 has a square hole in its middle."""
+    """A cube around the origin with inward winding and a square hole in the centre of its wall at z
+    = 2.
+    """
     h, w = HALF, WINDOW
     points = [(x, y, z) for x in (-h, h) for y in (-h, h) for z in (-h, h)]
     points += [(-w, -w, h), (w, -w, h), (w, w, h), (-w, w, h)]
@@ -38,7 +40,7 @@ def dome(*targets: str, image: Path | None = None) -> str:
 
 
 def portal(size: float = 2 * WINDOW, name: str = "Portal", place: Any = None) -> str:
-    """Lets light out along -z."""
+    """A portal that faces -z."""
     place = moved(0, 0, HALF) if place is None else place
     return f"""def PortalLight "{name}" {{
         float inputs:width = {size}
@@ -66,14 +68,14 @@ def test_portals_change_no_mean_and_lower_the_noise(shot: Any, tmp_path: Path) -
     with_it = INSIDE, portal(), dome("Portal", image=sky)
     truth = shot(*with_it, spp=4096, seed=7)
     plain = shot(INSIDE, dome(image=sky), spp=4096, seed=8)
-    assert plain.mean() == pytest.approx(truth.mean(), rel=0.025)  # three sigmas
+    assert plain.mean() == pytest.approx(truth.mean(), rel=0.025)  # three standard errors
     noise = error(shot(INSIDE, dome(image=sky)), truth)
     assert error(shot(*with_it), truth) < noise / 3
 
 
 @pytest.mark.slow
 def test_light_from_beside_portals_counts(shot: Any, fewer: int) -> None:
-    """Of a portal over half of the window, or none of it, or turned away: the same mean."""
+    """A portal over half of the window, beside it, or facing away: the mean stays the same."""
     expected = shot(INSIDE, portal(), dome("Portal"), spp=2048).mean()
     away = moved(0.7, 0, 0) @ turned(y=180) @ moved(0, 0, HALF)
     for place in (moved(WINDOW, 0, HALF), moved(1.5, 0, HALF), away):
@@ -89,7 +91,7 @@ def test_two_portals_that_overlap(shot: Any) -> None:
 
 
 def test_irradiance_through_a_window(shot: Any) -> None:
-    """Of the wall that faces it: by the form factors of a parallel square, radiance 1."""
+    """On the wall opposite the window: form factors of a parallel square of radiance 1."""
     view = camera((0, 0, 0), (0, 0, -HALF), half=1e-3)
     x = WINDOW / (2 * HALF)
     corner = x / np.sqrt(1 + x * x) * np.arctan(x / np.sqrt(1 + x * x)) / np.pi

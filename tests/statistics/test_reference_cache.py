@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference images on disk: keys of content, what is made once, what is made anew."""
+"""Cached reference images: content keys, images made once, and images made anew."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
 def test_a_reference_is_of_scene_settings_and_seed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With a peer that counts; nothing of Mitsuba is needed."""
+    """Uses a stand-in renderer that counts calls; Mitsuba is not needed."""
     from mitsuba_bridge import PeerSettings
     from recorded import Recorded
 

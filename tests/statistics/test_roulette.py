@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Roulette changes noise and time, never the mean: even by costs that are absurd."""
+"""Russian roulette changes noise and time but never the mean, even with absurd costs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def cornell(generated: Any) -> Any:
 
 
 def profile(scene: Any, cheap: float, dear: float, start: int = 0) -> dict[str, dict[str, float]]:
-    """Costs that alternate from material to material."""
+    """Costs that alternate between materials."""
     names = [name for name, _ in scene.materials]
     return {
         "materials": {name: dear if i % 2 == start else cheap for i, name in enumerate(names)},
@@ -50,7 +50,9 @@ def test_absurd_costs_do_not_bias(cornell: Any, beauty: Any, start: int, fewer: 
 
 
 def test_roulette_ends_paths(cornell: Any) -> None:
-    """Counts fall in the order off, throughput; dear materials are shaded less than cheap ones."""
+    """Roulette by throughput shades fewer records than none; expensive materials fewer than cheap
+    ones.
+    """
 
     def counts(**settings: Any) -> Any:
         picture = wavecomb.render(cornell, size=(48, 48), spp=16, max_depth=8, **settings)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene looks the same in millimetres and in kilometres: no acne, no leaks at any scale."""
+"""A scene renders alike in millimetres and in kilometres: no self-intersection or leaks at any
+scale.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,9 @@ SCALES = (1e-3, 1e3, 1e5)
 
 
 def scaled(folder: Path, scale: float, place: tuple[float, float, float] = (0, 0, 0)) -> Any:
-    """A ball, a block and a lamp; the geometry is written at scale, not transformed.
+    """A ball, a block and a light. The geometry itself is scaled, not its transform.
 
-    place: everything is moved by so much (before scaling).
+    ``place`` moves everything by this offset before scaling.
     """
     s, (x, y, z) = scale, place
     grey = material("Grey", "diffuse", diffuseColor=(0.6, 0.5, 0.4))
@@ -50,7 +52,7 @@ def scaled(folder: Path, scale: float, place: tuple[float, float, float] = (0, 0
 
 @pytest.mark.slow
 def test_scales(tmp_path: Path, beauty: Any) -> None:
-    """Independent noise: one seed range for each scale."""
+    """Independent noise: a separate seed range for each scale."""
     unit = scaled(tmp_path, 1.0)
     b = batches(lambda seed: beauty(unit, 64, 64, seed=seed, max_depth=5), 8, first_seed=700)
     for k, scale in enumerate(SCALES):
@@ -64,17 +66,17 @@ def test_scales(tmp_path: Path, beauty: Any) -> None:
 
 @pytest.mark.slow
 def test_far_from_the_origin(tmp_path: Path, beauty: Any) -> None:
-    """A thousand units away: float coordinates have 6e-5 left, no acne for that."""
+    """A thousand units from the origin floats resolve 6e-5; nothing intersects itself."""
     near, far = scaled(tmp_path, 1.0), scaled(tmp_path, 1.0, (1000.0, 0.0, -1000.0))
     b = batches(lambda seed: beauty(near, 64, 64, seed=seed, max_depth=5), 8, first_seed=700)
     a = batches(lambda seed: beauty(far, 64, 64, seed=seed, max_depth=5), 8)
-    # Edges move by a pixel's thousandth, shadows of facets with them.
+    # Edges move by a thousandth of a pixel, and the shadows of facets with them.
     assert_agree("far away", a, b, tolerance=0.01)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3, 1e5])
 def test_same_noise(tmp_path: Path, beauty: Any, scale: float) -> None:
-    """The very same random numbers: rounding apart, pixels differ where a few paths split."""
+    """Equal random numbers: apart from rounding, pixels differ where a few paths diverge."""
     scale = 2.0 ** round(np.log2(scale))
     a, b = (beauty(scaled(tmp_path, s), 48, 4, max_depth=5) for s in (scale, 1.0))
     close = np.isclose(a, b, rtol=1e-3, atol=1e-4).all(axis=2)
@@ -84,7 +86,7 @@ def test_same_noise(tmp_path: Path, beauty: Any, scale: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3, 1e5])
 def test_a_closed_box_is_dark(tmp_path: Path, beauty: Any, scale: float) -> None:
-    """No light leaks through edges and corners from a bright sky outside."""
+    """No light from a bright sky leaks in through edges and corners."""
     s = scale
     grey = material("Grey", "diffuse", diffuseColor=(0.9, 0.9, 0.9))
     stage = write_stage(
@@ -100,7 +102,7 @@ def test_a_closed_box_is_dark(tmp_path: Path, beauty: Any, scale: float) -> None
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3, 1e5])
 def test_an_open_floor_has_no_acne(tmp_path: Path, beauty: Any, scale: float) -> None:
-    """A white plane under a white dome shows 1; a ray that met it again would find it darker."""
+    """A white plane under a white dome has radiance 1; self-intersections would darken it."""
     s = scale
     white = material("White", "diffuse", diffuseColor=(1, 1, 1))
     eye = (0.3 * s, 0.4 * s, 2.0 * s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rect lights with a texture: closed form, the wave and the reference, and how noisy they are."""
+"""Rect lights with a texture: closed form, wave and reference integrator, and noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 1.0, 0.7
 FLOOR = material("M", "diffuse", diffuseColor=(0.5, 0.5, 0.5))
 DOWN = camera((0, 5, 0), (0, 0, 0), half=0.004)
-"""Sees 4 cm around the origin from above."""
+"""Camera from above that sees 4 cm around the origin."""
 PLACES = {
     "above": turned(-90) @ moved(0.8, 1.2, 0.3),
     "tilted": turned(-60, 70, 10) @ moved(0.8, 1.2, 0.3),
@@ -28,14 +28,14 @@ PLACES = {
 
 
 def spots() -> NDArray[np.float32]:
-    """Three bright texels of three colours on a dim ground, (12, 16, 3)."""
+    """Three bright texels of three colours on a dim background, (12, 16, 3)."""
     image = np.full((12, 16, 3), 0.02, np.float32)
     image[2, 3], image[7, 11], image[10, 12] = (30, 5, 2), (4, 40, 3), (1, 6, 50)
     return image
 
 
 def radiance(image: Array, s: Array, t: Array) -> Array:
-    """Bilinear, clamped, t up."""
+    """Bilinear lookup, clamped, t up."""
     height, width, _ = image.shape
     x, y = s * width - 0.5, (1 - t) * height - 0.5
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
@@ -50,9 +50,9 @@ def radiance(image: Array, s: Array, t: Array) -> Array:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_irradiance(tmp_path: Path, beauty: Any, place: str) -> None:
-    """Of the floor at the origin, by integrating the picture over the rect.
+    """Irradiance at the origin of the floor, compared with an integral of the image over the rect.
 
-    Seen from the front, looking along +z with +y up, +x is on the left: s runs along -x.
+    Seen from the front, looking along +z with +y up, +x is on the left: s increases along -x.
     """
     image, frame = spots(), PLACES[place]
     write_image(tmp_path / "spots.exr", image, "float")
@@ -66,7 +66,7 @@ def test_irradiance(tmp_path: Path, beauty: Any, place: str) -> None:
     p = (local @ frame)[..., :3]
     d2 = (p**2).sum(-1)
     cos_floor = np.maximum(p[..., 1], 0) / np.sqrt(d2)
-    cos_light = np.maximum((p @ frame[2, :3]) / np.sqrt(d2), 0)  # -z of the light towards us
+    cos_light = np.maximum((p @ frame[2, :3]) / np.sqrt(d2), 0)  # the light's -z, towards the floor
     given = radiance(image.astype(np.float64), s, t) * (cos_floor * cos_light / d2)[..., None]
     expected = 0.5 / np.pi * given.mean((0, 1)) * WIDTH * HEIGHT
     assert np.abs(found / expected - 1).max() < 1e-2, (found, expected)
@@ -74,7 +74,7 @@ def test_irradiance(tmp_path: Path, beauty: Any, place: str) -> None:
 
 @pytest.fixture(scope="module")
 def screen(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A floor before a screen of spots, and an even rect beside it."""
+    """A floor in front of a screen with bright spots, and a uniform rect beside it."""
     folder = tmp_path_factory.mktemp("screen")
     write_image(folder / "spots.exr", spots(), "float")
     view = camera((0, 2, 4), (0, 0.3, 0), half=0.4)
@@ -101,7 +101,7 @@ def test_the_wave_is_the_reference(screen: Path) -> None:
 
 
 def test_the_floor_is_not_salt_and_pepper(screen: Path) -> None:
-    """At 16 samples its noise is 0.45 of its light; with rects sampled evenly it was 1.69."""
+    """Relative noise at 16 samples is 0.45; with uniform sampling of the rect it was 1.69."""
     pictures = np.stack(
         [
             wavecomb.render(

@@ -14,7 +14,7 @@ from stages import camera, ground, light, look_at, material, quad, sphere, write
 import wavecomb
 
 _plain: dict[Any, Any] = {}
-"""What several settings are compared with."""
+"""Cached images with plain settings, the reference for several tests."""
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +47,9 @@ def test_same_mean(
     stage = request.getfixturevalue(scene)
     plain: dict[str, Any] = {"max_depth": 8}
     if scene == "mixed":
-        # By cosine, what a narrow lobe shows of another object comes from one sample in thousands,
-        # more than a test has time for: lamps and the sky, by light samples as well, are enough.
+        # With cosine sampling, one sample in thousands hits the narrow lobe's reflection of another
+        # object, which takes too long here. Direct light, which light samples find too, is
+        # sufficient.
         plain["max_depth"] = 1 if name == "cosine" else 4
     size, spp = 64 if fewer == 1 else 48, 64 // fewer
     a = batches(lambda seed: beauty(stage, size, spp, seed=seed, **plain, **settings), 12)
@@ -63,7 +64,7 @@ def test_same_mean(
 @pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["independent", "sobol"])
 def test_seeds_are_independent(cornell: Any, beauty: Any, sampler: str) -> None:
-    """The mean of four renders has a fourth of the variance of one (measured: 4.03 and 4.00)."""
+    """The mean of four renders has a quarter of the variance of one (measured: 4.03 and 4.00)."""
     pictures = batches(
         lambda seed: beauty(cornell, 48, 8, seed=seed, max_depth=4, sampler=sampler), 64
     )
@@ -74,7 +75,9 @@ def test_seeds_are_independent(cornell: Any, beauty: Any, sampler: str) -> None:
 
 
 def rel_mse(picture: Any, reference: Any) -> float:
-    """As in the benchmarks, without the worst 1 % of pixels: the lamp's edge, which is luck."""
+    """As in the benchmarks, without the worst 1 % of pixels: the edge of the light, which is
+    chance.
+    """
     error = ((picture - reference) ** 2 / (reference**2 + 0.01)).mean(axis=2).ravel()
     return float(np.sort(error)[: -error.size // 100].mean())
 
@@ -83,8 +86,8 @@ def rel_mse(picture: Any, reference: Any) -> float:
 def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> None:
     """Independent noise has at least 1.3 times the error at 16 samples, and 1.9 times at 256.
 
-    Measured at 8 bounces: 1.6 and 2.4 (4.4 and 7.0 with direct light only). As many times more
-    samples would bring independent noise to the same error.
+    Measured at 8 bounces: 1.6 and 2.4 (4.4 and 7.0 with direct light only). Independent samples
+    need this many times more samples for the same error.
     """
     reference = beauty(cornell, 32, 8192 // fewer, seed=900, sampler="sobol")
     gain = {}
@@ -115,7 +118,7 @@ def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> N
     ],
 )
 def test_filters_keep_energy(tmp_path: Path, kind: str, width: float) -> None:
-    """A bright square in the middle of black: its total does not depend on the filter."""
+    """A bright square on black: its total does not depend on the filter."""
     lamp = material("L", "emissive", emissiveColor=(4, 2, 8))
     corners = [(-0.3, -0.2, 0), (0.25, -0.2, 0), (0.25, 0.35, 0), (-0.3, 0.35, 0)]
     view = camera((0, 0, 5), (0, 0, 0), half=0.2)
@@ -135,7 +138,7 @@ def test_filters_keep_a_flat_field(tmp_path: Path, kind: str) -> None:
 
 
 def test_clamping_only_takes_away(cornell: Any, beauty: Any) -> None:
-    """Indirect light only: with one bounce nothing changes; with more the picture gets darker."""
+    """Clamps indirect light only: one bounce is unchanged, more bounces get darker."""
     one = beauty(cornell, 32, 16, max_depth=1)
     assert np.array_equal(beauty(cornell, 32, 16, max_depth=1, clamp_indirect=0.05), one)
     more, clamped = (beauty(cornell, 32, 16, clamp_indirect=c) for c in (0.0, 0.05))
@@ -145,9 +148,10 @@ def test_clamping_only_takes_away(cornell: Any, beauty: Any) -> None:
 
 @pytest.mark.slow
 def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
-    """Sample k is the same whatever the count: the first 4 of 8 samples are those of 4.
+    """Sample k does not depend on the count: the first 4 of 8 samples are those of a 4-sample
+    render.
 
-    Correlation of the noise: sqrt(4 / 8), and none with another seed's.
+    Correlation of the noise: sqrt(4 / 8), and none with another seed.
     """
     plain = {"sampler": "independent", "max_depth": 1}
     truth = beauty(cornell, 32, 2048, seed=50, **plain)
@@ -163,7 +167,7 @@ def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 3])
 def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int, fewer: int) -> None:
-    """A delta lobe beside a diffuse one is chosen by a probability that cosine sampling knows."""
+    """A delta lobe beside a diffuse one: cosine sampling accounts for its probability."""
     coat = {"clearcoat": 1.0, "clearcoatRoughness": 0.0}
     prims = [
         light("Dome", texture=write_sky(tmp_path)),
@@ -191,7 +195,9 @@ def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int, f
 
 
 def test_light_by_either_technique(tmp_path: Path, beauty: Any) -> None:
-    """Bounces by the lobe or by plain cosine weigh against light samples in the same way."""
+    """Bounces by lobe sampling and by cosine sampling have consistent MIS weights with light
+    samples.
+    """
     sky = light("Dome", texture=write_sky(tmp_path))
     silver = material("M", "metal", diffuseColor=(1, 1, 1), roughness=0.0)
     grey = material("G", "diffuse", diffuseColor=(0.5, 0.5, 0.5))

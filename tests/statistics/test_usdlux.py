@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The UsdLux suite against its public pictures, and the referee that judges them."""
+"""The UsdLux suite compared with its public reference images, and tests of that comparison."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ import usdlux
 from usdlux_judge import Verdict, judge
 
 FEW = ("sphere:18", "rect:28", "cylinder:1", "disk:1", "iesTest:5")
-"""A colour temperature, a soft cone, shapes, and a profile that is scaled by -0.5."""
+"""A colour temperature, a soft cone, shapes, and a profile scaled by -0.5."""
 
 
 def files(pictures: tuple[str, ...]) -> list[str]:
-    """Of the suite, with their references."""
+    """Reference files of the suite for these images."""
     found = []
     for stage, _, frame in (picture.partition(":") for picture in pictures):
         found += [
@@ -35,7 +35,7 @@ def files(pictures: tuple[str, ...]) -> list[str]:
 @needs("wavecomb._core")
 @needs_asset(*files(FEW))
 def test_a_few_pictures(tmp_path: Path) -> None:
-    """Small: blocks of 16 pixels of 64 hold 64 of the reference's."""
+    """Small images: a block of 16 pixels of 64 corresponds to 64 pixels of the reference."""
     options = ["--size", "64", "--spp", "64", "-o", str(tmp_path)]
     assert usdlux.main([*FEW, *options]) == 0
 
@@ -45,12 +45,12 @@ def test_a_few_pictures(tmp_path: Path) -> None:
 @needs_asset(*files(("sphere:1", "dome:1", "visibleRect:1")))
 @pytest.mark.parametrize("size", ["256", "512"])
 def test_the_whole_suite(size: str, tmp_path: Path) -> None:
-    """All of it with 256 samples: means within 0.5 %, blocks within the noise."""
+    """The whole suite with 256 samples: means within 0.5 %, blocks within noise."""
     assert usdlux.main(["--size", size, "--spp", "256", "-o", str(tmp_path)]) == 0
 
 
 def fake(rng: np.random.Generator, noise: float) -> np.ndarray:
-    """A slope with skewed noise, (64, 64, 3)."""
+    """A gradient with skewed noise, (64, 64, 3)."""
     slope = np.linspace(0.2, 1.0, 64)[None, :, None] * np.ones((64, 64, 3))
     return np.asarray(slope * rng.gamma(1 / noise**2, noise**2, slope.shape))
 
@@ -65,7 +65,9 @@ def test_the_referee_accepts_noise() -> None:
 
 
 def test_a_mean_near_its_limit_is_open() -> None:
-    """0.6 % off with a standard error of about 0.1 %; 2 % off is a fault, 0.1 % is none."""
+    """0.6 % off with a standard error of about 0.1 % is undecided; 2 % off is a fault, 0.1 % is
+    not.
+    """
     rng = np.random.default_rng(4)
     ours = np.stack([fake(rng, 0.2) for _ in range(8)])
     reference = fake(rng, 0.1)
@@ -82,7 +84,7 @@ def test_a_mean_near_its_limit_is_open() -> None:
 
 @pytest.mark.parametrize("fault", ["mean", "block", "colour"])
 def test_the_referee_finds_faults(fault: str) -> None:
-    """A mean that is 1 % off; one block that is 6 % off; one colour of one block."""
+    """Detects a mean that is 1 % off, a block that is 6 % off, and one channel of one block."""
     rng = np.random.default_rng(3)
     ours = np.stack([fake(rng, 0.2) for _ in range(8)])
     reference = fake(rng, 0.1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes against Mitsuba 3's `volpathmis`: pictures agree to within noise."""
+"""Volumes compared with Mitsuba 3's `volpathmis`: images agree within noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEPTH = 12
 
 
 def smoke() -> Any:
-    """Densities of a lumpy ball, 0 at the edge of the grid: there Mitsuba's grids end sharply."""
+    """Densities of a lumpy ball, 0 at the edge of the grid, where Mitsuba's grids end."""
     rng = np.random.default_rng(4)
     at = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, VOXELS)] * 3, indexing="ij"), axis=-1)
     ball = np.linalg.norm(at, axis=-1) < 0.85
@@ -27,13 +27,13 @@ def smoke() -> Any:
 
 
 def tints() -> Any:
-    """Albedos that differ along x, y and z."""
+    """Albedos that vary along x, y and z."""
     ramp = np.linspace(0.3, 0.95, VOXELS, dtype=np.float32)
     return np.stack(np.meshgrid(ramp, ramp, ramp, indexing="ij"), axis=-1)
 
 
 def in_cube(voxels: Any) -> Any:
-    """A grid whose voxels are the middles of equal cells of [-1, 1]^3."""
+    """A grid whose voxels are the centres of equal cells of [-1, 1]^3."""
     from wavecomb import _core
 
     step = 2.0 / VOXELS
@@ -43,7 +43,7 @@ def in_cube(voxels: Any) -> Any:
 
 
 def stage() -> Any:
-    """A grey floor below the cube, a glowing block beside it, a dim sky; no volume yet."""
+    """A grey floor below the cube, an emissive block beside it, a dim sky; no volume yet."""
     from recording import RecordingBuilder
 
     builder = RecordingBuilder()
@@ -67,7 +67,7 @@ def stage() -> Any:
 
 @pytest.mark.parametrize("kind", ["even", "grid"])
 def test_volumes(mitsuba: ModuleType, beauty: Any, fewer: int, kind: str) -> None:
-    """An even box, whose extinction differs by channel; and a grid of densities and albedos."""
+    """A homogeneous box with extinction by channel, and a grid of densities and albedos."""
     from mitsuba_bridge import MitsubaScene, PeerSettings
 
     mi = mitsuba
@@ -92,7 +92,7 @@ def test_volumes(mitsuba: ModuleType, beauty: Any, fewer: int, kind: str) -> Non
         )  # fmt: skip
 
         def gridvolume(voxels: Any) -> dict[str, Any]:
-            # Mitsuba's are z, y, x over the unit cube.
+            # Mitsuba's arrays are indexed z, y, x over the unit cube.
             values = np.ascontiguousarray(np.swapaxes(voxels, 0, 2))
             if values.ndim == 3:
                 values = values[..., None]
@@ -109,7 +109,7 @@ def test_volumes(mitsuba: ModuleType, beauty: Any, fewer: int, kind: str) -> Non
     medium["phase"] = {"type": "hg", "g": g}
 
     class WithVolume(MitsubaScene):
-        """The stage with the volume within a cube that is not seen."""
+        """The stage with the volume inside an invisible cube."""
 
         def _geometry(self) -> dict[str, Any]:
             return super()._geometry() | {
