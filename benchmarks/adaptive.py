@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far the adaptive policy is from the best fixed one, and what measuring costs takes.
+"""Compare the adaptive policy with the best fixed policy, and measure the cost of timing records.
 
     .venv/bin/python benchmarks/adaptive.py out/mixed.usdc out/dragon.usdc out/cornell.usda
 
-Renders each stage with every policy in turn, rounds in shuffled order, in one process and one
-sitting. Prints medians of the render time, the ratio of adaptive to the best fixed policy, and the
-ratio of shading time with costs measured to shading time without.
+Renders each stage with every policy, in rounds of shuffled order, in one process. Prints medians of
+the render time, the ratio of adaptive to the best fixed policy, and the ratio of shading time with
+cost measurement to shading time without.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ POLICIES = ("none", "program", "material", "texture-locality", "adaptive")
 
 
 def main() -> None:
-    """Runs the sitting."""
+    """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+")
     parser.add_argument("--spp", type=int, default=16)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What allotting samples to pixels brings: efficiency to that of even samples.
+"""Compare the efficiency of sample allocation by pixel with uniform sampling.
 
     .venv/bin/python benchmarks/allotment.py out/cornell.usda out/mixed.usdc half
 
-Renders each stage with every way of ``--allocate`` and number of samples, several seeds in turns,
-and compares with a picture of ``--reference`` samples of other seeds. Efficiency is
-1 / (relMSE x seconds), both as means over seeds; seconds are of the processor, so that other work
-on the machine counts little. ``half`` is a stage of its own: the left half is an open floor, the
-right half a white box whose paths are many times as long.
+Renders each stage with every mode of ``--allocate`` and number of samples, with several seeds in
+turn, and compares with a render of ``--reference`` samples and other seeds. Efficiency is 1 /
+(relMSE x seconds), both as means over seeds. Seconds are CPU time, so that other work on the
+machine has little effect. ``half`` is a stage made here: its left half is an open floor, its right
+half a white box whose paths are many times as long.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ def Xform "World" {
 
 
 def rel_mse(picture: Any, reference: Any) -> float:
-    """Mean of (A - B)^2 / (B^2 + 0.01)."""
+    """Return the mean of (A - B)^2 / (B^2 + 0.01)."""
     return float(np.mean((picture - reference) ** 2 / (reference**2 + 0.01)))
 
 
 def measure(scene: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
-    """A row for each number of samples and way."""
+    """Return a row for each number of samples and mode."""
     common: dict[str, Any] = {"size": (options.size, options.size), "threads": options.threads}
     reference = np.asarray(
         wavecomb.render(scene, spp=options.reference, seed=1000, **common).beauty, np.float64
@@ -94,7 +94,7 @@ def measure(scene: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
                 seconds[way].append(time.process_time() - before)
                 errors[way].append(rel_mse(np.asarray(picture.beauty, np.float64), reference))
                 if picture.samples.sum() != spp * options.size**2:
-                    sys.exit(f"{way} at {spp}: another number of samples")
+                    sys.exit(f"{way} at {spp}: the number of samples differs between renders")
         even = statistics.mean(errors["even"]) * statistics.mean(seconds["even"])
         for way in WAYS:
             error, took = statistics.mean(errors[way]), statistics.mean(seconds[way])
@@ -111,7 +111,7 @@ def measure(scene: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def main() -> None:
-    """Runs the sitting."""
+    """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+")
     parser.add_argument("--spp", type=int, nargs="+", default=[16, 64, 256])

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What paths from the lights bring: efficiency of ``--transport light`` and ``auto`` to ``path``.
+"""Compare the efficiency of light paths (``--transport light`` and ``auto``) with ``path``.
 
     .venv/bin/python benchmarks/caustics.py caustics pool lens prism landscape mixed dragon
 
-For each stage two references of other seeds are rendered first, with light paths that are merged
-within half a pixel. Short renders then tell how many samples each way has in ``--seconds``, and the
-ways are rendered in turns, each round with another seed. Ways that are ``merged`` have
-``--merge-radius 1``, and ``unaimed`` is ``light`` with ``--light-aim off``.
+For each stage, two references with different seeds are rendered first, with light paths that are
+merged within half a pixel. Short renders determine how many samples each mode takes in
+``--seconds``. The modes are then rendered in turn, each round with a new seed. Modes named
+``merged`` have ``--merge-radius 1``, and ``unaimed`` is ``light`` with ``--light-aim off``.
 
-Efficiency is 1 / (relMSE x seconds), relMSE the mean of (picture - one reference) x (picture - the
-other) over (m^2 + 0.01 of its mean^2), with m their mean: what noise the references have adds
-nothing in the mean, however many samples it takes till it is gone. Seconds are of the clock, with
-all that is learned and tried before the first pass, without loading. Each figure is there for the
-whole picture and for the caustics, the pixels of which light paths found more than half in the
-references; and for both without the thousandth of the pixels that is largest (``trimmed``).
+Efficiency is 1 / (relMSE x seconds). relMSE is the mean of (image - reference 1) x (image -
+reference 2) / (m^2 + 0.01 of its mean^2), with m the mean of the references: independent noise of
+the references adds nothing on average. Seconds are wall time including training and pilot renders
+but not loading. Results are given for the whole image and for the caustics: pixels where light
+paths contribute more than half of the references. Both are also given without the thousandth of the
+pixels with the largest values (``trimmed``).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ REFERENCE_SEEDS, TRIAL_SEED = (1_000_003, 1_000_037), 1_000_033
 
 
 class Stage:
-    """A stage, with its reference and the pixels of its caustics."""
+    """A stage with its references and the pixels of its caustics."""
 
     def __init__(self, name: str, options: argparse.Namespace) -> None:
         path = options.folder / f"caustics-{name}.usdc"
@@ -66,7 +66,7 @@ class Stage:
         self.scale = 1.0 / (self.truth**2 + 0.01 * float(bright.mean()) ** 2)
 
     def render(self, spp: int, seed: int, **settings: Any) -> tuple[wavecomb.Picture, float]:
-        """A picture, and the seconds it took."""
+        """Render, and return the image and the time in seconds."""
         begin = time.perf_counter()
         picture = wavecomb.render(
             self.scene,
@@ -79,7 +79,7 @@ class Stage:
         return picture, time.perf_counter() - begin
 
     def samples(self, way: str) -> int:
-        """As many as `way` has in the time of a round: the line through two renders."""
+        """Samples that `way` takes in the time of a round, from a line through two renders."""
         spp, most = 4, self.options.reference // 4
         done, before = 0, 0.0
         while True:
@@ -92,7 +92,7 @@ class Stage:
             spp = min(wanted, 4 * spp)
 
     def errors(self, picture: wavecomb.Picture) -> dict[str, float]:
-        """relMSE, by FIGURES; 0 for caustics where there are none."""
+        """The relMSE by FIGURES; 0 for caustics if there are none."""
         one, other = (np.asarray(picture.beauty, np.float64) - r for r in self.references)
         pixels = (one * other * self.scale).mean(2)
         some = pixels[self.mask] if self.mask.any() else np.zeros(1)
@@ -105,13 +105,13 @@ class Stage:
 
 
 def trimmed(errors: NDArray[np.float64]) -> float:
-    """The mean without the thousandth that is farthest from 0."""
+    """Mean without the thousandth of the values that are largest in magnitude."""
     by_size = errors.ravel()[np.argsort(np.abs(errors), axis=None)]
     return float(by_size[: by_size.size - int(by_size.size * TRIMMED_SHARE)].mean())
 
 
 def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one stage."""
+    """Return all results of one stage."""
     stage = Stage(name, options)
     spp = {way: stage.samples(way) for way in options.ways}
     seconds: dict[str, list[float]] = {way: [] for way in options.ways}
@@ -135,7 +135,7 @@ def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
             base, own = costs[options.ways[0]][figure], costs[way][figure]
             if min(own) > 0.0:
                 efficiency[figure] = ratio(base, own)
-                # Of all rounds together, which one lucky round says little of.
+                # Ratio of the means over rounds, which a single lucky round affects little.
                 efficiency[figure]["of_means"] = float(np.mean(base) / np.mean(own))
         ways[way] = {
             "spp": spp[way], "seconds": summary(seconds[way]), "efficiency": efficiency,
@@ -145,19 +145,25 @@ def measure(name: str, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Runs the sitting."""
+    """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("stages", nargs="*", default=list(STAGES), help="of: " + " ".join(STAGES))
+    parser.add_argument(
+        "stages", nargs="*", default=list(STAGES), help="names out of " + " ".join(STAGES)
+    )
     parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=list(WAYS))
     parser.add_argument("--size", type=int, nargs=2, default=[320, 240])
-    parser.add_argument("--seconds", type=float, default=10.0, help="of a render")
+    parser.add_argument("--seconds", type=float, default=10.0, help="time of each render")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--reference", type=int, default=8192, help="samples of both together")
+    parser.add_argument(
+        "--reference", type=int, default=8192, help="samples per pixel of both references together"
+    )
     parser.add_argument("--triangles", type=int, default=1_000_000)
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "caustics", help="of stages")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "caustics", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "caustics.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     options = parser.parse_args()
     if options.quick:
         options.size, options.seconds, options.reference = [64, 48], 0.3, 256

@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What issue 5 promises about speed, measured in one interleaved sitting.
+"""Measure the speed targets: traversal, lanes, reference, threads, linearity, wave size.
 
-    .venv/bin/python benchmarks/claims.py                       # all of it: some 20 minutes
-    .venv/bin/python benchmarks/claims.py --only lanes threads  # some of it
-    .venv/bin/python benchmarks/claims.py --quick               # does it run?
+    .venv/bin/python benchmarks/claims.py                       # everything: about 20 minutes
+    .venv/bin/python benchmarks/claims.py --only lanes threads  # a part of it
+    .venv/bin/python benchmarks/claims.py --quick               # check that it runs
 
-- traversal (1): trace and shadow phases as a share of the render, for each policy. Of all thread
-  time of the render, and of the phases' sum, which leaves out threads that wait.
-- lanes (2): shading with its ordering, at the widest lanes and each policy, against 1 lane without
-  an order and the widest without an order.
-- reference (3): the wave at 1 lane and the defaults against the depth-first scalar reference.
-- threads (5): as many threads as --threads against 1.
-- linear (5): time against samples and against pixels. A line t = a + b n is fitted with equal
-  weight for relative errors; given are the largest deviation from it, and what a call costs once.
-- waves: the default wave size against the best of 256 to 2^20.
+- traversal: trace and shadow phases as a fraction of the render, for each policy; of all thread
+  time, and of the sum of the phases, which excludes idle threads.
+- lanes: shading plus ordering at the widest lanes for each policy, compared with 1 lane without
+  ordering and the widest lanes without ordering.
+- reference: the wavefront at 1 lane and with default settings, compared with the scalar depth-first
+  reference integrator.
+- threads: --threads threads compared with 1.
+- linear: time by number of samples and pixels. A line t = a + b n is fitted with equal weight for
+  relative errors. Results are the largest deviation from it and the constant cost of a call.
+- waves: the default wave size compared with the best of 256 to 2^20.
 
-A round renders every choice of a stage once, in shuffled order; a choice that several claims use
-is rendered once. Ratios are taken within a round, and are medians over rounds with a bootstrap
-interval of 95 %. "best" is the policy or wave size with the least median. Times are of the render
-without loading and building. All pictures of one size and sample count must be equal bit for bit,
-or the sitting fails. The limit ratio is benchmarks/limit.py's, the peers are benchmarks/peers'.
+A round renders every configuration of a stage once, in shuffled order; configurations that several
+measurements share are rendered once. Ratios are taken within a round. Results are medians over
+rounds with a bootstrap interval of 95 %. "best" is the policy or wave size with the lowest median.
+Times exclude loading and scene construction. All images of one size and sample count must be
+bitwise equal, or the benchmark fails. benchmarks/limit.py measures the ratio to Embree alone,
+benchmarks/peers other renderers.
 """
 
 from __future__ import annotations
@@ -53,14 +55,14 @@ WAVE_SIZES = tuple(4**k for k in range(4, 11))
 """256 to 2^20."""
 SPP_FACTORS = (0.5, 1, 2, 4)
 EDGE_FACTORS = (0.5, 0.7071, 1, 1.4142)
-"""Edges of the pictures: pixels double from one to the next."""
+"""Factors of the image width: pixels double from one to the next."""
 
 Choice = dict[str, Any]
 Figures = dict[str, Any]
 
 
 class Stage:
-    """A loaded stage, and every render of it so far: by choice, one a round."""
+    """A loaded stage and the results of its renders: by configuration, one per round."""
 
     def __init__(self, name: str, args: argparse.Namespace) -> None:
         self.name, self.args = name, args
@@ -69,13 +71,13 @@ class Stage:
         self._pictures: dict[Any, str] = {}
 
     def render(self, choice: Choice) -> dict[str, Any]:
-        """One render; its times are kept."""
+        """Render once and store the times."""
         full = {"spp": self.args.spp, "size": self.args.size, "threads": self.args.threads} | choice
         edge = full.pop("size")
         picture = wavecomb.render(self.loaded.scene, size=(edge, edge), **full)
         found = hashlib.sha256(picture.beauty.tobytes()).hexdigest()
         if self._pictures.setdefault((edge, full["spp"]), found) != found:
-            sys.exit(f"{self.name}: {_key(choice)} gives another picture")
+            sys.exit(f"{self.name}: {_key(choice)} gives a different image")
         run = phase_times(picture.stats) | {
             "threads": full["threads"],
             "wave_size": picture.stats["wave_size"],
@@ -84,11 +86,11 @@ class Stage:
         return run
 
     def times(self, choice: Choice, *keys: str) -> list[float]:
-        """Sums of the times named, round by round; by default render_s."""
+        """Sums of the named times per round; by default render_s."""
         return [sum(run[key] for key in keys or ("render_s",)) for run in self.runs[_key(choice)]]
 
     def quickest(self, choices: Sequence[Choice]) -> Choice:
-        """The choice with the least median time."""
+        """The configuration with the lowest median time."""
         return min(choices, key=lambda choice: float(np.median(self.times(choice))))
 
 
@@ -96,7 +98,7 @@ def _key(choice: Choice) -> str:
     return ", ".join(f"{key} {value}" for key, value in sorted(choice.items())) or "default"
 
 
-# ---- the claims: what each renders, and what it makes of that ------------------------------------
+# ---- measurements: configurations to render, and their evaluation --------------------------------
 
 
 def traversal_choices(args: argparse.Namespace) -> list[Choice]:
@@ -104,7 +106,7 @@ def traversal_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def traversal(stage: Stage) -> Figures:
-    """Shares of the trace and shadow phases."""
+    """Fractions of the trace and shadow phases."""
     choices = traversal_choices(stage.args)
     shares = {}
     for choice in choices:
@@ -122,7 +124,7 @@ def lanes_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def lanes(stage: Stage) -> Figures:
-    """How many times faster ordered shading in the widest lanes is."""
+    """Speedup of shading in the widest lanes with ordering."""
     best = stage.quickest(traversal_choices(stage.args))
     shading = ("shade_s", "order_s")
     scalar = stage.times({"policy": "none", "lanes": 1}, *shading)
@@ -146,7 +148,7 @@ def reference_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def reference(stage: Stage) -> Figures:
-    """Time of the wave at 1 lane to that of the reference; how many times faster the default is."""
+    """Time of the wavefront at 1 lane over that of the reference, and speedup of the defaults."""
     scalar = stage.times(REFERENCE)
     return {
         "one_lane_to_reference": ratio(stage.times(ONE_LANE[0]), scalar),
@@ -160,7 +162,7 @@ def threads_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def threads(stage: Stage) -> Figures:
-    """How many times faster all threads are than one."""
+    """Speedup by threads."""
     return {
         "threads": stage.args.threads,
         "speedup": ratio(stage.times({"threads": 1}), stage.times({})),
@@ -168,7 +170,7 @@ def threads(stage: Stage) -> Figures:
 
 
 def series(args: argparse.Namespace) -> dict[str, list[tuple[int, Choice]]]:
-    """What is rendered for more and more samples and pixels: (amount, choice)."""
+    """Configurations with increasing samples and pixels: (amount, configuration)."""
     spp = [max(1, round(factor * args.spp)) for factor in SPP_FACTORS]
     edges = [round(factor * args.size) for factor in EDGE_FACTORS]
     return {
@@ -182,7 +184,7 @@ def linear_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def linear(stage: Stage) -> Figures:
-    """Deviations of time from a line, relative."""
+    """Relative deviations of the time from a line."""
     figures: Figures = {}
     for name, points in series(stage.args).items():
         amounts = np.array([amount for amount, _ in points], float)
@@ -204,7 +206,7 @@ def linear(stage: Stage) -> Figures:
 
 
 def _fit(n: Any, t: Any) -> tuple[float, float, float]:
-    """Coefficients a, b of t = a + b n by least relative squares; largest relative deviation."""
+    """Fit t = a + b n by least relative squares; return a, b and the largest deviation."""
     columns = np.stack([1 / t, n / t], axis=1)
     (a, b), *_ = np.linalg.lstsq(columns, np.ones_like(t), rcond=None)
     return float(a), float(b), float(np.max(np.abs((a + b * n) / t - 1)))
@@ -215,7 +217,7 @@ def waves_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def waves(stage: Stage) -> Figures:
-    """The default wave size against the best; small pictures make large waves smaller."""
+    """The default wave size compared with the best; small images limit the size of waves."""
     sizes = [{"wave_size": size} for size in WAVE_SIZES]
     best = stage.quickest(sizes)
     return {
@@ -243,11 +245,11 @@ CLAIMS: dict[str, Claim] = {
 }
 
 
-# ---- the sitting ---------------------------------------------------------------------------------
+# ---- run -----------------------------------------------------------------------------------------
 
 
 def main() -> None:
-    """Runs the sitting, prints the tables, writes the JSON."""
+    """Run the benchmark, print the tables, write the JSON."""
     args = _arguments()
     figures: Figures = {name: {} for name in args.only}
     runs = {}
@@ -274,13 +276,13 @@ def _arguments() -> argparse.Namespace:
         nargs="+",
         default=["program", "material", "texture-locality", "adaptive"],
         metavar="NAME",
-        help="among which the best is looked for",
+        help="wave sizes to search for the best",
     )
     return sitting_arguments(parser, size=80, spp=2, rounds=2, triangles=20_000)
 
 
 def measure(name: str, args: argparse.Namespace) -> Stage:
-    """Every choice that the claims ask for, round by round."""
+    """Render every configuration that the measurements need, round by round."""
     stage = Stage(name, args)
     choices: list[Choice] = []
     for claim in args.only:
@@ -298,7 +300,7 @@ def measure(name: str, args: argparse.Namespace) -> Stage:
 
 
 def report(figures: Figures) -> Iterable[str]:
-    """A line for each figure and stage, as Markdown."""
+    """Yield a Markdown line for each result and stage."""
     yield from head("claim", "stage", "figure", "value")
     for claim, stages in figures.items():
         for stage, found in stages.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A stage of all that costs otherwise: graphs, images, walks below surfaces, hair, smoke, glass.
+"""Write a stage with all expensive features: graphs, images, subsurface, hair, smoke, glass.
 
 .venv/bin/python benchmarks/everything.py out/everything.usda
 """
@@ -20,11 +20,11 @@ _PARTS: dict[str, tuple[dict[str, Any], tuple[float, float, float], float]] = {
     "head": ({"strands": 20_000}, (0.5, 4.6, 5.0), 1.0),
     "smoke": ({"voxels": 96}, (6.0, 1.0, 3.0), 1.6),
 }
-"""Generated stages with their options, where each is put, and how large."""
+"""Generated stages with their options, positions and sizes."""
 
 
 def write(path: Path) -> Path:
-    """Writes the stage, and its parts beside it; the camera and the lights are of ``heavy``."""
+    """Write the stage and those it references; camera and lights are those of ``heavy``."""
     path.parent.mkdir(parents=True, exist_ok=True)
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)

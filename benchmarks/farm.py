@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares an image in tiles by N workers with one process with N threads.
+"""Compare rendering an image in tiles by N workers with one process of N threads.
 
-python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --rounds 3
+    python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --rounds 3
 
-With --frames N the camera moves over N frames, and all pictures are compared, bit for bit:
+With --frames N the camera moves over N frames, and all images are compared bit for bit:
 
-python benchmarks/farm.py out/mixed.usdc --size 1200 800 --spp 64 --workers 4 --rounds 1 --frames 48
+    python benchmarks/farm.py out/mixed.usdc --size 1200 800 --workers 4 --rounds 1 --frames 48
 
---way says how: with all AOVs, adaptive to a pixel error, or with a learned field.
+--way selects the mode: with all AOVs, adaptive to a pixel error, or with a learned field.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ AOVS = (
     *("emission", "direct", "indirect", "light_groups", "guide_albedo", "guide_normal"),
     *("samples", "error", "variance"),
 )
-"""All but cost, which is of the clock."""
+"""All AOVs but cost, which depends on the clock."""
 WAYS = {
     "plain": [],
     "aovs": [word for name in AOVS for word in ("--aov", name)],
@@ -38,23 +38,23 @@ WAYS = {
 
 
 def cpu_s() -> float:
-    """Processor time of all processes that this one started and that ended."""
+    """CPU time of all finished child processes."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def timed(*words: object) -> tuple[float, float]:
-    """Seconds that a command takes: of the wall, and of the processor."""
+    """Run a command; return wall seconds and CPU seconds."""
     start, before = time.perf_counter(), cpu_s()
     subprocess.run([*COMMAND, *map(str, words)], check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - start, cpu_s() - before
 
 
 def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
-    """Milliseconds for each of so many tiles of 8 x 8 pixels beyond rendering them.
+    """Overhead in milliseconds for each of ``count`` tiles of 8 x 8 pixels.
 
     Tiles are rendered once by one process, without a scheduler, and once by the farm, whose workers
-    have their stage open before the clock starts. Both write the same part files.
+    have opened the stage before the clock starts. Both write the same files.
     """
     from wavecomb import farm
     from wavecomb.farm import client, outcome
@@ -91,7 +91,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
 
 
 def moving(stage: Path, place: Path, frames: int) -> Path:
-    """The stage with a camera that goes sideways, a step for each frame."""
+    """Return the stage with a camera that moves sideways from frame to frame."""
     from pxr import Gf, Sdf, Usd, UsdGeom
 
     file = place / "moving.usda"
@@ -108,7 +108,7 @@ def moving(stage: Path, place: Path, frames: int) -> Path:
 
 
 def differing(place: Path, frames: int) -> int:
-    """Frames of whose two pictures any layer is not the same bits."""
+    """Number of frames whose two images differ in any layer."""
     from wavecomb.picture.image import read_layers
 
     found = 0
@@ -122,7 +122,7 @@ def differing(place: Path, frames: int) -> int:
 
 
 def main() -> None:
-    """Prints JSON; pairs are of the wall and of the processor."""
+    """Print JSON; pairs are wall and CPU seconds."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stage", type=Path)
     parser.add_argument("--size", nargs=2, type=int, default=(600, 400))
@@ -134,7 +134,9 @@ def main() -> None:
     parser.add_argument(
         "--tasks", type=int, default=0, help="tiles of 8 x 8 pixels to time, a multiple of 50"
     )
-    parser.add_argument("--frames", type=int, default=0, help="of a camera that moves")
+    parser.add_argument(
+        "--frames", type=int, default=0, help="number of frames with a moving camera"
+    )
     asked = parser.parse_args()
     picture = ["--size", *asked.size, "--spp", asked.spp, "--quiet", *WAYS[asked.way]]
     rounds = []

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders every stage below a folder and puts the pictures on one page.
+"""Render every stage below a folder and show the images on one page.
 
     .venv/bin/python benchmarks/gallery.py
     .venv/bin/python benchmarks/gallery.py my/stages -o out/mine --size 320 --spp 64 --limit 120
 
-Each stage is rendered by ``wavecomb render`` in a process of its own, which is ended at the time
-limit. The page, index.html in the output folder, has for each stage the picture, seconds, memory,
-what is not supported, and warnings. Exit code 1 where one failed or was ended.
+Each stage is rendered by ``wavecomb render`` in a separate process, which is stopped at the time
+limit. The page, index.html in the output folder, shows the image, seconds, memory, unsupported
+features and warnings of each stage. Exit code 1 if a stage failed or was stopped.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ img {{ width: 100%; background: #888 }} .no {{ color: #a40 }} .bad {{ color: #c3
 
 @dataclass
 class Entry:
-    """What came of one stage; ``reference``: a picture to show beside ours."""
+    """Result of one stage; ``reference`` is an image to show beside it."""
 
     name: str
     about: str = ""
@@ -63,7 +63,7 @@ class Entry:
     failure: str = ""
 
     def card(self) -> str:
-        """Its part of the page."""
+        """HTML of the entry."""
         lines = [f'<article class="{"failed" if self.failure else "done"}">']
         for picture in (self.picture, self.reference):
             if picture is not None:
@@ -89,7 +89,7 @@ class Entry:
 def render(
     stage: Path, name: str, stem: Path, options: argparse.Namespace, extra: Sequence[str] = ()
 ) -> Entry:
-    """Renders a stage in a process of its own; ``extra``: more options of the command."""
+    """Render a stage in a separate process; ``extra`` are more options of the command."""
     entry = Entry(name)
     files = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in ("exr", "png", "json")}
     command = [sys.executable, "-m", "wavecomb", "render", str(stage), "--quiet"]
@@ -127,7 +127,7 @@ def render(
 
 
 def write_page(folder: str, entries: Sequence[Entry], options: argparse.Namespace) -> int:
-    """Writes the page; gives the exit code."""
+    """Write the page; return the exit code."""
     failed = [entry for entry in entries if entry.failure]
     summary = (
         f"{len(failed)} failed; Wavecomb {version()}, {options.size} x {options.size} pixels, "
@@ -150,13 +150,13 @@ def write_page(folder: str, entries: Sequence[Entry], options: argparse.Namespac
 
 
 def main() -> int:
-    """Renders all and writes the page."""
+    """Render all stages and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", nargs="?", type=Path, default=ASSETS, help="of the stages")
+    parser.add_argument("folder", nargs="?", type=Path, default=ASSETS, help="folder of the stages")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/gallery"))
-    parser.add_argument("--size", type=int, default=256, help="pixels of an edge")
+    parser.add_argument("--size", type=int, default=256, help="image edge in pixels")
     parser.add_argument("--spp", type=int, default=32)
-    parser.add_argument("--limit", type=float, default=60.0, help="seconds for each stage")
+    parser.add_argument("--limit", type=float, default=60.0, help="time limit per stage in seconds")
     options = parser.parse_args()
     stages = sorted(p for p in options.folder.rglob("*") if p.suffix.lower() in ENDINGS)
     if not stages:

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is learned brings: efficiency of a render to one without.
+"""Compare the efficiency of renders with learning (guiding, light shares) and without.
 
     .venv/bin/python benchmarks/guiding.py room cornell --spp 64 --seeds 5
     .venv/bin/python benchmarks/guiding.py mixed-lamps kitchen lights --ways power off auto light
     .venv/bin/python benchmarks/guiding.py room --seconds 20 --ways power lights lights+pixels
 
-Renders each stage in each way, several seeds in turns; the first way is what others are compared
-with. ``power`` is without anything learned, ``off`` the defaults, of which shares of lights are
-learned; parts, and parts joined by ``+``, are over ``power``. Stages are generated ones, written
-as exporters do (``--plain``), with ``-lamps`` behind their names lit by a key, a fill and a dim
-dome; or files. The filter is a box of one pixel. relMSE is that of one picture: the variance over
-the seeds at each pixel over the square of the mean of all pictures, plus 0.01; every combination
-has the same mean. Efficiency is 1 / (relMSE x seconds); seconds are of the processor and have the
-training in them, so that other work on the machine counts little. With ``--seconds`` each render
-ends after so many, training included, and they are those of the clock.
+Renders each stage in each mode, with several seeds in turn; the first mode is the baseline.
+``power`` learns nothing, ``off`` is the default, which calibrates light shares. The names of
+learned parts, also joined by ``+``, add to ``power``. Stages are generated in exporter style
+(``--plain``) or files; with the suffix ``-lamps`` they are lit by a key light, a fill light and a
+dim dome. The filter is a box of one pixel. relMSE is that of one image: the variance over seeds at
+each pixel, divided by the square of the mean of all images plus 0.01, since all modes have the same
+mean. Efficiency is 1 / (relMSE x seconds). Seconds are CPU time including training, so that other
+work on the machine has little effect. With ``--seconds``, each render ends after this wall time,
+training included, and seconds are wall time.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ PARTS: dict[str, dict[str, str]] = {
     "paths": {"roulette": "efficient"},
     "directions": {"guiding": "on"},
 }
-"""Of what is learned, each over everything off."""
+"""Learned parts, each with everything else off."""
 
 
 def way(name: str) -> dict[str, str]:
-    """Settings of a way: one of WAYS, or some of PARTS joined by ``+``.
+    """Settings of a mode: one of WAYS, or PARTS joined by ``+``.
 
     Raises:
-        argparse.ArgumentTypeError: Is neither.
+        argparse.ArgumentTypeError: The name is neither.
     """
     if name in WAYS:
         return WAYS[name]
@@ -66,13 +66,13 @@ def way(name: str) -> dict[str, str]:
 
 
 def known(name: str) -> str:
-    """A way's name, once it is known to be one."""
+    """Check the name of a mode and return it."""
     way(name)
     return name
 
 
 def load(name: str, folder: Path) -> Any:
-    """The scene of a generated stage, or of a file."""
+    """Load a generated stage or a file."""
     is_file = Path(name).suffix != ""
     scene, _, lamps = name.partition("-lamps")
     options = {"plain": True, "lamps": name != scene and not lamps}
@@ -83,7 +83,7 @@ def load(name: str, folder: Path) -> Any:
 def measure(
     scene: Any, options: argparse.Namespace, budget: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    """A row for each way. `budget`: ``spp`` or ``limit``, seconds, of a render."""
+    """Return a row per mode. `budget` is ``spp`` or ``limit`` (seconds) of a render."""
     clock, ends = time.process_time, budget
     if "limit" in budget:
         clock, ends = time.perf_counter, {"spp": 1 << 20, "time_limit": budget["limit"]}
@@ -106,7 +106,7 @@ def measure(
     for name in options.ways:
         stack = np.array(pictures[name])
         pixels = np.sort((stack.var(axis=0, ddof=1) / (mean**2 + 0.01)).mean(axis=-1).ravel())
-        # Each round's own error, for the spread of the ratios.
+        # Error of each round, for the spread of the ratios.
         rounds = [
             float(((one - mean) ** 2 / (mean**2 + 0.01)).mean()) * took
             for one, took in zip(stack, seconds[name], strict=True)
@@ -128,13 +128,15 @@ def measure(
 
 
 def main() -> None:
-    """Runs the sitting."""
+    """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+")
     usual = ["off", "roulette", "guiding", "both", "auto"]
     parser.add_argument("--ways", nargs="+", default=usual, type=known)
     parser.add_argument("--spp", type=int, nargs="+", default=[64])
-    parser.add_argument("--seconds", type=float, nargs="+", help="of each render, in place of spp")
+    parser.add_argument(
+        "--seconds", type=float, nargs="+", help="time of each render, instead of --spp"
+    )
     parser.add_argument("--size", type=int, nargs=2, default=[240, 160])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)

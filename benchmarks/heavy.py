@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an order is worth where it should be worth most: 64 heavy materials, 2 GB of textures.
+"""Measure the gain of ordering where it should be largest: 64 heavy materials, 2 GB of textures.
 
     .venv/bin/python benchmarks/heavy.py              # 2 GB: minutes to write the stage, once
-    .venv/bin/python benchmarks/heavy.py --quick      # does it run?
+    .venv/bin/python benchmarks/heavy.py --quick      # check that it runs
 
-The stage of `wavecomb scene heavy`. Every policy renders it at one lane and at the widest, in
-rounds of shuffled order, in one process; a second field, whose textures fit into the caches, tells
-what textures have to do with it. Prints a Markdown table for each and how far materials are apart
-in cost, and writes all figures to a JSON file. All pictures must be one picture, bit for bit.
+Uses the stage of `wavecomb scene heavy`. Every policy renders it at one lane and at the widest, in
+rounds of shuffled order, in one process. A second stage with textures that fit into the caches
+shows the effect of the textures. Prints a Markdown table for each stage and the spread of material
+costs, and writes all results to a JSON file. All images must be bitwise equal.
 
-Figures are medians over rounds with 95 % intervals, of a policy's over arrival order's in the same
-round: shade + order time (what shading takes with what its order costs), and the time of the
-render.
+Results are medians over rounds with 95 % intervals, relative to arrival order in the same round:
+shade + order time (shading including the cost of its order), and the time of the render.
 """
 
 from __future__ import annotations
@@ -40,13 +39,13 @@ from wavecomb.options import settings
 
 SMALL_MB = 2.0
 LANES = (0, 1)
-"""The widest, and one."""
+"""0 means the widest."""
 SEEN = 1000
-"""Materials with fewer records are left out of the spread of costs."""
+"""Materials with fewer records are excluded from the spread of costs."""
 
 
 def main() -> None:
-    """Renders, prints the tables, writes the JSON."""
+    """Render, print the tables, write the JSON."""
     args = _arguments()
     found: dict[str, Any] = {}
     for texture_mb in (args.texture_mb, SMALL_MB):
@@ -69,9 +68,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--spp", type=int, default=8)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "heavy", help="of stages")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "heavy", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "heavy.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     args = parser.parse_args()
     if args.quick:
         args.materials, args.texture_mb, args.triangles = 16, 8.0, 50_000
@@ -81,7 +82,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one field."""
+    """Return all results of one stage."""
     path = stage_file(
         args.folder / f"heavy-{args.materials}-{args.triangles}-{texture_mb:g}.usdc",
         "heavy", materials=args.materials, texture_mb=texture_mb, triangles=args.triangles,
@@ -100,7 +101,7 @@ def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
             if picture is None:
                 picture = done.beauty
             elif not np.array_equal(picture, done.beauty):
-                raise SystemExit(f"{policy} at {width} lanes gives another picture")
+                raise SystemExit(f"{policy} at {width} lanes gives a different image")
             times.setdefault(f"{width}/{policy}", []).append(phase_times(done.stats))
             if (width, policy) == (0, "material"):
                 spread = cost_spread(done.stats)
@@ -115,20 +116,20 @@ def measure(texture_mb: float, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def render(stage: Any, args: argparse.Namespace, **settings: Any) -> Any:
-    """One render."""
+    """Render once."""
     return wavecomb.render(
         stage, size=(args.size, args.size), spp=args.spp, threads=args.threads, **settings
     )
 
 
 def cost_spread(stats: dict[str, Any]) -> float:
-    """Nanoseconds a record of the dearest material to those of the cheapest, among those seen."""
+    """Cost per record of the most expensive material over that of the least expensive one."""
     costs = [m["ns_per_record"] for m in stats["materials"] if m["records"] >= SEEN]
     return max(costs) / min(costs)
 
 
 def _ratios(times: dict[str, list[dict[str, float]]], of: Any) -> dict[str, Any]:
-    """Each case to arrival order at as many lanes."""
+    """Each configuration relative to arrival order at the same lanes."""
     return {
         case: ratio([of(t) for t in runs], [of(t) for t in times[f"{case.split('/')[0]}/none"]])
         for case, runs in times.items()
@@ -136,7 +137,7 @@ def _ratios(times: dict[str, list[dict[str, float]]], of: Any) -> dict[str, Any]
 
 
 def report(found: dict[str, Any]) -> list[str]:
-    """The tables, as Markdown."""
+    """Return the tables as Markdown lines."""
     lines = []
     for texture_mb, figures in found.items():
         lines += [

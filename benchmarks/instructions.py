@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-r"""Instructions a record, by library, as valgrind counts them: other work does not move them.
+r"""Count instructions per record and library with valgrind, whatever else the machine does.
 
-    .venv/bin/python benchmarks/instructions.py cornell.usda                # of this tree
-    .venv/bin/python benchmarks/instructions.py cornell.usda ../old ../new  # of others, beside it
+    .venv/bin/python benchmarks/instructions.py cornell.usda                # this tree
+    .venv/bin/python benchmarks/instructions.py cornell.usda ../old ../new  # others for comparison
 
-valgrind knows no AVX-512, so a tree is built for an instruction set below it:
+valgrind does not support AVX-512, so a tree must be built for an older instruction set:
 
     .venv/bin/python -m pip install --no-build-isolation --no-deps -e . \
-      --config-settings=build-dir=build/editable \
-      --config-settings=cmake.define.WAVECOMB_ARCH=x86-64-v3
+        --config-settings=build-dir=build/editable \
+        --config-settings=cmake.define.WAVECOMB_ARCH=x86-64-v3
 
-Each tree renders the stage with its own environment, 96 x 96 by one thread in lanes of 8, once with
-4 and once with 20 samples a pixel. What the second took beyond the first, divided by the records
-that it shaded beyond it, is free of what is loaded and built. `_core` is everything but traversal:
-camera, order, shading, sums; `libembree4` is traversal.
+Each tree renders the stage in its environment, 96 x 96 with one thread and 8 lanes, once with 4 and
+once with 20 samples per pixel. The difference in instructions divided by the difference in shaded
+records excludes loading and scene construction. `_core` is everything but traversal: camera,
+ordering, shading, film; `libembree4` is traversal.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pathlib import Path
 
 SAMPLES = (4, 20)
 SHOWN = 3
-"""Libraries with the most instructions."""
+"""Number of libraries to print, those with the most instructions."""
 RENDER = """
 import json, sys, wavecomb
 picture = wavecomb.render(sys.argv[1], size=(96, 96), spp=int(sys.argv[2]), threads=1,
@@ -38,7 +38,7 @@ print(json.dumps(picture.stats["counts"]["records"]))
 
 
 def main() -> None:
-    """Counts and prints, a line for each tree and library."""
+    """Count, and print a line for each tree and library."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stage", type=Path)
     parser.add_argument("trees", type=Path, nargs="*", default=[Path(__file__).parents[1]])
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def count(tree: Path, stage: Path, spp: int) -> tuple[int, dict[str, int]]:
-    """Records, and instructions by library, of one render."""
+    """Return the records and the instructions by library of one render."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "counts"
         done = subprocess.run(
@@ -70,7 +70,7 @@ def count(tree: Path, stage: Path, spp: int) -> tuple[int, dict[str, int]]:
 
 
 def self_by_library(file: Path) -> dict[str, int]:
-    """Instructions of functions themselves, added up by library; callgrind's format."""
+    """Sum the self cost of functions by library, from a file in callgrind's format."""
     names: dict[str, str] = {}
     total: dict[str, int] = {}
     library, is_call = "", False
@@ -81,7 +81,7 @@ def self_by_library(file: Path) -> dict[str, int]:
             if not found[1]:
                 library = names[found[2]]
         elif line.startswith("calls="):
-            is_call = True  # the next line is what was called
+            is_call = True  # the next line has the callee's cost
         elif line[:1] in "0123456789+-*" and line:
             if not is_call:
                 total[library] = total.get(library, 0) + int(line.split()[1])

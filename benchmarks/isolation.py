@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the cost of the child process (docs/decisions/sandbox.md).
+"""Measure the cost of the child process (docs/decisions/sandbox.md).
 
     .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
 
-For each stage, in turns, so that a busy machine hits all alike: ``wavecomb info`` with --isolate
-off and on (with the sandbox, where the system has it), and with --sandbox off and on. Medians; CPU
-seconds are of the process with its children, and memory is that of the largest of them.
+Runs ``wavecomb info`` on each stage with --isolate off and on (with the sandbox where the system
+supports it), and with --sandbox off and on. Configurations alternate, so that a busy machine
+affects all alike. Results are medians. CPU seconds include child processes; memory is that of the
+largest process.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ WAYS = {
 
 
 def many_prims(path: Path, count: int) -> None:
-    """A stage of so many prims, half of them meshes."""
+    """Write a stage with ``count`` prims, half of them meshes."""
     from pxr import Sdf, Usd, UsdGeom, Vt
 
     layer = Sdf.Layer.CreateNew(str(path))
@@ -54,7 +55,7 @@ def many_prims(path: Path, count: int) -> None:
 
 
 def seconds(arguments: list[str]) -> tuple[float, float, float]:
-    """(wall, CPU, peak memory in MB of the largest process) of Python with these arguments."""
+    """Run Python with these arguments; return wall seconds, CPU seconds and peak MB."""
     start = time.perf_counter()
     process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
@@ -67,7 +68,9 @@ def seconds(arguments: list[str]) -> tuple[float, float, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="*")
-    parser.add_argument("--prims", type=int, default=0, help="a stage of so many prims, too")
+    parser.add_argument(
+        "--prims", type=int, default=0, help="also measure a stage of this many prims"
+    )
     parser.add_argument("--turns", type=int, default=9, help="at least 5")
     options = parser.parse_args()
     if options.turns < 5:
@@ -76,7 +79,7 @@ def main() -> None:
         stages = list(options.stages)
         if options.prims:
             path = Path(folder, f"{options.prims}-prims.usdc")
-            # In a process of its own: what it takes would count as memory of those started later.
+            # In a separate process: its memory would count for processes started later.
             writer = multiprocessing.get_context("spawn").Process(
                 target=many_prims, args=(path, options.prims)
             )

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What --equiangular is worth: a lamp in a box of fog, as a volume and in a mesh.
+"""Measure the gain of --equiangular: a light in a box of fog, as a volume and inside a mesh.
 
     .venv/bin/python benchmarks/lamps_in_fog.py
 
-Prints, for lamps and extinctions: relative variance of a pixel at 32 samples (mean over pixels,
-without the worst thousandth), that of the picture (sum of variances by sum of squares), and seconds
-of one thread; gain of the two: variance x seconds, off to on.
+For several lights and extinctions, prints the relative variance of a pixel at 32 samples (mean over
+pixels without the worst thousandth), that of the image (sum of variances over sum of squares),
+seconds of one thread, and the gain of both: variance x seconds, off over on.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ LAMPS = {
 
 
 def measure(stage: Path, equiangular: str, seeds: int) -> tuple[float, float, float]:
-    """Relative variance of pixels, that of the picture, and seconds."""
+    """Return the relative variances of pixels and of the image, and seconds."""
     loaded = wavecomb.load(stage, lights="hidden")
     pictures, seconds = [], 0.0
     for seed in range(seeds):
@@ -89,7 +89,7 @@ def measure(stage: Path, equiangular: str, seeds: int) -> tuple[float, float, fl
 
 
 def main() -> None:
-    """Prints the table."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=8)
     seeds = parser.parse_args().seeds

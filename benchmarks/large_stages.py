@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a large stage is in memory: peaks of renders of stages that are larger than it.
+"""Measure peak memory of renders of stages that are larger than memory.
 
     .venv/bin/python benchmarks/large_stages.py --gb 12     # 12 GB of disk for each, one at a time
 
-Two kinds of stages, as shots have them: `cache`, one .usdc with the points of a sea of a million
-points for each frame, rendered at one frame; `parts`, a hundred payloads with a mesh each, rendered
-with `--mask` of one. Each is rendered beside the same stage without what the frame does not need.
+There are two kinds of stages, as in production shots. `cache` is one .usdc with the points of a sea
+of a million points for each frame, rendered at one frame. `parts` has a hundred payloads with a
+mesh each, rendered with `--mask` of one. Each is compared with the same stage without the data that
+the frame does not need.
 """
 
 from __future__ import annotations
@@ -27,11 +28,13 @@ PARTS = 100
 
 
 def main() -> None:
-    """Writes the stages, renders them, prints a table."""
+    """Write the stages, render them, print a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--gb", type=float, default=12.0, help="of each stage (12)")
-    parser.add_argument("--points", type=int, default=1_000_000, help="of a mesh (10^6)")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "large", help="of the stages")
+    parser.add_argument("--gb", type=float, default=12.0, help="size of each stage in GB (12)")
+    parser.add_argument("--points", type=int, default=1_000_000, help="points per mesh (10^6)")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "large", help="folder of the stages"
+    )
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     side = max(round(args.points**0.5), 2)
@@ -52,7 +55,7 @@ def main() -> None:
 
 
 def write_cache(folder: Path, frames: int, side: int, _: int) -> Path:
-    """One file with points for each frame, written frame by frame."""
+    """Write one file with points for each frame, frame by frame."""
     path = folder / "sea.usdc"
     stage = _new(path)
     points = _mesh(stage, "/World/Sea", side).GetPointsAttr()
@@ -65,7 +68,7 @@ def write_cache(folder: Path, frames: int, side: int, _: int) -> Path:
 
 
 def write_parts(folder: Path, count: int, side: int, copies: int) -> Path:
-    """A stage with payloads; their meshes have ``copies`` of their points, as primvars have."""
+    """Write a stage with payloads; their meshes have ``copies`` primvars as large as the points."""
     path = folder / "set.usda"
     stage = _new(path)
     for i in range(count):
@@ -83,7 +86,7 @@ def write_parts(folder: Path, count: int, side: int, copies: int) -> Path:
 
 
 def render(path: Path, options: tuple[str, ...]) -> tuple[float, float, float]:
-    """GB of a stage's files, seconds to load and build, MB at the peak; the files are removed."""
+    """Render a stage and remove its files; return GB of files, seconds to load, peak MB."""
     stats = path.with_suffix(".json")
     size = sum(file.stat().st_size for file in path.parent.glob("*.usd*"))
     command = [
@@ -100,7 +103,7 @@ def render(path: Path, options: tuple[str, ...]) -> tuple[float, float, float]:
 
 
 def sea(side: int, frame: int) -> NDArray[np.float32]:
-    """(side^2, 3) points with waves that move, and noise that does not compress."""
+    """Points of waves that move, (side^2, 3), with noise that does not compress."""
     x = np.linspace(-1, 1, side, dtype=np.float32)
     u, v = np.meshgrid(x, x, indexing="ij")
     rough = np.random.default_rng(frame).random((side, side), np.float32)
@@ -118,7 +121,7 @@ def _new(path: Path) -> Usd.Stage:
 
 
 def _mesh(stage: Usd.Stage, path: str, side: int) -> UsdGeom.Mesh:
-    """A grid of quads without its points."""
+    """A grid of quads without points."""
     i = np.arange(side * side, dtype=np.int32).reshape(side, side)
     quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], -1).reshape(-1)
     mesh = UsdGeom.Mesh.Define(stage, path)

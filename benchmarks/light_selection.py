@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What choosing lights by tree brings against choosing them by power, by their number.
+"""Compare light selection by tree with selection by power, for increasing numbers of lights.
 
     .venv/bin/python benchmarks/light_selection.py
-    .venv/bin/python benchmarks/light_selection.py --quick       # does it run?
+    .venv/bin/python benchmarks/light_selection.py --quick       # check that it runs
 
-The street of `wavecomb scene lights`, whose light is as strong with 10 lights as with 10,000. For
-each number, in rounds of `--rounds` seeds: a render by power and one by tree, side by side.
-Errors are of the layer `direct`, and of `direct` and `indirect` together: lights that the camera
-sees are no matter of choice. Most of the error of indirect light is of rare paths that end close to
-a lamp, which no choice of lights finds.
+Uses the street of `wavecomb scene lights`, whose total light is the same with 10 and with 10,000
+lights. For each number, each of `--rounds` rounds has one render by power and one by tree with the
+same seed. Errors are those of the layer `direct`, and of `direct` plus `indirect`; lights that the
+camera sees directly do not depend on selection. Most of the error of indirect light comes from rare
+paths that end close to a light, which light selection cannot find.
 
-Figures, by tree / by power unless said otherwise:
+Results, by tree / by power unless stated otherwise:
 
-- error: relMSE, against a render by tree of `--reference` samples a pixel;
-- time: of render seconds, median of the rounds with its 95 % interval;
-- efficiency: error x time by power / error x time by tree; the error at equal time is less by it,
-  with direct light alone and with all of it;
-- us a sample: render seconds for a sample by tree (the threads together).
+- error: relMSE against a render by tree with `--reference` samples per pixel;
+- time: render seconds, median of the rounds with its 95 % interval;
+- efficiency: error x time by power / error x time by tree, which is the ratio of errors at equal
+  time, for direct light and for all light;
+- us a sample: microseconds per sample by tree, for all threads together.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Layers = dict[str, np.ndarray]
 
 
 def main() -> None:
-    """Renders, prints the table, writes the JSON."""
+    """Render, print the table, write the JSON."""
     args = _arguments()
     found: dict[str, Any] = {}
     for count in args.lights:
@@ -51,13 +51,15 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--lights", nargs="+", type=int, default=[4, 10, 100, 1000, 10_000])
     parser.add_argument("--size", nargs=2, type=int, default=[120, 80], metavar=("W", "H"))
     parser.add_argument("--spp", type=int, default=32)
-    parser.add_argument("--reference", type=int, default=1024, help="samples a pixel")
+    parser.add_argument("--reference", type=int, default=1024, help="samples per pixel")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--max-depth", type=int, default=4)
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "quick", help="of stages")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "quick", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "light_selection.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     args = parser.parse_args()
     if args.quick:
         args.size, args.spp, args.reference, args.rounds = [48, 32], 8, 256, 3
@@ -67,7 +69,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def measure(count: int, args: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one number of lights."""
+    """Return all results for one number of lights."""
     path = stage_file(args.folder / f"lights-{count}.usdc", "lights", lights=count)
     scene = wavecomb.load(path).scene
     size = (args.size[0], args.size[1])
@@ -107,7 +109,7 @@ def measure(count: int, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(found: dict[str, Any]) -> list[str]:
-    """The table, as Markdown."""
+    """Return the table as Markdown lines."""
     lines = head(
         "lights", "direct light: relMSE by power", "by tree", "time", "efficiency",
         "efficiency, all light", "us a sample by power", "by tree",

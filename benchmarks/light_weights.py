@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What calibrated shares of lights bring against shares by power, and against Mitsuba.
+"""Compare calibrated light shares with shares by power, and with Mitsuba.
 
     .venv/bin/python benchmarks/light_weights.py
-    .venv/bin/python benchmarks/light_weights.py --quick       # does it run?
+    .venv/bin/python benchmarks/light_weights.py --quick       # check that it runs
 
-`studio` is lit by a key lamp, a fill lamp and a dim dome, as many stages are; the others are those
-of benchmarks/light_selection.py and of the isolation. For each, seed by seed: a render with
-`light_weights` power and one calibrated. Mitsuba 3 chooses among its lights by heads; it renders
-`studio` from the same arrays, by independent samples and by `multijitter`, against a converged
-picture of its own.
+`studio` is lit by a key light, a fill light and a dim dome, as many stages are. Others are the
+stages of benchmarks/light_selection.py and of the isolation benchmark. For each seed there is a
+render with `light_weights` power and one with calibration. Mitsuba 3 selects lights uniformly. It
+renders `studio` from the same arrays with the samplers independent and `multijitter`, compared with
+a converged image of Mitsuba.
 
-Figures:
+Results:
 
-- relMSE: mean of (x - r)^2 / (r^2 + 0.01) at equal samples, less what the reference has of it;
-- trimmed: the same without the worst 0.1 % of pixels, which a few bright paths decide over;
+- relMSE: mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the noise of the reference;
+- trimmed: the same without the worst 0.1 % of pixels, which a few bright paths dominate;
 - ratio: calibrated / power within a round, median with its 95 % interval;
-- calibration: seconds that it took of a picture of `--timed-size`, and its part of a render of
-  10 s.
+- calibration: seconds for an image of `--timed-size`, and the fraction of a 10 s render.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ import wavecomb
 
 Picture = NDArray[np.float64]
 OUTLIERS = 1e-3
-"""Share of pixels, the worst ones, that the trimmed error leaves out."""
+"""Fraction of pixels, the worst ones, that the trimmed error leaves out."""
 STAGES: dict[str, tuple[str, dict[str, Any]]] = {
     "studio": ("studio", {"triangles": 20_000}),
     "mixed": ("mixed", {"triangles": 50_000}),
@@ -46,7 +45,7 @@ STAGES: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def main() -> None:
-    """Renders, prints the tables, writes the JSON."""
+    """Render, print the tables, write the JSON."""
     args = _arguments()
     found: dict[str, Any] = {}
     for name in args.stages:
@@ -67,14 +66,16 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--size", type=int, default=150)
     parser.add_argument("--timed-size", type=int, default=600)
     parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--reference", type=int, default=4096, help="samples a pixel")
+    parser.add_argument("--reference", type=int, default=4096, help="samples per pixel")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--sampler", default="independent")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--no-mitsuba", action="store_true")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "quick", help="of stages")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "quick", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "light_weights.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     args = parser.parse_args()
     if args.quick:
         args.size, args.spp, args.reference, args.rounds = 48, 16, 256, 5
@@ -84,14 +85,14 @@ def _arguments() -> argparse.Namespace:
 
 
 def stage_path(name: str, folder: Path) -> Path:
-    """The stage, written where it is not there yet."""
+    """Return the stage file; write it if it is missing."""
     scene, options = STAGES[name]
     path = folder / f"weights-{name}.usdc"
     return stage_file(path, scene, **options)
 
 
 def measure(name: str, depth: int, args: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one stage with paths of `depth` vertices."""
+    """Return all results of one stage with paths of `depth` vertices."""
     path = stage_path(name, args.folder)
     scene = wavecomb.load(path).scene
 
@@ -123,14 +124,14 @@ def measure(name: str, depth: int, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _calibration_s(scene: Any, depth: int, args: argparse.Namespace) -> float:
-    """Seconds of one calibration of a picture of the size that is timed."""
+    """Seconds of one calibration for an image of the timed size."""
     size = (args.timed_size, args.timed_size)
     stats = wavecomb.render(scene, size=size, spp=1, max_depth=depth, threads=args.threads).stats
     return float(stats["light_calibration"]["seconds"])
 
 
 def error(picture: Picture, truth: Picture, doubt: float) -> tuple[float, float]:
-    """Error of a picture, and the trimmed one, without what the reference's own noise adds."""
+    """Error of an image and its trimmed error, minus the noise of the reference."""
     errors = np.sort(((picture - truth) ** 2 / (truth**2 + 0.01)).mean(axis=2).ravel())
     kept = round(len(errors) * (1.0 - OUTLIERS))
     return (
@@ -151,7 +152,7 @@ def _ratio(
 
 
 def _mitsuba(path: Path, depth: int, args: argparse.Namespace) -> dict[str, Any]:
-    """Mitsuba's errors by sampler, each round by another seed."""
+    """Mitsuba's errors by sampler, with a new seed per round."""
     sys.path.insert(0, str(Path(__file__).with_name("peers")))
     from mitsuba_bridge import MitsubaScene, PeerSettings, load_mitsuba
     from recording import record
@@ -180,7 +181,7 @@ def _mitsuba(path: Path, depth: int, args: argparse.Namespace) -> dict[str, Any]
 
 
 def report(found: dict[str, Any]) -> list[str]:
-    """The tables, as Markdown."""
+    """Return the tables as Markdown lines."""
     lines = head(
         "stage", "relMSE by power", "calibrated", "ratio", "trimmed, ratio", "calibration, s",
         "of a render of 10 s",

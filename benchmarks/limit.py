@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a render is from its limit: the same rays traced by Embree alone.
+"""Compare a render with its lower limit: the same rays traced by Embree alone.
 
     .venv/bin/python benchmarks/limit.py --spp 16 --threads 2 --rounds 5
-    .venv/bin/python benchmarks/limit.py --quick          # does it run?
+    .venv/bin/python benchmarks/limit.py --quick          # check that it runs
 
-Each stage is rendered once with its rays recorded: all of them, wave by wave, stage by stage, in
-traversal order, as the render chose it where it sorts rays. Embree alone then traces them in the
-same order with as many threads: a plain loop around rtcIntersect and rtcOccluded that fills a
-packet, calls, and counts the hits; no filter, nothing stored. First each kind of ray (camera,
-bounce, shadow) is traced at each width, coherent, not, and as the render had it, and the quickest
-is taken for it. A round then takes, in shuffled order,
+Each stage is rendered once with its rays recorded: all rays, by wave and wave stage, in traversal
+order. Embree alone then traces them in the same order on the same number of threads, in a plain
+loop around rtcIntersect and rtcOccluded that fills a packet, calls and counts hits, without filters
+and without storing results. First, each kind of ray (camera, bounce, shadow) is traced at each
+width with coherent and incoherent flags and as the render did, and the fastest way is selected per
+kind. A round then measures, in shuffled order:
 
-- render: the render as it is, without a recorder;
-- alone: Embree alone, wall time, every kind at its best;
-- calls: the same rays through the accelerator's own functions, as the render calls them: they fill
+- render: the render, without a recorder;
+- alone: Embree alone, wall time, each kind in its fastest way;
+- calls: the same rays through the accelerator's functions, as the render calls them. They fill
   packets, keep hits canonical by a filter, and store hits.
 
 Ratios are taken within a round:
 
-- limit: render / alone, wall time both;
+- limit: render / alone, both wall time;
 - traversal: the trace and shadow phases (per thread) / alone;
-- calls: calls / alone: filter, set-up and storing of hits, alone on the machine;
-- filter share: (calls - alone) / the trace and shadow phases: how much of them that is.
+- calls: calls / alone, that is the cost of filter, set-up and storing of hits;
+- filter share: (calls - alone) / the trace and shadow phases, the fraction of them it takes.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ from wavecomb.run.settings import make_settings
 KINDS = ("camera", "bounce", "shadow")
 WIDTHS = (1, 4, 8, 16)
 COHERENCE = (True, False, None)
-"""None: as the render told Embree, stage by stage."""
+"""None means: the flag that the render set in each wave stage."""
 Round = dict[str, float]
 
 
 def main() -> None:
-    """Runs the sitting, prints the tables, writes the JSON."""
+    """Run the benchmark, print the tables, write the JSON."""
     args = _arguments()
     stages: dict[str, Any] = {}
     for name in args.stages:
@@ -80,14 +80,18 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = sitting_parser(__doc__, "limit")
-    parser.add_argument("--tuning-rounds", type=int, default=2, help="for the choice of widths")
+    parser.add_argument(
+        "--tuning-rounds", type=int, default=2, help="rounds that select packet widths"
+    )
     parser.add_argument("--policy", default="program")
-    parser.add_argument("--memory-gb", type=float, default=4.0, help="most that rays may take")
+    parser.add_argument(
+        "--memory-gb", type=float, default=4.0, help="limit of memory for recorded rays"
+    )
     return sitting_arguments(parser, size=96, spp=4, rounds=2, triangles=20_000)
 
 
 def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
-    """All rounds of one stage."""
+    """Run all rounds of one stage."""
     scene = load_stage(name, args.folder, args.triangles).scene
     settings = make_settings(
         (args.size, args.size), args.spp, threads=args.threads, policy=args.policy
@@ -148,7 +152,7 @@ def _per_kind(recording: Any) -> tuple[int, int, int]:
 
 
 def tune(recording: Any, args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
-    """Thread nanoseconds per ray of each kind, width and coherence: the least of some rounds."""
+    """Thread nanoseconds per ray by kind, width and coherence: the minimum of several rounds."""
     least: dict[tuple[str, int, bool | None], float] = {}
     for _, width, coherent in itertools.product(range(args.tuning_rounds), WIDTHS, COHERENCE):
         try:
@@ -156,7 +160,7 @@ def tune(recording: Any, args: argparse.Namespace) -> dict[str, list[dict[str, A
                 threads=args.threads, width=(width,) * 3, coherent=(coherent,) * 3
             )
         except _core.Error:
-            continue  # wider than Embree has here
+            continue  # this build of Embree does not support the width
         for kind, seconds, rays in zip(KINDS, turn["thread_s"], turn["rays"], strict=True):
             key = (kind, width, coherent)
             least[key] = min(least.get(key, float("inf")), 1e9 * seconds / max(1, rays))
@@ -167,7 +171,7 @@ def tune(recording: Any, args: argparse.Namespace) -> dict[str, list[dict[str, A
 
 
 def report(stages: dict[str, Any]) -> Iterable[str]:
-    """The tables, as Markdown."""
+    """Yield the tables as Markdown lines."""
     yield from head(
         *("stage", "M rays", "Embree alone s", "trace + shadow s", "render s"),
         *("limit: render / alone", "traversal / alone", "calls / alone", "filter share"),

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the start of a process to its first picture, and how much memory that takes.
+"""Measure time and memory from process start to the first image.
 
     .venv/bin/python benchmarks/loading.py
     .venv/bin/python benchmarks/loading.py --rounds 9 --stages mixed --threads 2 --output my.json
 
-Each turn is a fresh process that reads a stage, renders it with 1 sample per pixel and writes an
-EXR file, as ``wavecomb render`` does. Stages take turns in shuffled rounds. Times count from just
-before the process is started; the files lie in the page cache (one turn of each goes first,
-uncounted). Writes JSON with every turn, and prints medians with the quickest and slowest turn.
+Each turn is a new process that reads a stage, renders it with 1 sample per pixel and writes an EXR
+file, as ``wavecomb render`` does. Stages alternate in shuffled rounds. Times count from just before
+the process starts; files are in the page cache, because one uncounted turn of each stage comes
+first. Writes JSON with every turn, and prints medians with the fastest and slowest turn.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ STAGES = ("cornell", "mixed", "dragon")
 TIMES = ("python", "imports", "load", "build", "first_sample", "render", "first_picture", "process")
 MEMORY = ("imports_mb", "peak_mb", "parts_mb", "ratio")
 
-# What one turn runs. All times are of CLOCK_MONOTONIC, which processes share.
+# Program of one turn. Times are of CLOCK_MONOTONIC, which processes share.
 CHILD = """
 import time
 start = time.monotonic()
@@ -63,7 +63,7 @@ print(json.dumps({"start": start, "imports": imports, "load": load, "build": beg
 
 
 def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
-    """One process: seconds since its start, by event, and memory in MB."""
+    """Run one process; return seconds since its start by event, and memory in MB."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", CHILD, str(stage), os.path.join(folder, "a.exr")]
         begin = time.monotonic()
@@ -72,7 +72,7 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
             check=True,
             capture_output=True,
             text=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as the command line has it
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # as the command line sets it
         )
         end = time.monotonic()
     got = json.loads(run.stdout)
@@ -83,14 +83,14 @@ def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
     record["imports_mb"] = got["imports_bytes"] / 1e6
     record["peak_mb"] = got["peak_bytes"] / 1e6
     record["parts_mb"] = parts / 1e6
-    # Of loading and rendering: the library of image files comes later where no image is read.
+    # Peak of loading and rendering. The image file library is loaded later if no image is read.
     record["ratio"] = (got["render_peak_bytes"] - got["imports_bytes"]) / parts
     record["memory_bytes"] = got["memory_bytes"]
     return record
 
 
 def summary(turns: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """Median, least and most of each figure."""
+    """Median, minimum and maximum of each value."""
     out = {}
     for name in (*TIMES, *MEMORY):
         values = [entry[name] for entry in turns]
@@ -103,7 +103,7 @@ def summary(turns: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
 
 
 def make_stage(name: str, folder: Path) -> Path:
-    """A stage of ``wavecomb scene``, or the file of that name."""
+    """Return a stage of ``wavecomb scene``, or the file of that name."""
     if name not in STAGES:
         return Path(name)
     path = folder / f"{name}.usdc"
@@ -114,13 +114,15 @@ def make_stage(name: str, folder: Path) -> Path:
 
 
 def main() -> None:
-    """Runs the sitting."""
+    """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--stages", nargs="+", default=list(STAGES), help="names or files")
-    parser.add_argument("--folder", type=Path, default=Path("out"), help="where stages are made")
+    parser.add_argument(
+        "--folder", type=Path, default=Path("out"), help="folder of generated stages"
+    )
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--size", type=int, default=600)
-    parser.add_argument("--threads", type=int, default=0, help="0: all")
+    parser.add_argument("--threads", type=int, default=0, help="number of threads; 0 means all")
     parser.add_argument("--output", type=Path, default=RESULTS / "loading.json")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the stages whose documents say how materials should look, and shows what they say.
+"""Render material test stages, and show the images beside what their documentation says.
 
     .venv/bin/python benchmarks/materials_page.py
     .venv/bin/python benchmarks/materials_page.py cornell-box MaterialXTest -o out/looks --spp 256
 
-The stages lie in ../shared/assets/usd. Names choose among them by a part of their path. Beside our
-picture the page, index.html in the output folder, has the one that the stage's own repository
-carries, where it is there; below it what its document says, what is not supported, and warnings.
-Exit code 1 where a stage failed.
+The stages are in ../shared/assets/usd. Names select stages by a part of their path. The page,
+index.html in the output folder, shows our image beside the one in the stage's repository, if there
+is one, and below it the stage's documentation, unsupported features and warnings. Exit code 1 if a
+stage failed.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ BALL = "/standard_shader_ball_scene"
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A picture to make.
+    """An image to render.
 
     Attributes:
-        stage: Below ``ROOT``.
-        about: What its document says that it shows.
-        options: Of ``wavecomb render``.
+        stage: Path below ``ROOT``.
+        about: What the stage shows, by its documentation.
+        options: Options of ``wavecomb render``.
     """
 
     stage: str
@@ -43,7 +43,7 @@ class Exhibit:
 
     @property
     def name(self) -> str:
-        """Its title: with what is chosen."""
+        """Title, including the selected variants."""
         chosen = [
             word.rpartition("{")[2].replace("}", "")
             for word in self.options
@@ -53,7 +53,7 @@ class Exhibit:
 
 
 def _variants(stage: str, about: str, *choices: tuple[str, ...]) -> tuple[Exhibit, ...]:
-    """One exhibit for each list of variants."""
+    """Return an exhibit for each list of variants."""
     return tuple(
         Exhibit(stage, about, tuple(word for one in choice for word in ("--variant", one)))
         for choice in choices
@@ -134,7 +134,7 @@ EXHIBITS = (
 
 
 def exhibits() -> Iterator[Exhibit]:
-    """Those above, and all other stages of the working group's test assets."""
+    """The exhibits above, and all other stages of the working group's test assets."""
     yield from EXHIBITS
     shown = {exhibit.stage for exhibit in EXHIBITS}
     for file in sorted((ROOT / "wg_test_assets").rglob("*")):
@@ -155,7 +155,7 @@ def document_of(stage: Path) -> Path | None:
 
 
 def said_of(stage: Path) -> str:
-    """The first paragraph of prose that a stage's document has of it, else of all; one sentence."""
+    """First sentence about a stage in its documentation, or else of the document."""
     document = document_of(stage)
     if document is None:
         return ""
@@ -171,7 +171,7 @@ def said_of(stage: Path) -> str:
 
 
 def picture_of(exhibit: Exhibit) -> Path | None:
-    """The picture that a stage's document shows of it, where it is there."""
+    """Image of a stage in its documentation, if there is one."""
     stage = ROOT / exhibit.stage
     document = document_of(stage)
     if document is None:
@@ -181,20 +181,22 @@ def picture_of(exhibit: Exhibit) -> Path | None:
         file = document.parent / (match[1] or match[2])
         if file.is_file() and "texture" not in file.as_posix().lower():
             there.append(file)
-    # One that the stage or a choice names, else the first: that of the document as a whole.
+    # Prefer an image named after the stage or a variant; otherwise take the document's first image.
     words = [stage.stem, *(option.rpartition("=")[2] for option in exhibit.options)]
     named = (f for f in there if any(word.lower() in f.stem.lower() for word in words if word))
     return next(named, there[0] if there else None)
 
 
 def main() -> int:
-    """Renders all and writes the page."""
+    """Render all exhibits and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", help="parts of paths; default: all")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/materials"))
-    parser.add_argument("--size", type=int, default=256, help="pixels of an edge")
+    parser.add_argument("--size", type=int, default=256, help="image edge in pixels")
     parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--limit", type=float, default=300.0, help="seconds for each stage")
+    parser.add_argument(
+        "--limit", type=float, default=300.0, help="time limit per stage in seconds"
+    )
     options = parser.parse_args()
     wanted = [
         exhibit

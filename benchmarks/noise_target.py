@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What adaptive sampling costs in bias, and what it brings.
+"""Measure the bias and the gain of adaptive sampling.
 
     .venv/bin/python benchmarks/noise_target.py
-    .venv/bin/python benchmarks/noise_target.py --quick          # does it run?
+    .venv/bin/python benchmarks/noise_target.py --quick          # check that it runs
 
-A pixel that stops when its own samples look quiet stops too early when they look quieter than they
-are, so its mean is biased, mostly towards the dark. For each stage and noise target:
+A pixel that stops as soon as its samples look quiet sometimes stops too early, so its mean is
+biased, mostly towards dark. For each stage and noise target:
 
-- `--seeds` renders end at the target; n is the samples a pixel that they took on average;
-- as many plain renders take n samples each;
-- two references, of seeds of their own, take 64 n.
+- `--seeds` renders stop at the target; n is the mean number of samples per pixel;
+- the same number of plain renders take n samples each;
+- two references with other seeds take 64 n.
 
-Figures:
+Results:
 
-- total bias: mean picture of the adaptive renders / reference - 1, of all light together, with its
-  standard error over seeds;
-- bias / noise: root mean square over pixels of bias to that of the noise of one adaptive render,
-  relative to brightness as in relMSE. Squares of bias come from two halves of the seeds and the
-  two references, (a1 - r1) (a2 - r2), so that noise does not look like bias; below 0: none seen;
-- error: true mean relative error of one adaptive render, which the target is for;
+- total bias: mean adaptive image / reference - 1, for the sum of all light, with its standard error
+  over seeds;
+- bias / noise: root mean square bias of pixels over that of the noise of one adaptive render,
+  relative to brightness as in relMSE. Squares of bias come from two halves of the seeds and the two
+  references, (a1 - r1) (a2 - r2), so that noise does not count as bias; negative values mean that
+  no bias was detected;
+- error: true mean relative error of one adaptive render, which the target limits;
 - gain: relMSE of the plain renders / that of the adaptive ones, at equal samples.
 """
 
@@ -38,7 +39,7 @@ Stack = NDArray[np.float64]
 
 
 def main() -> None:
-    """Renders, prints the table, writes the JSON."""
+    """Render, print the table, write the JSON."""
     args = _arguments()
     stages: dict[str, Any] = {}
     for name in args.stages:
@@ -59,14 +60,16 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--stages", nargs="+", default=["cornell", "mixed"], metavar="NAME")
     parser.add_argument("--targets", nargs="+", type=float, default=[0.1, 0.04])
-    parser.add_argument("--size", type=int, default=96, help="edge of the picture, pixels")
+    parser.add_argument("--size", type=int, default=96, help="image edge in pixels")
     parser.add_argument("--seeds", type=int, default=16)
-    parser.add_argument("--most", type=int, default=4096, help="samples a pixel")
+    parser.add_argument("--most", type=int, default=4096, help="samples per pixel")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--triangles", type=int, default=20_000, help="of a dragon")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "quick", help="of stages")
+    parser.add_argument("--triangles", type=int, default=20_000, help="triangles of the dragon")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "quick", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "noise_target.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     args = parser.parse_args()
     if args.quick:
         args.size, args.seeds, args.targets = 32, 4, [0.2]
@@ -75,7 +78,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def measure(scene: Any, target: float, args: argparse.Namespace) -> dict[str, float]:
-    """All figures of one stage and target."""
+    """Return all results of one stage and target."""
 
     def render(seed: int, spp: int, **settings: Any) -> wavecomb.Picture:
         size = (args.size, args.size)
@@ -110,7 +113,7 @@ def _rel_mse(pictures: Stack, truth: Stack, weight: Stack) -> float:
 
 
 def report(stages: dict[str, Any]) -> list[str]:
-    """The table, as Markdown."""
+    """Return the table as Markdown lines."""
     lines = list(
         head(
             *("stage, target", "samples a pixel", "total bias %", "bias / noise"),

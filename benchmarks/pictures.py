@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of a comparison page: reading, shrinking, and writing them side by side."""
+"""Images of comparison pages: reading, shrinking, and writing them side by side."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ Pixels = NDArray[np.float32]
 
 
 def read(file: Path) -> Pixels:
-    """The colours of a picture as they are in the file, (height, width, 3).
+    """Colours of an image as stored in the file, (height, width, 3).
 
     Raises:
-        OSError: It cannot be read.
+        OSError: The file cannot be read.
     """
     image = oiio.ImageBuf(str(file))
     if image.has_error or image.spec().nchannels < 3:
-        raise OSError(f"{file}: not a picture of three channels {image.geterror()}".rstrip())
+        raise OSError(f"{file}: not an image of three channels {image.geterror()}".rstrip())
     return np.asarray(image.get_pixels(oiio.FLOAT), np.float32)[..., :3]
 
 
 def shrunk(image: Pixels, width: int) -> Pixels:
-    """An image at a width that divides its own, by means of blocks."""
+    """Shrink an image by block means to a width that divides its width."""
     n = image.shape[1] // width
     height = image.shape[0] // n
     blocks = image[: height * n, : width * n].reshape(height, n, width, n, 3)
@@ -36,7 +36,7 @@ def shrunk(image: Pixels, width: int) -> Pixels:
 
 
 def linear(encoded: Pixels) -> Pixels:
-    """Linear values of sRGB (IEC 61966-2-1) ones."""
+    """Convert sRGB values (IEC 61966-2-1) to linear."""
     low = encoded <= 0.04045
     return np.where(low, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
@@ -44,9 +44,9 @@ def linear(encoded: Pixels) -> Pixels:
 def write_row(
     file: Path, images: Sequence[Pixels], white: float, enlarged: int = 1, columns: int = 0
 ) -> None:
-    """A PNG or JPEG of images side by side; ``white`` is the value that is shown as white.
+    """Write images side by side as PNG or JPEG; ``white`` is the value shown as white.
 
-    They are as many to a row as ``columns`` says, or all; what is left of the last row is black.
+    ``columns`` is the number per row, by default all; the rest of the last row is black.
     """
     columns = columns or len(images)
     black = np.zeros_like(images[0])
@@ -66,5 +66,5 @@ def write_row(
 
 
 def white_of(reference: Pixels) -> float:
-    """What to show as white, so that a picture is as bright as its reference is."""
+    """Value to show as white, so that an image is as bright as its reference."""
     return max(float(np.percentile(reference, 99.5)), 1e-6)

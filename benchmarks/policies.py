@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a policy is from the best one of each stage: is the default good everywhere?
+"""Compare each policy with the best one of each stage, to check the default.
 
     .venv/bin/python benchmarks/policies.py                       # generated stages, half an hour
-    .venv/bin/python benchmarks/policies.py --files shot.usd ...  # and stages of others
+    .venv/bin/python benchmarks/policies.py --files shot.usd ...  # and third-party stages
 
-Each stage is rendered short and long, in small waves, in those of the default and in large ones, by
-each policy in turns of shuffled order, in one process. For a policy and a case: shade + order time
-and the time of the render, over those of the best *fixed* policy of the case, which is the one with
-the least median. Prints a Markdown table of the worst case of each policy and of every case of the
-default; the JSON has all. All pictures of a case must be one picture, bit for bit.
+Each stage is rendered with few and many samples, in small, default and large waves, by each policy
+in turns of shuffled order, in one process. Results for a policy and case are shade + order time and
+render time, over those of the best *fixed* policy of the case, which is the one with the lowest
+median. Prints a Markdown table of the worst case of each policy and of every case of the default;
+the JSON has all results. All images of a case must be bitwise equal.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ SAMPLES = (4, 32)
 
 
 def main() -> None:
-    """Renders, prints the tables, writes the JSON."""
+    """Render, print the tables, write the JSON."""
     args = _arguments()
     stages: list[tuple[str, dict[str, Any] | None]] = [(n, GENERATED[n]) for n in args.stages]
     stages += [(str(path), None) for path in args.files]
@@ -70,13 +70,17 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--stages", nargs="*", default=list(GENERATED), help="generated ones")
-    parser.add_argument("--files", type=Path, nargs="*", default=[], help="stages of others")
+    parser.add_argument(
+        "--stages", nargs="*", default=list(GENERATED), help="names of generated stages"
+    )
+    parser.add_argument("--files", type=Path, nargs="*", default=[], help="files of other stages")
     parser.add_argument("--samples", type=int, nargs="+", default=list(SAMPLES))
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "policies", help="of stages")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "policies", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "policies.json")
     return parser.parse_args()
 
@@ -91,7 +95,7 @@ def _stage(name: str, options: dict[str, Any] | None, args: argparse.Namespace) 
 
 
 def measure(stage: Any, wave: int, spp: int, args: argparse.Namespace) -> dict[str, Any]:
-    """All policies on one case."""
+    """Run all policies on one case."""
     shuffle = random.Random(1)
     default = settings()["policy"].default
     policies = [*FIXED, *(p for p in (default, "adaptive") if p not in FIXED)]
@@ -106,8 +110,8 @@ def measure(stage: Any, wave: int, spp: int, args: argparse.Namespace) -> dict[s
             if picture is None:
                 picture = done.beauty
             elif not np.array_equal(picture, done.beauty):
-                raise SystemExit(f"{policy} gives another picture")
-            if turn > 0:  # the first fills caches
+                raise SystemExit(f"{policy} gives a different image")
+            if turn > 0:  # the first turn fills caches
                 times[policy].append(phase_times(done.stats))
 
     def shading(policy: str) -> list[float]:
@@ -126,7 +130,7 @@ def measure(stage: Any, wave: int, spp: int, args: argparse.Namespace) -> dict[s
 
 
 def report(found: dict[str, Any]) -> list[str]:
-    """The tables, as Markdown."""
+    """Return the tables as Markdown lines."""
     default = settings()["policy"].default
     policies = list(next(iter(found.values()))["render"])
     lines = head("policy", "shade + order to the best: median over cases", "worst case", "which")

@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How bright a UsdPreviewSurface is, by several readings of its specification.
+"""Compare the albedo of UsdPreviewSurface in several implementations.
 
     .venv/bin/python benchmarks/preview_surface.py
     .venv/bin/python benchmarks/preview_surface.py --roughness 0.2 --base 1 --markdown
 
-For each cosine of the view, the share of light that a surface under an even white sky sends back:
+For each cosine of the view, prints the fraction of light that a surface in a white furnace
+reflects:
 
-- wavecomb: rendered through the whole way, one bounce;
-- uncoupled: what wavecomb did before: the diffuse base dimmed by the *smooth* interface's
+- wavecomb: rendered from USD, one bounce;
+- uncoupled: the earlier model, whose diffuse base is dimmed by the *smooth* interface's
   reflectance;
-- glslfx: OpenUSD's own shader of Storm (previewSurface.glslfx), its formulas integrated;
+- glslfx: numerical integral of Storm's shader in OpenUSD (previewSurface.glslfx);
 - MaterialX: the graph of its library (usd_preview_surface.mtlx): a Lambertian base times 1 - E,
-  E the rough interface's albedo with Schlick's reflectance;
-- Mitsuba's principled and roughplastic, their BSDFs integrated; left out where Mitsuba is missing.
+  with E the rough interface's albedo with Schlick's reflectance;
+- Mitsuba's principled and roughplastic, numerically integrated; left out without Mitsuba.
 
-Integrals are sums over 512 x 512 directions. docs/decisions/preview-surface.md quotes the figures.
+Integrals are sums over 512 x 512 directions. docs/decisions/preview-surface.md quotes the results.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ COSINES = (0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.0)
 
 
 class Directions:
-    """Of the upper hemisphere, by equal steps in cos^2 and azimuth: all weigh the same."""
+    """Directions of the upper hemisphere, in equal steps of cos^2 and azimuth."""
 
     def __init__(self) -> None:
         u, phi = np.meshgrid(
@@ -45,32 +46,32 @@ class Directions:
         self.wi = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
     def albedo(self, value: Callable[[Array, Array], Array], z: float) -> float:
-        """The integral of f cos: f(wo, wi) by `value`."""
+        """Integral of f cos, where `value` is f(wo, wi)."""
         wo = np.array((np.sqrt(1.0 - z * z), 0.0, z))
         return float(np.pi * value(wo, self.wi).mean())
 
 
 def exact(c: Array, ior: float) -> Array:
-    """Fresnel's reflectance of a dielectric."""
+    """Fresnel reflectance of a dielectric."""
     t = np.sqrt(1.0 - (1.0 - c * c) / ior**2)
     return 0.5 * (((ior * c - t) / (ior * c + t)) ** 2 + ((c - ior * t) / (c + ior * t)) ** 2)
 
 
 def schlick(c: Array, ior: float) -> Array:
-    """Schlick's approximation of it."""
+    """Schlick's approximation of the Fresnel reflectance."""
     f0 = ((1.0 - ior) / (1.0 + ior)) ** 2
     return f0 + (1.0 - f0) * (1.0 - c) ** 5
 
 
 def half(wo: Array, wi: Array) -> tuple[Array, Array]:
-    """(cosine of the half vector with the normal, with wo)."""
+    """Cosines of the half vector with the normal and with wo."""
     h = wo + wi
     h = h / np.linalg.norm(h, axis=-1, keepdims=True)
     return h[..., 2], np.clip(h @ wo, 0.0, 1.0)
 
 
 def ggx(wo: Array, wi: Array, alpha: float, fresnel: Callable[[Array], Array]) -> Array:
-    """D G2 F / (4 z_o z_i), masking correlated with height."""
+    """D G2 F / (4 z_o z_i) with height-correlated masking."""
     nh, oh = half(wo, wi)
     a2 = alpha * alpha
     d = a2 / (np.pi * (nh * nh * (a2 - 1.0) + 1.0) ** 2)
@@ -80,7 +81,7 @@ def ggx(wo: Array, wi: Array, alpha: float, fresnel: Callable[[Array], Array]) -
 
 
 def uncoupled(base: float, roughness: float, ior: float) -> Callable[[Array, Array], Array]:
-    """Value of wavecomb before: (1 - F(o)) (1 - F(i)) / (1 - F_avg) over the base."""
+    """The earlier model's value: (1 - F(o)) (1 - F(i)) / (1 - F_avg) over the base."""
     z = np.sqrt((np.arange(4096) + 0.5) / 4096)
     mean = float(exact(z, ior).mean())
 
@@ -106,7 +107,7 @@ def materialx(
 
 
 def glslfx(base: float, roughness: float, ior: float) -> Callable[[Array, Array], Array]:
-    """Value of evaluateLight in previewSurface.glslfx, metallic and clearcoat 0."""
+    """Value of evaluateLight in previewSurface.glslfx with metallic and clearcoat 0."""
     epsilon = 0.001
 
     def value(wo: Array, wi: Array) -> Array:
@@ -125,7 +126,7 @@ def glslfx(base: float, roughness: float, ior: float) -> Callable[[Array, Array]
 def mitsuba_albedos(
     base: float, roughness: float, ior: float, directions: Directions
 ) -> dict[str, list[float]]:
-    """Of Mitsuba's principled and roughplastic, by cosine."""
+    """Albedos of Mitsuba's principled and roughplastic, by cosine."""
     try:
         import mitsuba as mi
     except ImportError:
@@ -158,7 +159,7 @@ def mitsuba_albedos(
 
 
 def rendered(base: float, roughness: float, ior: float, spp: int) -> list[float]:
-    """A plane under an even sky, seen along each cosine through a narrow camera."""
+    """Render a plane under a uniform sky, seen along each cosine through a narrow camera."""
     found = []
     for z in COSINES:
         eye = 20.0 * np.array((0.0, z, np.sqrt(1.0 - z * z)))
@@ -233,7 +234,7 @@ def main() -> None:
     parser.add_argument("--roughness", type=float, nargs="+", default=[0.3, 0.4, 0.6])
     parser.add_argument("--ior", type=float, default=1.5)
     parser.add_argument("--spp", type=int, default=1024)
-    parser.add_argument("--markdown", action="store_true", help="tables for a page")
+    parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
     args = parser.parse_args()
     for base in args.base:
         for roughness in args.roughness:

@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the scenes of other renderers and compares each picture with theirs.
+"""Render scenes of other renderers and compare the images with theirs.
 
     .venv/bin/python benchmarks/references.py
     .venv/bin/python benchmarks/references.py arnold cbox -o out/references --spp 256
 
-The scenes and pictures lie in ../shared/assets/reference: tests of Autodesk's arnold-usd and of
-Mitsuba 3. A reference is the stored picture; where a Mitsuba scene has none, Mitsuba renders it
-now. Beside it Mitsuba (make setup-test) renders every one of its scenes twice: as it is, which
-shows whether the stored picture is what that scene gives today, and with our approximations of
-its materials, which shows what those do to the picture. The page, index.html in the output
-folder, has for each scene the pictures, their difference and why they differ; what cannot be
-expressed is listed with the reason. All errors are relative to the mean of the reference.
+The scenes and images are in ../shared/assets/reference: tests of Autodesk's arnold-usd and of
+Mitsuba 3. The reference is the stored image, or a new render by Mitsuba where a scene has none.
+Mitsuba (make setup-test) also renders each of its scenes twice: unchanged, to check the stored
+image, and with our approximations of its materials, to show their effect. The page, index.html in
+the output folder, has the images of each scene, their difference and the reasons for it, and lists
+what cannot be expressed and why. All errors are relative to the mean of the reference.
 
-Exit code 1 where a scene could not be rendered.
+Exit code 1 if a scene could not be rendered.
 """
 
 from __future__ import annotations
@@ -40,11 +39,11 @@ from wavecomb.picture.working_space import to_rec709
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 EDGE = 128
-"""Of the picture that --spp is for: smaller ones get more samples, larger ones fewer."""
+"""Image edge that --spp refers to: smaller images get more samples, larger ones fewer."""
 WIDTH = 128
-"""Of pictures that Mitsuba renders now: of scenes without a stored one."""
+"""Image width where Mitsuba renders the reference because none is stored."""
 SHOWN = 240
-"""Height that small pictures are enlarged to on the page, about."""
+"""Approximate height to which small images are enlarged on the page."""
 
 PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>References</title>
@@ -70,7 +69,7 @@ now against the reference, "as ours" is our picture against Mitsuba with our app
 
 @dataclass
 class Entry:
-    """What came of one scene: errors relative to the reference's mean."""
+    """Result of one scene; errors are relative to the reference's mean."""
 
     name: str
     ours: float
@@ -85,11 +84,11 @@ class Entry:
 
     @property
     def difference(self) -> float:
-        """Of the means."""
+        """Relative difference of the means."""
         return self.ours / self.reference - 1.0
 
     def row(self) -> str:
-        """Its part of the page."""
+        """HTML of the entry."""
 
         def share(value: float | None) -> str:
             return "" if value is None else f"{100 * value:+.2f}"
@@ -103,7 +102,7 @@ class Entry:
         )
 
     def line(self) -> str:
-        """For the terminal."""
+        """Text for the terminal."""
         more = "" if self.as_ours is None else f"   as ours {100 * self.as_ours:+6.2f} %"
         return (
             f"{self.name:58s} mean {self.reference:8.5f}   difference {100 * self.difference:+6.2f}"
@@ -112,7 +111,7 @@ class Entry:
 
 
 def render(stage: Path, spp: int, **settings: Any) -> tuple[Pixels, Pixels]:
-    """Our picture of a stage, and the variance of its pixels."""
+    """Render a stage; return the image and the variance of its pixels."""
     scene = wavecomb.load(stage)
     picture = wavecomb.render(scene, spp=spp, error=True, **settings)
     assert picture.variance is not None
@@ -122,7 +121,7 @@ def render(stage: Path, spp: int, **settings: Any) -> tuple[Pixels, Pixels]:
 def entry_of(
     name: str, file: Path, ours: Pixels, variance: Pixels, reference: Pixels, kept: NDArray[Any]
 ) -> Entry:
-    """Compares the kept pixels and writes the pictures, with the others dark."""
+    """Compare the kept pixels and write the images, with other pixels darkened."""
     mean = max(float(reference[kept].mean(dtype=np.float64)), 1e-12)
     noise = float(np.sqrt(variance[kept].sum(dtype=np.float64))) / variance[kept].size
     found = compare(ours[kept][None], reference[kept][None])
@@ -142,7 +141,7 @@ def entry_of(
 
 
 def arnold_entry(folder: Path, options: argparse.Namespace) -> Entry:
-    """Compares a test of arnold-usd; both pictures within 0 and 1, as 8 bits hold them."""
+    """Compare a test of arnold-usd; both images are clamped to [0, 1] like 8-bit files."""
     name = f"arnold {folder.name}"
     test = arnold.to_stage(folder, options.out / "stages" / f"{folder.name}.usda")
     ours, variance = render(
@@ -164,10 +163,10 @@ def arnold_entry(folder: Path, options: argparse.Namespace) -> Entry:
 
 
 def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace) -> Entry:
-    """Compares a scene of Mitsuba.
+    """Compare a scene of Mitsuba.
 
     Raises:
-        Inexpressible: We cannot draw it.
+        Inexpressible: The scene cannot be drawn.
     """
     width = 0 if stored.exists() else WIDTH
     name = name_of(file)
@@ -200,12 +199,12 @@ def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace
 
 
 def name_of(file: Path) -> str:
-    """What a scene of Mitsuba is called."""
+    """Name of a Mitsuba scene."""
     return f"mitsuba {file.parent.name}/{file.stem}"
 
 
 def mitsuba_scenes(scenes: Path) -> list[tuple[Path, Path]]:
-    """Scene files with the pictures that may be stored of them."""
+    """Scene files, each with the path where its image may be stored."""
     found = []
     for file in sorted(scenes.rglob("*.xml")):
         if file.parent.name != "fragments":
@@ -215,7 +214,7 @@ def mitsuba_scenes(scenes: Path) -> list[tuple[Path, Path]]:
 
 
 def write_page(file: Path, entries: list[Entry], listed: dict[str, str]) -> None:
-    """The whole of it."""
+    """Write the page."""
     reasons = "\n".join(
         f"<li>{html.escape(name)}: {html.escape(reason)}" for name, reason in listed.items()
     )
@@ -230,7 +229,7 @@ def write_page(file: Path, entries: list[Entry], listed: dict[str, str]) -> None
 
 
 def main() -> int:
-    """Runs the comparison."""
+    """Run the comparison."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages that are big in one way each: many prims, many instances, many triangles.
+"""Measure stages that are large in one respect: many prims, many instances, many triangles.
 
     .venv/bin/python benchmarks/scale.py
     .venv/bin/python benchmarks/scale.py --only instances --count 4000000 --rounds 3
 
-Each is written once (below --folder), then read and rendered with 1 sample per pixel by fresh
+Each stage is written once (below --folder), then read and rendered with 1 sample per pixel by new
 processes, as ``benchmarks/loading.py`` does. Prints medians: seconds to load and to build, and
-memory beside what must be there. ``prims`` are meshes of 12 triangles, each in an Xform of its own;
-``instances`` are of one point instancer; ``natives`` are native instances; ``triangles`` are in one
-mesh, with normals and texture coordinates.
+memory relative to the minimum. ``prims`` are meshes of 12 triangles, each in a separate Xform;
+``instances`` belong to one point instancer; ``natives`` are native instances; ``triangles`` are in
+one mesh with normals and texture coordinates.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FACES = np.array(
 
 
 def write_prims(stage: Usd.Stage, count: int) -> None:
-    """Half of ``count`` are Xforms, half meshes in them."""
+    """Write ``count`` prims: half are Xforms, half are meshes inside."""
     for path, place in zip(_paths("/World", count // 2), _places(count // 2), strict=True):
         xform = UsdGeom.Xform.Define(stage, path)
         xform.AddTranslateOp().Set(tuple(map(float, place)))
@@ -39,7 +39,7 @@ def write_prims(stage: Usd.Stage, count: int) -> None:
 
 
 def write_instances(stage: Usd.Stage, count: int) -> None:
-    """One point instancer of two prototypes, with turns, sizes and colours."""
+    """Write one point instancer of two prototypes, with rotations, scales and colours."""
     instancer = UsdGeom.PointInstancer.Define(stage, "/World/Instancer")
     paths = [_cube(stage, f"/World/Instancer/Prototypes/P{k}") for k in range(2)]
     instancer.CreatePrototypesRel().SetTargets(paths)
@@ -57,7 +57,7 @@ def write_instances(stage: Usd.Stage, count: int) -> None:
 
 
 def write_natives(stage: Usd.Stage, count: int) -> None:
-    """Native instances of one class."""
+    """Write native instances of one class."""
     stage.CreateClassPrim("/Prototype")
     _cube(stage, "/Prototype/Mesh")
     for path, place in zip(_paths("/World", count), _places(count), strict=True):
@@ -69,7 +69,7 @@ def write_natives(stage: Usd.Stage, count: int) -> None:
 
 
 def write_triangles(stage: Usd.Stage, count: int) -> None:
-    """A field of waves."""
+    """Write a surface of waves."""
     edge = round((count / 2) ** 0.5)
     mesh = UsdGeom.Mesh.Define(stage, "/World/Waves")
     u, v = np.meshgrid(*[np.linspace(0, 1, edge + 1, dtype=np.float32)] * 2)
@@ -100,12 +100,12 @@ WRITERS: dict[str, Callable[[Usd.Stage, int], None]] = {
 
 
 def _paths(folder: str, count: int) -> list[str]:
-    """So many paths, a thousand in each folder: USD is slow where a prim has more children."""
+    """``count`` paths, a thousand per folder, because USD is slow with more children per prim."""
     return [f"{folder}/G{i // 1000}/P{i}" for i in range(count)]
 
 
 def _places(count: int) -> np.ndarray[Any, Any]:
-    """So many places on a cubic grid, (count, 3)."""
+    """``count`` positions on a cubic grid, (count, 3)."""
     edge = int(np.ceil(count ** (1 / 3)))
     at = np.arange(count)
     return np.stack([at % edge, at // edge % edge, at // edge**2], axis=1).astype(np.float64)
@@ -121,7 +121,7 @@ def _cube(stage: Usd.Stage, path: str) -> str:
 
 
 def make(name: str, count: int, folder: Path) -> Path:
-    """The stage's file, written if it is not there."""
+    """Return the file of a stage; write it if it is missing."""
     path = folder / f"{name}-{count}.usdc"
     if not path.exists():
         part = path.with_suffix(".part.usdc")
@@ -133,14 +133,18 @@ def make(name: str, count: int, folder: Path) -> Path:
 
 
 def main() -> None:
-    """Runs the sitting."""
+    """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", choices=list(WRITERS), help="one of them")
-    parser.add_argument("--count", type=int, help="with --only: how many")
-    parser.add_argument("--folder", type=Path, default=Path("out"), help="where stages are made")
+    parser.add_argument("--only", choices=list(WRITERS), help="only this kind of stage")
+    parser.add_argument(
+        "--count", type=int, help="with --only: number of prims, instances or triangles"
+    )
+    parser.add_argument(
+        "--folder", type=Path, default=Path("out"), help="folder of generated stages"
+    )
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--size", type=int, default=300)
-    parser.add_argument("--threads", type=int, default=0, help="0: all")
+    parser.add_argument("--threads", type=int, default=0, help="number of threads; 0 means all")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     print("| stage | load s | build s | peak MB | arrays + BVH MB | ratio | bytes each |")
@@ -164,7 +168,7 @@ def main() -> None:
 
 
 def _scene_bytes(record: dict[str, Any]) -> int:
-    """Arrays, records and BVH."""
+    """Bytes of arrays, records and BVH."""
     parts = record["memory_bytes"]
     return int(sum(parts[name] for name in ("accelerator", "meshes", "records")))
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders a page of shader balls: each lobe of OpenPBR, and a sweep of its parameters.
+"""Render a page of shader balls: each lobe of OpenPBR with sweeps of its parameters.
 
     .venv/bin/python benchmarks/shaderballs.py
     .venv/bin/python benchmarks/shaderballs.py metal coat -o out/balls --ball 160 --spp 256
 
-A sweep is a row of balls in one picture; its stage is written beside it, so that it can be rendered
-again or opened elsewhere. The page is index.html in the output folder. Exit code 1 where a stage
-was not rendered as it is meant, with what was said of it.
+A sweep is a row of balls in one image; its stage is written next to it. The page is index.html in
+the output folder. Exit code 1 if a stage has warnings, which are printed.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ BLACK = {"base_color": (0.02, 0.02, 0.02)}
 
 @dataclass(frozen=True)
 class Sweep:
-    """Balls that differ in some inputs of open_pbr_surface."""
+    """Balls that differ in inputs of open_pbr_surface."""
 
     name: str
     about: str
@@ -39,7 +38,7 @@ class Sweep:
 
     @classmethod
     def of(cls, name: str, about: str, common: dict[str, Any], key: str, *values: Any) -> Sweep:
-        """Of one input."""
+        """Make a sweep of one input."""
         return cls(name, about, common, tuple({key: value} for value in values))
 
 
@@ -85,7 +84,7 @@ SWEEPS = (
 
 
 def sphere(rings: int = 48, segments: int = 96) -> str:
-    """A ball of radius 1 with its texture coordinates, cut open by no seam of its normals."""
+    """A ball of radius 1 with texture coordinates and smooth normals across the seam."""
     points, normals, uvs, faces = [], [], [], []
     for i in range(rings + 1):
         polar = math.pi * i / rings
@@ -127,7 +126,7 @@ def _input(name: str, value: Any) -> str:
 
 
 def stage(sweep: Sweep) -> str:
-    """A stage with a ball for each step, over a striped ground, under a window and a sky."""
+    """A stage with a ball for each step, on striped ground, under a window light and a sky."""
     count = len(sweep.steps)
     parts = []
     for i, step in enumerate(sweep.steps):
@@ -197,12 +196,14 @@ def Xform "World" {{{"".join(parts)}{"".join(stripes)}
 
 
 def main() -> int:
-    """Renders the sweeps and writes the page."""
+    """Render the sweeps and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     names = [sweep.name for sweep in SWEEPS]
-    parser.add_argument("sweeps", nargs="*", metavar="SWEEP", help=f"of {', '.join(names)}; all")
+    parser.add_argument(
+        "sweeps", nargs="*", metavar="SWEEP", help=f"{', '.join(names)}; default: all"
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("out/shaderballs"))
-    parser.add_argument("--ball", type=int, default=160, help="pixels of a ball's cell")
+    parser.add_argument("--ball", type=int, default=160, help="size of a ball in pixels")
     parser.add_argument("--spp", type=int, default=128)
     options = parser.parse_args()
     if unknown := [name for name in options.sweeps if name not in names]:

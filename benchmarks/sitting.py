@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every sitting shares: stages, ratios with intervals, where and on what it was measured."""
+"""Shared code of benchmarks: stages, rounds, ratios with intervals, and machine information."""
 
 from __future__ import annotations
 
@@ -34,23 +34,25 @@ STAGES = ("cornell", "mixed", "dragon")
 
 
 def sitting_parser(doc: str, name: str) -> argparse.ArgumentParser:
-    """A parser with the arguments of sittings on generated stages; results go to ``name``.json."""
+    """Parser with the common arguments; results go to ``name``.json."""
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("--stages", nargs="+", default=list(STAGES), metavar="NAME")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--spp", type=int, default=16)
-    parser.add_argument("--size", type=int, default=600, help="edge of the picture, pixels")
+    parser.add_argument("--size", type=int, default=600, help="image edge in pixels")
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--triangles", type=int, default=250_000, help="of a dragon")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "stages", help="of stages")
-    parser.add_argument("--seed", type=int, default=1, help="of the order of renders in a round")
+    parser.add_argument("--triangles", type=int, default=250_000, help="triangles of the dragon")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "stages", help="folder of generated stages"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="seed of the order of renders")
     parser.add_argument("--output", type=Path, default=RESULTS / f"{name}.json")
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     return parser
 
 
 def sitting_arguments(parser: argparse.ArgumentParser, **quick: Any) -> argparse.Namespace:
-    """Parses the arguments; ``quick`` are those of --quick, which writes beside its stages."""
+    """Parse the arguments; ``quick``: values for --quick, which writes beside its stages."""
     args = parser.parse_args()
     if args.quick:
         folder = ROOT / "out" / "quick"
@@ -61,7 +63,7 @@ def sitting_arguments(parser: argparse.ArgumentParser, **quick: Any) -> argparse
 def shuffled_rounds(
     turns: Sequence[T], args: argparse.Namespace, name: str
 ) -> Iterator[Iterator[T]]:
-    """Yields the turns of each round in shuffled order, and logs the end of each round."""
+    """Yield the turns of each round in shuffled order, and log the end of each round."""
     shuffle = random.Random(args.seed)
     started = time.perf_counter()
     for number in range(args.rounds):
@@ -73,7 +75,7 @@ def shuffled_rounds(
 
 
 def stage_file(path: Path, name: str, **options: Any) -> Path:
-    """`path`, where a generated stage is written unless it is there. Options: of `write_scene`."""
+    """Write a generated stage to `path` unless it exists; options are those of `write_scene`."""
     if not path.exists():
         log(f"writing {path}")
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -82,17 +84,17 @@ def stage_file(path: Path, name: str, **options: Any) -> Path:
 
 
 def load_stage(name: str, folder: Path, triangles: int) -> Any:
-    """A generated stage, loaded; written to `folder` where it is not there yet."""
+    """Load a generated stage; write it to `folder` if it is missing."""
     path = folder / f"{name}-{triangles}.usdc"
     options = {} if name == "cornell" else {"triangles": triangles}
     return wavecomb.load(stage_file(path, name, **options))
 
 
 def phase_times(stats: Mapping[str, Any]) -> dict[str, float]:
-    """Thread seconds of a render that sittings ask for, from Picture.stats or Result.stats.
+    """Thread seconds of a render by phase, from Picture.stats or Result.stats.
 
-    shade_s, order_s (what an order of shading costs), traversal_s (trace and shadow phases),
-    phases_total_s; and render_s, wall seconds without loading and building.
+    shade_s, order_s (cost of ordering the shading), traversal_s (trace and shadow phases),
+    phases_total_s; and render_s, wall seconds without loading and scene construction.
     """
     phases = stats["phases_s"]
     return {
@@ -104,11 +106,11 @@ def phase_times(stats: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-# ---- figures -------------------------------------------------------------------------------------
+# ---- statistics ----------------------------------------------------------------------------------
 
 
 def bootstrap(values: Any, statistic: Callable[[Any], Any] = np.median) -> tuple[float, float]:
-    """95 % percentile interval of a statistic over rounds."""
+    """95 % percentile bootstrap interval of a statistic over rounds."""
     if len(values) < 2:
         value = float(statistic(np.asarray(values)))
         return value, value
@@ -140,7 +142,7 @@ def ratio(ours: Sequence[float], theirs: Sequence[float]) -> dict[str, float]:
 
 
 def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
-    """Writes a sitting as JSON, whole or not at all, with commit, command, machine and load."""
+    """Write results as JSON atomically, with commit, command, machine and load."""
 
     def git(*words: str) -> str:
         done = subprocess.run(
@@ -166,7 +168,7 @@ def write_result(path: Path, schema: str, content: Mapping[str, Any]) -> None:
 
 
 def _what_counts(words: Sequence[str]) -> list[str]:
-    """Arguments without those that say where files go on this machine."""
+    """Arguments without those that are file locations on this machine."""
     kept, places = [], ("--folder", "--output", "--cache", "--pictures")
     for before, word in zip(("", *words), words, strict=False):
         if before not in places and word.split("=")[0] not in places:
@@ -180,16 +182,16 @@ def head(*names: str) -> list[str]:
 
 
 def row(*cells: str) -> str:
-    """A line of a Markdown table."""
+    """A row of a Markdown table."""
     return "| " + " | ".join(cells) + " |"
 
 
 def show(figure: Mapping[str, float], digits: int = 3) -> str:
-    """Median and interval."""
+    """Median and interval as text."""
     median, low, high = (f"{figure[key]:.{digits}f}" for key in ("median", "low", "high"))
     return f"{median} ({low} to {high})"
 
 
 def log(text: str) -> None:
-    """Progress, on the error stream."""
+    """Log progress to stderr."""
     print(text, file=sys.stderr, flush=True)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subdivision by us and by Embree: time and memory of one mesh.
+"""Compare subdivision by Wavecomb and by Embree: time and memory of one mesh.
 
     .venv/bin/python benchmarks/subdivision.py Teapot.usd /Teapot/Geometry 4
 
-Prints what refining takes, what Embree then takes for the triangles, and what Embree's own
-subdivision geometry takes at a tessellation rate of 2^level; one thread each. Compiles
-benchmarks/subdivision_embree.cpp against the staged Embree, or the distribution's.
+Prints the cost of refinement, of Embree's BVH for the resulting triangles, and of Embree's
+subdivision geometry at a tessellation rate of 2^level; one thread each. Compiles
+benchmarks/subdivision_embree.cpp against the staged Embree or the distribution's.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STAGED = ROOT / ".deps" / "embree"
 
 
 def compile_probe(folder: Path) -> list[str]:
-    """Builds the program; gives the command that runs it."""
+    """Build the program; return the command that runs it."""
     program = folder / "subdivision_embree"
     source = ROOT / "benchmarks" / "subdivision_embree.cpp"
     command = ["g++", "-std=c++20", "-O2", str(source), "-o", str(program)]
@@ -43,7 +43,7 @@ def compile_probe(folder: Path) -> list[str]:
 
 
 def save(path: Path, points: Any, counts: Any, indices: Any) -> Path:
-    """A mesh as the program reads it."""
+    """Save a mesh in the format of the program."""
     with path.open("wb") as file:
         file.write(np.array([len(points), len(counts), indices.size], np.int32).tobytes())
         for array in (points.astype(np.float32), counts.astype(np.int32), indices.astype(np.int32)):
@@ -52,7 +52,7 @@ def save(path: Path, points: Any, counts: Any, indices: Any) -> Path:
 
 
 def main() -> None:
-    """Measures and prints."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stage")
     parser.add_argument("prim")

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A mesh in Embree alone, for benchmarks/subdivision.py: as Embree's own subdivision surface, or
+/// Builds a mesh in Embree alone for benchmarks/subdivision.py, as Embree's subdivision surface or
 /// as triangles.
 ///
-///     subdivision_embree FILE RATE     RATE 0: the faces are triangles
+///      subdivision_embree FILE RATE     RATE 0: the faces are triangles
 ///
 /// FILE: counts of points, faces and corners (int32), points (3 float), face sizes, corners
 /// (int32).

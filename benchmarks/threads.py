@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What more threads bring: measured up to the cores there are, told from the groups beyond.
+"""Measure the speedup by threads, and predict it beyond the number of cores.
 
     .venv/bin/python benchmarks/threads.py
     .venv/bin/python benchmarks/threads.py --files shot.usd --size 800 --spp 32
 
-Stages are rendered by 1 and 2 threads, and by 4, 8, 16 ... where there are as many cores, in turns
-of shuffled order, in one process. ``measured`` is the ratio of render times within a round.
-``by groups`` is told from the times of groups of waves (``sharing`` of docs/statistics.md): passes
-by list scheduling, and what of the render is outside of passes as it was. Prints a table, writes
+Stages are rendered with 1 and 2 threads, and with 4, 8, 16 and more up to the number of cores, in
+turns of shuffled order, in one process. ``measured`` is the ratio of render times within a round.
+``by groups`` is predicted from the times of groups of waves (``sharing`` in docs/statistics.md):
+passes by list scheduling, and the rest of the render unchanged. Prints a table and writes
 ``results/threads.json``.
 """
 
@@ -34,7 +34,7 @@ TOLD = (2, 4, 8, 16, 32, 64)
 
 
 def main() -> None:
-    """Renders, prints the table, writes the JSON."""
+    """Render, print the table, write the JSON."""
     args = _arguments()
     files = [stage_file(args.folder / f"{n}.usdc", n, **STAGES[n]) for n in args.stages]
     found: dict[str, Any] = {}
@@ -80,7 +80,7 @@ def _measure(path: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _counts() -> list[int]:
-    """Numbers of threads that this machine has cores for."""
+    """Numbers of threads up to the number of cores."""
     cores = len(os.sched_getaffinity(0))
     return [n for n in (1, *TOLD) if n <= cores]
 
@@ -92,7 +92,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--size", type=int, default=600)
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "threads", help="of stages")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "out" / "threads", help="folder of generated stages"
+    )
     parser.add_argument("--output", type=Path, default=RESULTS / "threads.json")
     return parser.parse_args()
 

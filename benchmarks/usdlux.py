@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the UsdLux suite and compares each picture with its reference.
+"""Render the UsdLux suite and compare each image with its reference.
 
     .venv/bin/python benchmarks/usdlux.py
     .venv/bin/python benchmarks/usdlux.py sphere rect:28 -o out/usdlux --size 256 --spp 64
 
-The stages and pictures lie in ../shared/assets (usd/usdlux, reference/usdlux; FRAMES.md there says
-what varies at each frame). Direct light only. The page, index.html in the output folder, shows each
-pair and its errors:
+The stages and images are in ../shared/assets (usd/usdlux, reference/usdlux; FRAMES.md there lists
+what varies by frame). Direct light only. The page, index.html in the output folder, shows each pair
+and its errors:
 
-    mean        of the difference, relative: what the two disagree about in brightness
-    noise       one standard error of that
-    worst       the largest difference of a block of 16 x 16 pixels, in standard errors
-    absolute    mean of the absolute difference, which noise and the edges of shapes are part of
+    mean        relative difference of mean brightness
+    noise       standard error of the mean
+    worst       largest difference of a block of 16 x 16 pixels, in standard errors
+    absolute    mean absolute difference, including noise and edges of shapes
 
-Each mean must be within 0.5 %, and each block within the noise of both pictures, at a level of 0.01
-for all blocks of a picture together (usdlux_judge.py). Exit code 1 where that does not hold, but
-for what NOT_REACHED lists with the reason.
+Each mean must be within 0.5 %, and each block within the noise of both images at a level of 0.01
+for all blocks of an image together (usdlux_judge.py). Exit code 1 if an image fails, except those
+that NOT_REACHED lists with the reason.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from wavecomb.picture.files import replacing
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 CAMERAS = {"iesTest": ("/cameras/iesTop", "/cameras/iesBottom")}
-"""Of stages whose reference has a picture of each, one above the other."""
+"""Stages whose reference has an image of each camera, one above the other."""
 VISIBLE = ("visibleRect",)
-"""Stages whose lights are seen."""
+"""Stages whose lights are visible."""
 LAMBERT = """#usda 1.0
 over "materials" {
     over "usdpreviewsurface1" {
@@ -50,18 +50,19 @@ over "materials" {
     }
 }
 """
-"""The references are of Lambert's surfaces. The stages ask for a specularColor of 0 at the index 1.
-By UsdPreviewSurface's specular workflow that still reflects at grazing angles (F90 is 1); by its
-metallic workflow it is Lambert's."""
+"""The references show Lambertian surfaces. The stages set a specularColor of 0 at index 1. In
+UsdPreviewSurface's specular workflow this still reflects at grazing angles (F90 is 1); in its
+metallic workflow it is Lambertian.
+"""
 NOT_REACHED = {
     "dome": "the image is seen: OpenUSD's delegate looks up the nearest texel, we are bilinear",
-    "visibleRect": "likewise",
+    "visibleRect": "the image is seen, as in dome",
     **dict.fromkeys(
         ("distant 1", "distant 5", "distant 10"),
         "the delegate's 1 - cos(0.265 degrees) is 179 steps of a float for 179.45: 0.25 % too dark",
     ),
 }
-"""Of stages and pictures that do not reach it, why. Their means still have to be within 0.5 %."""
+"""Reasons why stages and images do not pass. Their means must still be within 0.5 %."""
 NAME = re.compile(r"(?P<stage>\w+)-embree\.(?P<frame>\d+)\.exr")
 
 PAGE = """<!doctype html>
@@ -81,7 +82,7 @@ td, th {{ padding: 2px 10px; text-align: right }} td:first-child {{ text-align: 
 
 @dataclass
 class Entry:
-    """What came of one picture."""
+    """Result of one image."""
 
     name: str
     mean: float
@@ -91,17 +92,17 @@ class Entry:
 
     @property
     def reason(self) -> str:
-        """Why its blocks need not be within noise; or ""."""
+        """Reason why its blocks may exceed the noise, or ""."""
         return NOT_REACHED.get(self.name) or NOT_REACHED.get(self.name.split()[0], "")
 
     @property
     def is_good(self) -> bool:
-        """Whether it agrees as far as it has to."""
+        """Whether it agrees as far as required."""
         v = self.verdict
         return v.agrees or (bool(self.reason) and v.mean_agrees)
 
     def row(self) -> str:
-        """Its part of the page."""
+        """HTML of the entry."""
         v = self.verdict
         return (
             f"<tr{'' if v.agrees else ' class=off'}><td>{html.escape(self.name)}"
@@ -112,7 +113,7 @@ class Entry:
         )
 
     def line(self) -> str:
-        """The same as text."""
+        """Text of the entry."""
         v = self.verdict
         what = "" if v.agrees else "   NOT REACHED" + (f": {self.reason}" if self.reason else "")
         if v.outside:
@@ -139,7 +140,7 @@ def render(
         camera=camera,
         lights=lights,
         session_layer=lambert,
-        subdivision="off",  # OpenUSD's delegate draws cages
+        subdivision="off",  # OpenUSD's reference implementation draws cages
     )
     return np.stack(
         [
@@ -157,7 +158,7 @@ def render(
 
 
 def compare(reference_file: Path, options: argparse.Namespace) -> Entry:
-    """Renders what a reference shows and compares."""
+    """Render the frame of a reference and compare."""
     found = NAME.fullmatch(reference_file.name)
     assert found is not None
     stage, frame = found["stage"], int(found["frame"])
@@ -178,15 +179,19 @@ def compare(reference_file: Path, options: argparse.Namespace) -> Entry:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the comparison."""
+    """Run the comparison."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("pictures", nargs="*", help="STAGE or STAGE:FRAME; default: all")
     parser.add_argument("-o", "--out", type=Path, default=Path("out/usdlux"))
-    parser.add_argument("--size", type=int, default=512, help="width; divides 512")
-    parser.add_argument("--spp", type=int, default=256, help="of all batches together")
-    parser.add_argument("--batches", type=int, default=8, help="independent renders, from 2 on")
+    parser.add_argument("--size", type=int, default=512, help="image width, a divisor of 512")
+    parser.add_argument(
+        "--spp", type=int, default=256, help="samples per pixel of all batches together"
+    )
+    parser.add_argument(
+        "--batches", type=int, default=8, help="number of independent renders, at least 2"
+    )
     options = parser.parse_args(arguments)
     if options.size < 16 or 512 % options.size:
         parser.error("--size must divide 512 and be 16 or more")

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a picture of ours is a reference's, but for noise.
+"""Test whether an image equals a reference within their noise.
 
-Ours comes as independent renders (batches). A reference is one picture whose samples are not known:
-its noise is what is left of the differences between neighbouring pixels of *reference - ours* when
-ours has its share taken off, block by block. (What is no noise but changes from pixel to pixel, as
-an outline that is filtered in another way, counts as such there.)
+Our image comes as independent renders (batches). The reference is a single image with an unknown
+number of samples. Its noise is estimated per block from the differences between neighbouring pixels
+of *reference - ours*, minus the part due to our noise. Other differences between neighbouring
+pixels, such as differently filtered outlines, count as noise there.
 
-Both noises are taken as independent from pixel to pixel, so that the variance of a block is the sum
-of those of its pixels, with the freedom of all: z is a normal deviate.
+Noise is assumed to be independent between pixels, so that the variance of a block is the sum over
+its pixels; z is a normal deviate.
 """
 
 from __future__ import annotations
@@ -23,25 +23,26 @@ Array = NDArray[np.float64]
 BLOCK = 16
 MEAN_LIMIT = 0.005
 SIGNIFICANCE = 0.01
-"""Of all blocks of a picture together, by Sidak."""
+"""For all blocks of an image together, by Sidak."""
 ROUNDING = 1e-3
-"""A block that differs by less of its own value, or of a hundredth of the picture's mean, agrees:
-half floats, 50 faces around a sphere, and what else is no noise and no matter."""
+"""Blocks that differ by less than this fraction of their value, or of a hundredth of the image
+mean, agree. This covers half floats, 50 faces around a sphere, and similar negligible differences.
+"""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of one picture.
+    """Result of one image.
 
     Attributes:
-        difference: Of the mean to the reference's, relative.
-        worst: The largest deviate of a block among those that differ by more than rounding.
-        limit: What it may be.
-        outside: Blocks and channels beyond it.
-        blocks: All of them.
-        noise: One standard error of the mean, relative, of both pictures.
+        difference: Relative difference of the mean to the reference's.
+        worst: Largest deviate among blocks that differ by more than rounding.
+        limit: Limit of ``worst``.
+        outside: Number of blocks and channels beyond the limit.
+        blocks: Number of all blocks and channels.
+        noise: Relative standard error of the mean, of both images.
         place: Column and row of the worst block, in blocks.
-        excess: Relative difference there.
+        excess: Relative difference of that block.
     """
 
     difference: float
@@ -55,33 +56,33 @@ class Verdict:
 
     @property
     def mean_agrees(self) -> bool:
-        """Whether the means are within half a percent."""
+        """Whether the means agree within half a per cent."""
         return abs(self.difference) <= MEAN_LIMIT
 
     @property
     def mean_is_open(self) -> bool:
-        """Whether the means are further apart than that, but by three standard errors at most."""
+        """Whether the means differ by more than that, but by at most three standard errors."""
         return 0 < abs(self.difference) - MEAN_LIMIT <= 3 * self.noise
 
     @property
     def agrees(self) -> bool:
-        """Whether that holds and each block is within noise."""
+        """Whether the means agree and each block is within noise."""
         return self.mean_agrees and self.outside == 0
 
 
 def blocks_of(image: Array, size: int = BLOCK) -> Array:
-    """Means over blocks, (rows, columns, channels); a rest at the edges is left out."""
+    """Means over blocks, (rows, columns, channels); incomplete blocks are dropped."""
     rows, columns = image.shape[0] // size, image.shape[1] // size
     cut = image[: rows * size, : columns * size]
     return np.asarray(cut.reshape(rows, size, columns, size, -1).mean((1, 3)))
 
 
 def judge(batches: Array, reference: Array, size: int = BLOCK) -> Verdict:
-    """Compares ours, (n, height, width, 3) of n >= 2 independent renders, with a reference."""
+    """Compare n >= 2 independent renders, (n, height, width, 3), with a reference."""
     ours = batches.mean(0)
-    own = batches.var(0, ddof=1) / len(batches)  # of the mean, per pixel
+    own = batches.var(0, ddof=1) / len(batches)  # variance of the mean, per pixel
     residual = reference - ours
-    steps = np.diff(residual, axis=1) ** 2 / 2  # the variance of both, where that is all there is
+    steps = np.diff(residual, axis=1) ** 2 / 2  # variance of both images, if there is only noise
     both = blocks_of(np.concatenate([steps, steps[:, -1:]], axis=1), size)
     variance = np.maximum(both, blocks_of(own, size)) / size**2
     mine, theirs = blocks_of(ours, size), blocks_of(reference, size)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How quick the window is.
+"""Measure the responsiveness of the window.
 
-Prints, for each stage, seconds from the moment it is read to the first picture on the screen and
-to the first whole one, pictures a second while the camera turns, milliseconds from stop to
-standstill (median and most of ten), and the longest time that the window did not answer. Works
+For each stage, prints the seconds from reading it to the first image on the screen and to the first
+complete one, images per second while the camera orbits, milliseconds from stop to standstill
+(median and maximum of ten), and the longest time during which the window did not respond. Works
 without a display.
 """
 
@@ -37,7 +37,7 @@ class Run:
         self.stage = stage
 
     def beat(self):
-        """Lets the window work; notes how long it took."""
+        """Process window events and record how long they took."""
         self.application.processEvents()
         now = time.perf_counter()
         self.gap = max(self.gap, now - self.last)
@@ -45,7 +45,7 @@ class Run:
         self.last = time.perf_counter()
 
     def until(self, met, seconds=120.0):
-        """Waits; returns when it was."""
+        """Wait for a condition; return the time when it was met."""
         end = time.perf_counter() + seconds
         while not met():
             if time.perf_counter() > end:
@@ -54,7 +54,7 @@ class Run:
         return time.perf_counter()
 
     def measure(self):
-        """All figures, by name."""
+        """Return all results by name."""
         begun = time.perf_counter()
         opened, moving = [], []
         self.session.opened.connect(lambda stage: opened.append(time.perf_counter()))
@@ -105,7 +105,7 @@ class Run:
 
 
 def main():
-    """Measures each stage in turn."""
+    """Measure each stage in turn."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stages", nargs="+")
     parser.add_argument("--size", nargs=2, type=int, default=(960, 540))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Embree asked in ways that a render does not ask it: what they cost, and what they lose.
+/// Embree scenes built and traced in several modes, to measure their cost and accuracy.
 #pragma once
 
 #include <algorithm>
@@ -13,25 +13,25 @@ namespace wavecomb::micro {
 
 inline constexpr float kForever = std::numeric_limits<float>::infinity();
 
-/// Triangles, mesh by mesh.
+/// Triangle soup of several meshes.
 struct Soup {
-  std::vector<float> positions;  ///< 3 a vertex
+  std::vector<float> positions;  ///< 3 per vertex
   std::vector<uint32_t> indices;
 };
 
-/// How a scene is built and asked.
+/// Build and traversal options of a scene.
 struct Mode {
   const char* name;
   bool robust = true, filter = true;
   uint32_t width = 16;
-  const char* device = nullptr;  ///< Embree's configuration
+  const char* device = nullptr;  ///< configuration string of the Embree device
   RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
   bool merged = false;          ///< all meshes in one geometry
-  bool only_triangles = false;  ///< asks for no other features
+  bool only_triangles = false;  ///< requests no other features
   bool coherent = false;
 };
 
-/// A scene built as a mode wants it.
+/// A scene built in a mode.
 class Built {
  public:
   Built(const std::vector<Soup>& soups, const Mode& mode) : mode_(mode) {
@@ -58,7 +58,7 @@ class Built {
   Built(const Built&) = delete;
   Built& operator=(const Built&) = delete;
 
-  /// How many rays hit something.
+  /// Returns the number of rays that hit something.
   size_t trace(const RaySpan& rays, bool shadow) const {
     switch (mode_.width) {
       case 16:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What value graphs cost a record: the parameters of program "openpbr" as constants, and driven by
-// a graph of 20 operations (an image, gradient noise, sums, mixes and sines of three components),
-// where all lanes of a packet have the same material and where they have four different ones.
+// Cost of value graphs per record: the parameters of program "openpbr" as constants, and driven by
+// a graph of 20 operations (an image, gradient noise, sums, mixes and sines of three components).
+// Packets have lanes of one material or of four.
 #include <random>
 
 #include "scene_testing.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays that escape from closed rooms, by Embree with and without its robust mode.
+// Counts rays that escape from closed rooms, with and without Embree's robust mode.
 //
-//     micro_leaks MILLIONS     rays of each kind and room, in millions
+//      micro_leaks MILLIONS     rays of each kind and room, in millions
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +21,7 @@ Soup soup_of(const MeshData& mesh) {
           {mesh.indices.begin(), mesh.indices.end()}};
 }
 
-/// A closed tube along x with `n` sides of two long triangles each; all vertices are shared.
+/// A closed tube along x with `n` sides of two long triangles each; vertices are shared.
 Soup tube(uint32_t n, float half_length, float radius) {
   Soup s;
   for (uint32_t i = 0; i < n; ++i)
@@ -40,7 +40,7 @@ Soup tube(uint32_t n, float half_length, float radius) {
   return s;
 }
 
-/// Turned, so that no wall is parallel to an axis.
+/// Rotates the soup so that no wall is parallel to an axis.
 Soup turned(Soup s) {
   for (size_t i = 0; i + 2 < s.positions.size(); i += 3) {
     float* p = &s.positions[i];
@@ -55,7 +55,8 @@ void leaks(double millions) {
   struct Room {
     const char* name;
     Soup soup;
-    double share = 1;  ///< of the rays; Embree is slow where boxes of long triangles overlap
+    double share = 1;  ///< fraction of the rays; Embree is slow where boxes of long triangles
+                       ///< overlap
   };
   const Room rooms[] = {{"box", soup_of(box({-1, -1, -1}, {1, 1, 1}))},
                         {"box, turned", turned(soup_of(box({-1, -1, -1}, {1, 1, 1})))},
@@ -75,7 +76,7 @@ void leaks(double millions) {
       const auto uniform = [&] { return static_cast<float>(random() >> 7) * 0x1p-24f; };
       const auto& s = room.soup;
       const size_t triangles = s.indices.size() / 3;
-      /// A point of a random edge, or within a triangle.
+      /// A random point on an edge, or inside a triangle.
       const auto point = [&](bool edge, float* out) {
         const uint32_t* i = &s.indices[3 * (random() % triangles)];
         float a = uniform(), b = edge ? 0.f : uniform();
@@ -94,7 +95,7 @@ void leaks(double millions) {
           point(false, p);
           point(aimed, q);
           for (int k = 0; k < 3; ++k) {
-            p[k] *= 0.9f * uniform();  // convex and around 0: inside
+            p[k] *= 0.9f * uniform();  // convex and around 0: the point is inside
             rays.column[k][i] = p[k];
             rays.column[3 + k][i] = q[k] - p[k];
           }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What choosing a light and a point on it costs, by kind of light.
+// Cost of selecting a light and sampling a point on it, by kind of light.
 #include <random>
 #include <vector>
 
@@ -51,7 +51,7 @@ void light(benchmark::State& state, uint32_t kind) {
   std::vector<float> columns[6];
   for (auto& column : columns)
     for (size_t i = 0; i < kSamples; ++i) column.push_back(std::min(uniform(random), 0.9999f));
-  // The choice is by multiples of 2^-24, as samplers give them.
+  // Multiples of 2^-24, as samplers return them.
   for (float& pick : columns[3]) pick = std::floor(pick * 0x1p24f) * 0x1p-24f;
   for (auto _ : state) {
     F sum(0.f);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Words of scattered records into lanes and back: word by word (gather, scatter) and row by row.
+// Loads and stores of rows of scattered records: word by word (gather, scatter) and row by row.
 #include <algorithm>
 #include <array>
 #include <random>
@@ -12,7 +12,8 @@
 namespace wavecomb::micro {
 namespace {
 
-constexpr uint32_t kRecords = 4096;  // as in a wave: 256 KB at 16 words, in the second cache
+constexpr uint32_t kRecords = 4096;  // as in a wave: 256 KB at 16 words, which fits the
+                                     // second-level cache
 
 struct Records {
   std::vector<float> words;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the random numbers of a path's vertex cost: one set of four dimensions for each path.
+// Cost of the sample values of a path vertex: one set of four dimensions per path.
 #include <vector>
 
 #include "wavecomb/core/sampler.h"

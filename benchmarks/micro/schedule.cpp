@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What giving a queue an order costs: sorting keys, and moving records against reading them by
-// index. Times are per record.
+// Cost of ordering a queue: sorting keys, and moving records compared with reading them by index.
+// Times are per record.
 
 #include <algorithm>
 #include <numeric>
@@ -15,7 +15,7 @@
 namespace wavecomb::micro {
 namespace {
 
-/// Keys as "material" makes them: a program in the top byte, a material below.
+/// Keys of policy "material": program in the top byte, material below.
 std::vector<uint64_t> material_keys(size_t n, uint32_t materials) {
   std::mt19937 random(1);
   std::vector<uint64_t> keys(n);
@@ -26,7 +26,7 @@ std::vector<uint64_t> material_keys(size_t n, uint32_t materials) {
   return keys;
 }
 
-/// Keys as no policy makes them: 64 bits that differ. The most passes a sort can take.
+/// Random 64-bit keys, which need the maximum number of sort passes.
 std::vector<uint64_t> random_keys(size_t n) {
   std::mt19937_64 random(1);
   std::vector<uint64_t> keys(n);
@@ -69,7 +69,7 @@ void std_stable_sort(benchmark::State& state) {
 }
 BENCHMARK(std_stable_sort)->RangeMultiplier(16)->Range(256, 1 << 20);
 
-/// A queue of n records in the order of random materials.
+/// Fills a queue with n records in the order of random materials.
 void fill(ShadingQueue& queue, size_t n) {
   const std::vector<uint64_t> keys = material_keys(n, 24);
   RadixSorter sorter(n);
@@ -78,9 +78,9 @@ void fill(ShadingQueue& queue, size_t n) {
   queue.ordered = sorter.sort(n, queue.sorted_indices);
 }
 
-constexpr size_t kWords = 8;  ///< of a record's row, as waves have them
+constexpr size_t kWords = 8;  ///< of a record's row, as in waves
 
-/// Reads every record's row and ids once, in lanes: what a very cheap shader would do.
+/// Reads every record's row and ids once, in lanes, like a very inexpensive shader.
 float read_all(const ShadingQueue& queue) {
   constexpr size_t kLanes = WAVECOMB_MAX_LANES;
   using F = Lanes<kLanes>;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What shading a record costs: by program and lane width, with full packets and with packets filled
-// to 35 %, as arrival order fills packets of 16 on the Mixed stage. Hit set-up, material, light
-// sample, bounce and roulette, as in a wave; synthetic hits (time_material), a rect light.
+// Cost of shading a record by program and lane width, with full packets and with packets filled to
+// 35 %, as arrival order fills packets of 16 on the Mixed stage. Includes hit set-up, material,
+// light sample, bounce and roulette, as in a wave, for synthetic hits (time_material) and a rect
+// light.
 #include "wave_testing.h"
 #include "widths.h"
 
@@ -11,11 +12,11 @@ namespace {
 using namespace scene_testing;
 
 constexpr uint32_t kRecords = 4096;
-constexpr uint32_t kEdge = 1024;  // of the textures
+constexpr uint32_t kEdge = 1024;  // edge of the textures in texels
 
-/// What is asked of a program beside its constants: textures (1: the base colour; 4: roughness, a
-/// metallic map of zeros and an opacity map of ones, too; 5: roughness, metallic, specular colour
-/// and normal), and a layer. `odd`: one texel of maps that say nothing says something.
+/// Features of a material: textures (1: base colour; 4: also roughness, a metallic map of zeros and
+/// an opacity map of ones; 5: also specular colour and normal) and a layer. `odd`: constant maps
+/// have one differing texel, so that they cannot be replaced by constants.
 struct Look {
   const char* name;
   uint32_t textures;
@@ -38,7 +39,7 @@ constexpr Look kLooks[] = {
      }},
 };
 
-/// An image of bytes as files have them.
+/// Makes an 8-bit image.
 TextureUse image(SceneBuilder& b, uint32_t channels, bool srgb, float low, float high) {
   std::vector<uint8_t> bytes;
   for (const float x : random_texels(kEdge * kEdge * channels, low, high, channels))
@@ -47,7 +48,7 @@ TextureUse image(SceneBuilder& b, uint32_t channels, bool srgb, float low, float
                             Wrap::kRepeat, Wrap::kRepeat}));
 }
 
-/// An image that is the same all over, but for a texel where it is `odd`.
+/// Makes a constant image, with one differing texel if `odd`.
 TextureUse silent(SceneBuilder& b, uint8_t value, bool odd) {
   std::vector<uint8_t> bytes(size_t{kEdge} * kEdge, value);
   if (odd) bytes.back() = 127;
@@ -55,7 +56,7 @@ TextureUse silent(SceneBuilder& b, uint8_t value, bool odd) {
                             Wrap::kRepeat, Wrap::kRepeat}));
 }
 
-/// A sphere of one material under a lamp.
+/// A sphere of one material under a light.
 ScenePtr make_scene(ProgramId program, const Look& look) {
   SceneBuilder b;
   Material material = make_material(program, {0.6f, 0.5f, 0.4f}, 0.4f);
@@ -103,10 +104,10 @@ void shade(benchmark::State& state, ProgramId program, const Look& look, float f
   count_items(state, "record", kRecords);
 }
 
-/// Whether a program has what a look asks for.
+/// Whether a program supports the features of a look.
 bool has(ProgramId program, const Look& look) {
   const bool layered = program == ProgramId::kPrincipled || program == ProgramId::kOpenPbr;
-  // Emission is read from no base colour.
+  // Program "emissive" has no base colour.
   if (program == ProgramId::kEmissive) return look.textures == 0 && !look.edit;
   return layered || (look.textures <= 1 && !look.edit);
 }
@@ -117,7 +118,7 @@ const bool registered = [] {
       for (const float fill : {1.f, 0.35f})
         for_each_width([&]<size_t W>() {
           const auto program = static_cast<ProgramId>(p);
-          // A lone lane is always full.
+          // A single lane is always full.
           if (!has(program, look) || (fill < 1 && W == 1)) return;
           const std::string name = "shade/" + std::string(kProgramNames[p]) + look.name +
                                    (fill < 1 ? "/full:35%" : "/full:100%") + lanes_label(W);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The stage on which rays are timed.
+/// The scene in which rays are timed.
 #pragma once
 
 #include "scene_testing.h"
 
 namespace wavecomb::micro {
 
-/// A box, open towards the camera, with eight spheres of that many segments in it.
+/// A box, open towards the camera, that contains eight spheres with the given number of segments.
 inline scene_testing::ScenePtr spheres(uint32_t segments) {
   using namespace scene_testing;
   SceneBuilder b;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a trilinear texture lookup costs: by lane width, by the memory that lookups touch, and by
-// whether neighbours in a packet look at neighbouring texels.
+// Cost of a trilinear texture lookup by lane width, by size of the texture, and by whether
+// neighbouring lanes read neighbouring texels.
 #include <memory>
 #include <random>
 #include <vector>
@@ -13,14 +13,14 @@ namespace {
 
 constexpr size_t kLookups = 1 << 16;
 
-/// Texture coordinates, and widths that fall between two levels: both are read.
+/// Texture coordinates, and filter widths between two levels, so that both are read.
 struct Queries {
   std::vector<float> s, t;
   float width;
 };
 
-/// A texture of edge x edge texels of 8 bits, sRGB: edge^2 * 4 bytes at the finest level. The last
-/// one asked for is kept.
+/// Makes a texture of edge x edge texels of 8 bits, sRGB: edge^2 * 4 bytes at the finest level.
+/// Caches the last one.
 const Texture& texture_of(uint32_t edge) {
   static std::unique_ptr<Texture> made;
   if (made && made->view().levels[0].width == edge) return *made;
@@ -32,7 +32,7 @@ const Texture& texture_of(uint32_t edge) {
   return *made;
 }
 
-/// Coherent: along rows, a texel apart, as camera rays meet a plane. Else: anywhere.
+/// Coherent: along rows, a texel apart, as camera rays hit a plane. Otherwise: random positions.
 Queries make_queries(uint32_t edge, bool coherent) {
   Queries q;
   q.width = 1.4f / static_cast<float>(edge);
@@ -69,7 +69,7 @@ void texture(benchmark::State& state, uint32_t edge, bool coherent) {
 }
 
 const bool registered = [] {
-  // 4 bytes a texel: 16 KiB, 256 KiB, 4 MiB, 64 MiB, 256 MiB, and a third more for the levels.
+  // 4 bytes per texel: 16 KiB, 256 KiB, 4 MiB, 64 MiB, 256 MiB, plus a third for the mip levels.
   for (const uint32_t edge : {64u, 256u, 1024u, 4096u, 8192u})
     for (const bool coherent : {true, false})
       for_each_width([&]<size_t W>() {

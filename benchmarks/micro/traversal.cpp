@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tracing a ray costs: the rays of a render, by Embree alone and as a render traces them.
+// Cost of tracing a ray: the rays of a render, traced by Embree alone and as the render does.
 #include <map>
 
 #include "scene_testing.h"
@@ -12,13 +12,13 @@ namespace {
 
 using namespace scene_testing;
 
-/// A box of 20 triangles or so, or one with a million in it.
+/// A box of about 20 triangles, or one that contains a million.
 ScenePtr make_scene(bool large) {
   return large ? spheres(256) : cornell();
 }
 
-/// The rays of a picture of 128 x 128 with 16 samples, all diffuse bounces, in slot order or put in
-/// order of direction; made on first use.
+/// Rays of an image of 128 x 128 with 16 samples and diffuse bounces, in slot order or sorted by
+/// direction; recorded on first use.
 RayRecording& recording(bool large, RayOrder order) {
   static std::map<std::pair<bool, RayOrder>, std::unique_ptr<RayRecording>> made;
   auto& rays = made[{large, order}];
@@ -46,7 +46,7 @@ void traversal(benchmark::State& state, bool large, RayOrder order, bool alone, 
       state.SetIterationTime(times.thread_s[k]);
     }
   } catch (const Error& error) {
-    state.SkipWithError(error.what());  // wider than Embree has here
+    state.SkipWithError(error.what());  // this build of Embree does not support the width
     return;
   }
   count_items(state, "ray", times.rays[k]);
@@ -64,8 +64,8 @@ const bool registered = [] {
         for (const bool alone : {true, false})
           for (const uint32_t width : {1u, 4u, 8u, 16u})
             for (const bool coherent : {true, false}) {
-              if (coherent && width == 1) continue;              // the same as without
-              if (k == 0 && order != RayOrder::kSlot) continue;  // camera rays are left as they are
+              if (coherent && width == 1) continue;              // same as incoherent
+              if (k == 0 && order != RayOrder::kSlot) continue;  // camera rays are not sorted
               const std::string name =
                   std::string("traversal/") + (large ? "2M_triangles/" : "box/") + kKinds[k] +
                   order_name + (alone ? "/embree_alone" : "/as_a_render") +

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What exactness and watertightness cost: a render's rays, traced by Embree asked in many ways.
+// Cost of exact and watertight traversal: the rays of a render, traced by Embree in many modes.
 //
-//     micro_traversal_modes [ROUNDS]     ns a ray (thread time), modes interleaved
+//      micro_traversal_modes [ROUNDS]     ns per ray (thread time), modes interleaved
 #include <time.h>
 
 #include <cstdio>
@@ -18,7 +18,7 @@ namespace {
 
 using namespace scene_testing;
 
-/// Bounce rays and shadow rays of a render, in the order in which it traces them.
+/// Records the bounce and shadow rays of a render in traversal order.
 struct Kept final : RayRecorder {
   Rays bounce, shadow;
   void closest(const void*, const RaySpan& rays, uint32_t depth, bool) override {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What benchmarks of lane kernels share: every width, and time per item.
+/// Helpers of lane benchmarks: loops over lane widths, and time per item.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -10,7 +10,7 @@
 
 namespace wavecomb::micro {
 
-/// Calls f.operator()<W>() for each lane width that is built.
+/// Calls f.operator()<W>() for each lane width in the build.
 template <typename Function>
 void for_each_width(const Function& f) {
 #ifdef WAVECOMB_HAS_LANES_1
@@ -31,14 +31,14 @@ inline std::string lanes_label(size_t width) {
   return "/lanes:" + std::to_string(width);
 }
 
-/// Adds the counter `seconds_per_<item>`, for `n` items an iteration.
+/// Adds the counter `seconds_per_<item>` for `n` items per iteration.
 inline void count_items(benchmark::State& state, const char* item, size_t n) {
   using benchmark::Counter;
   state.counters[std::string("seconds_per_") + item] =
       Counter(static_cast<double>(n), Counter::kIsIterationInvariantRate | Counter::kInvert);
 }
 
-/// Keeps a packet's value from being optimised away.
+/// Prevents the compiler from removing the computation of a value.
 template <typename F>
 void keep(const F& value) {
   if constexpr (kIsScalar<F>) {

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Caustics in the same seconds, beside Mitsuba 3 (path, ptracer) and Cycles (without, with MNEE).
+"""Compare caustics at equal time with Mitsuba 3 (path, ptracer) and Cycles (with and without MNEE).
 
-    benchmarks/peers/setup                      # once: Cycles, in an environment of its own
+    benchmarks/peers/setup                      # once: Cycles, in a separate environment
     python benchmarks/peers/caustics.py caustics lens pool prism --seconds 20
-    python benchmarks/peers/caustics.py caustics --quick        # does it run?
+    python benchmarks/peers/caustics.py caustics --quick        # check that it runs
 
-Each renderer is asked for as many samples as it has in ``--seconds``, by a trial, in rounds of
-shuffled order; a picture is written for each, three to a row, after the reference, which is
-Wavecomb's with light paths, of other seeds, merged within half a pixel. relMSE = mean of (x - r)^2
-/ (r^2 + 0.01 mean(r)^2) without the worst thousandth of the pixels, of the whole picture and of
-those whose light is mostly that of light paths in the reference (caustics). Materials are those of
-the bridges: where a peer's is only the nearest, its error has that in it, so means are printed,
-too. ptracer has no MIS and does not find what the camera sees through glass.
+A pilot render determines how many samples each renderer takes in ``--seconds``; then they render in
+rounds of shuffled order. A sheet shows the images, three to a row, after the reference, which is
+Wavecomb's with light paths merged within half a pixel and other seeds. relMSE is the mean of (x -
+r)^2 / (r^2 + 0.01 mean(r)^2) without the worst thousandth of the pixels, for the whole image and
+for the caustics: pixels whose light in the reference comes mostly from light paths. Materials are
+those of the bridges. Where a peer's material is an approximation, its error includes the
+difference, so means are printed as well. ptracer has no MIS and cannot render what the camera sees
+through glass.
 """
 
 from __future__ import annotations
@@ -49,21 +50,21 @@ Image = NDArray[np.float64]
 
 
 def main() -> None:
-    """Runs the sitting, prints a table, writes pictures and JSON."""
+    """Run the benchmark, print a table, write images and JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+", choices=STAGES)
     parser.add_argument("--columns", nargs="+", default=list(COLUMNS), choices=list(COLUMNS))
-    parser.add_argument("--seconds", type=float, default=20.0, help="of a picture")
+    parser.add_argument("--seconds", type=float, default=20.0, help="time of each render")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--size", type=int, default=320, help="edge of the picture, pixels")
+    parser.add_argument("--size", type=int, default=320, help="image edge in pixels")
     parser.add_argument("--max-depth", type=int, default=8)
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--reference", type=int, default=8192, help="samples a pixel")
+    parser.add_argument("--reference", type=int, default=8192, help="samples per pixel")
     parser.add_argument("--cache", type=Path, default=ROOT / "out" / "peers")
-    parser.add_argument("--pictures", type=Path, help="folder of the sheets of pictures")
+    parser.add_argument("--pictures", type=Path, help="folder for the sheets of images")
     output = ROOT / "benchmarks" / "results" / "peers-caustics.json"
     parser.add_argument("--output", type=Path, default=output)
-    parser.add_argument("--quick", action="store_true", help="small; for trying the program")
+    parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     args = parser.parse_args()
     if args.quick:
         args.seconds, args.rounds, args.size, args.reference = 0.5, 1, 64, 256
@@ -80,7 +81,7 @@ def main() -> None:
 
 
 def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one stage, and its sheet of pictures."""
+    """Return all results of one stage, and write its sheet of images."""
     job = prepare(name, args)
     truth, mask = reference(job, args)
     scale = 1.0 / (truth**2 + 0.01 * float(truth.mean()) ** 2)
@@ -133,7 +134,7 @@ def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def prepare(name: str, args: argparse.Namespace) -> Job:
-    """The stage, and what peers get of it."""
+    """The stage, and its arrays for the peers."""
     from recording import record
     from stages import write_stage
 
@@ -146,7 +147,7 @@ def prepare(name: str, args: argparse.Namespace) -> Job:
 
 
 def opened(column: str, job: Job, args: argparse.Namespace) -> Process:
-    """The renderer of a column, loaded."""
+    """Start the renderer of a column and load the scene."""
     kind, options = COLUMNS[column]
     return Process(kind, job, args.cache / f"{column.replace(' ', '-')}.log", options)
 
@@ -154,17 +155,17 @@ def opened(column: str, job: Job, args: argparse.Namespace) -> Process:
 def picture(
     process: Process, spp: int, seed: int, args: argparse.Namespace
 ) -> tuple[Image, dict[str, Any]]:
-    """A picture, and what the renderer says of it."""
+    """Return an image, and the statistics that the renderer reports."""
     file = args.cache / "caustics.npy"
     answer = process.render(spp, seed, file)
     return np.load(file).astype(np.float64), answer
 
 
 def samples(process: Process, args: argparse.Namespace) -> int:
-    """As many as fit into the seconds; squares, which Mitsuba's multijitter keeps."""
+    """Samples that fit into the time; squares, as Mitsuba's multijitter requires."""
     spp = 4
     while True:
-        process.render(spp, TRIAL_SEED)  # compiles
+        process.render(spp, TRIAL_SEED)  # compiles kernels
         took = process.render(spp, TRIAL_SEED + spp)["seconds"]
         more = args.seconds / max(took, 1e-3)
         if more < 6 or spp >= args.reference:
@@ -173,7 +174,7 @@ def samples(process: Process, args: argparse.Namespace) -> int:
 
 
 def reference(job: Job, args: argparse.Namespace) -> tuple[Image, NDArray[np.bool_]]:
-    """A converged picture, and where its light is mostly that of light paths."""
+    """A converged image, and a mask of pixels whose light comes mostly from light paths."""
     import wavecomb
     from wavecomb.picture.compare import luminance
 

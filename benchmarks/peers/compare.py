@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavecomb beside Mitsuba 3 and Cycles on the same stages: speed, noise, memory, first picture.
+"""Compare Wavecomb with Mitsuba 3 and Cycles: speed, noise, memory, time to first image.
 
-    benchmarks/peers/setup                      # once: Cycles, in an environment of its own
+    benchmarks/peers/setup                      # once: Cycles, in a separate environment
     python benchmarks/peers/compare.py --rounds 5 --plain --stages cornell,mixed,dragon,room
     python benchmarks/peers/compare.py --stages smoke-200,fog-cornell --max-depth 24
     python benchmarks/peers/compare.py --stages head --renderers wavecomb,cycles --max-depth 12
     python benchmarks/peers/compare.py --stages shot.usd          # or any stage of meshes
-    python benchmarks/peers/compare.py --quick                    # does it run?
+    python benchmarks/peers/compare.py --quick                    # check that it runs
 
-All renderers get the same arrays, camera, box filter and depth; no denoising, clamping, adaptive
-sampling; roulette is as each has it by default. What materials become is in mitsuba_bridge.py and
-cycles_bridge.py.
+All renderers use the same arrays, camera, box filter and path depth, without denoising, clamping or
+adaptive sampling. Roulette is each renderer's default. mitsuba_bridge.py and cycles_bridge.py
+describe the conversion of materials.
 
-- Speed: in each round every renderer starts in a fresh process, in shuffled order. It loads the
-  stage (Wavecomb reads USD, the others the arrays that Wavecomb's reader made of it), renders one
-  sample (start to first picture), then a short and a long picture. The marginal rate is more
-  samples over more time. Peak memory is that of the process.
-- Noise: relMSE = mean of (x - r)^2 / (r^2 + 0.01) at equal samples, r each renderer's own converged
-  picture of other seeds, less the error of r itself; mean over seeds. Noise does not depend on the
-  load of the machine; pictures are kept under --cache and made once for each version and setting.
-- Efficiency is 1 / (relMSE * seconds), seconds by the marginal rate at full size.
+- Speed: in each round every renderer starts in a new process, in shuffled order. It loads the stage
+  (Wavecomb reads USD, the others read the arrays that Wavecomb's loader made), renders one sample
+  (start to first image), then an image with few and one with many samples. The marginal rate is the
+  difference in samples over the difference in time. Peak memory is that of the process.
+- Noise: relMSE = mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the error of r; mean over
+  seeds. r is each renderer's converged image with other seeds. Noise does not depend on the load of
+  the machine; images are cached in --cache by version and settings.
+- Efficiency is 1 / (relMSE * seconds), with seconds by the marginal rate at full size.
 
 Ratios of Wavecomb to the others are medians within rounds, with a 95 % bootstrap interval.
 """
@@ -48,7 +48,7 @@ STAGES = (*SCENES, *VOLUMES, *BELOW)
 
 
 def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
-    """Writes a generated stage where it is missing, and the arrays of any."""
+    """Write a generated stage if it is missing, and the arrays of any stage."""
     from recording import record, write_volumes
     from stages import write_stage
 
@@ -59,7 +59,7 @@ def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
     else:
         stage = Path(scene)
     recorded = args.cache / f"{label(scene, args)}-recorded"
-    # Always anew: the reader may have changed.
+    # Always record again, because the loader may have changed.
     scene_record = record(stage)
     write_volumes(scene_record, recorded)
     scene_record.save(recorded)
@@ -70,14 +70,14 @@ def prepare(scene: str, size: int, args: argparse.Namespace) -> Job:
 
 
 def label(scene: str, args: argparse.Namespace) -> str:
-    """What a stage is called in tables and files."""
+    """Name of a stage in tables and files."""
     if scene not in STAGES:
         return Path(scene).stem
     return f"{scene}-plain" if args.plain and scene in SCENES and scene != "room" else scene
 
 
 def measure(scene: str, args: argparse.Namespace) -> dict[str, Any]:
-    """All figures of one stage."""
+    """Return all results of one stage."""
     from dataclasses import replace
 
     job = prepare(scene, args.size, args)
@@ -98,9 +98,9 @@ def measure(scene: str, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def differ(ours: Any, theirs: Any) -> dict[str, Any]:
-    """Converged pictures beside each other, both averaged over blocks of 4 by 4 pixels as well.
+    """Compare converged images by pixel and by blocks of 4 x 4 pixels.
 
-    Textures are filtered by Wavecomb alone, so that pixels differ where mean colours do not.
+    Only Wavecomb filters textures, so pixels may differ where mean colours do not.
     """
     edge = len(ours) // 4 * 4
     a, b = (
@@ -113,7 +113,7 @@ def differ(ours: Any, theirs: Any) -> dict[str, Any]:
 
 
 def show(path: Path, names: list[str], found: Noise) -> None:
-    """A PNG: above, each renderer's picture at equal samples; below, what it converges to."""
+    """Write a PNG: above, each renderer's image at equal samples; below, its converged image."""
     from wavecomb.picture.image import write_png
 
     rows = [np.concatenate([f(n) for n in names], axis=1) for f in (found.noisy, found.converged)]
@@ -121,7 +121,7 @@ def show(path: Path, names: list[str], found: Noise) -> None:
 
 
 def arguments() -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
 
     def listed(known: Any) -> Any:
         def parse(text: str) -> list[str]:
@@ -138,21 +138,31 @@ def arguments() -> argparse.Namespace:
     )
     add = parser.add_argument
     add("--stages", type=listed(STAGES), default=list(SCENES), help=",".join(STAGES) + ", or files")
-    add("--plain", action="store_true", help="generated stages without names of programs")
+    add("--plain", action="store_true", help="generate stages in exporter style")
     add("--renderers", type=listed(RENDERERS), default=list(USUAL), help=",".join(RENDERERS))
     add("--rounds", type=int, default=3)
     add("--threads", type=int, default=2)
-    add("--size", type=int, default=600, help="edge of the timed picture, pixels")
+    add("--size", type=int, default=600, help="edge of the timed image in pixels")
     add("--max-depth", type=int, default=7, help="scattering vertices")
-    add("--only", choices=("speed", "noise"), help="half of it")
-    add("--noise-size", type=int, default=256, help="edge of the pictures of which noise is taken")
+    add("--only", choices=("speed", "noise"), help="run only this half")
+    add("--noise-size", type=int, default=256, help="edge of the images that measure noise")
     add("--noise-spp", type=int, default=64)
     add("--noise-seeds", type=int, default=4)
-    add("--reference-spp", type=int, default=4096, help="of a converged picture; in steps of 256")
-    add("--set", type=json.loads, default={}, help="settings of Wavecomb, JSON")
-    add("--seed", type=int, default=1, help="of the order of turns")
-    add("--quick", action="store_true", help="one round of small pictures, for a trial")
-    add("--cache", type=Path, default=ROOT / "out" / "peers", help="stages, pictures, logs")
+    add(
+        "--reference-spp",
+        type=int,
+        default=4096,
+        help="samples of converged images; multiple of 256",
+    )
+    add("--set", type=json.loads, default={}, help="settings of Wavecomb as JSON")
+    add("--seed", type=int, default=1, help="seed of the order of turns")
+    add("--quick", action="store_true", help="one round of small images, to check that it runs")
+    add(
+        "--cache",
+        type=Path,
+        default=ROOT / "out" / "peers",
+        help="folder of stages, images and logs",
+    )
     add("--output", type=Path, help="JSON (default: benchmarks/results/peers.json)")
     args = parser.parse_args()
     if args.quick:
@@ -164,7 +174,7 @@ def arguments() -> argparse.Namespace:
 
 
 def told() -> list[str]:
-    """The command line but for where files go."""
+    """The command line without file locations."""
     words = iter(sys.argv[1:])
     out = []
     for word in words:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded scene for Cycles: the same arrays, lights, camera and nearest materials.
+"""Convert a recorded scene to Cycles: same arrays, lights and camera, closest materials.
 
-Needs the environment of benchmarks/peers/setup, and a process of its own.
+Needs the environment of benchmarks/peers/setup and a separate process.
 
-Rect and disk lights are area lamps (one-sided; they block no ray), spheres are point lamps with a
-radius, distant lights suns, the dome is the world. Emissive meshes shine to both sides, as ours do.
-Instances of one mesh and one material share their data; Cycles copies a mesh for each material.
-Metal is the F82 tint with multiple scattering, as ours; glass, plastic and principled are
-Principled, whose layers are the nearest.
+Rect and disk lights become area lights (one-sided, invisible to rays), spheres become point lights
+with a radius, distant lights become suns, and the dome becomes the world. Emissive meshes emit to
+both sides, as in Wavecomb. Instances of one mesh and material share their data; Cycles copies a
+mesh for each material. Metal is F82 tint with multiple scattering, as in Wavecomb. Glass, plastic
+and principled become Principled, whose layers are the closest equivalent.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from recorded import INHERIT, Curves, Mesh, Recorded
 Matrix = NDArray[np.float64]
 
 _DOME = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""From the dome's frame (pole +Y, image's middle +Z) to that of Cycles (pole +Z, middle +X)."""
+"""Rotation from the dome's frame (pole +Y, image centre +Z) to Cycles' (pole +Z, centre +X)."""
 
 
 @dataclass(frozen=True)
 class CyclesSettings:
-    """How Cycles renders.
+    """Render settings of Cycles.
 
     Attributes:
         width: Pixels.
         height: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
-        threads: Of the render.
-        light_tree: Chooses lights by a tree; else alike.
-        shadow_caustics: Light of lamps through glass is found by walks on the glass (MNEE).
-        pattern: Cycles' name of a sampler: TABULATED_SOBOL, BLUE_NOISE, SOBOL_BURLEY.
+        threads: Threads of the render.
+        light_tree: Select lights by a tree instead of uniformly.
+        shadow_caustics: Find light through glass by manifold walks (MNEE).
+        pattern: Cycles' sampler: TABULATED_SOBOL, BLUE_NOISE, SOBOL_BURLEY.
     """
 
     width: int
@@ -55,10 +55,10 @@ class CyclesSettings:
 
 
 class CyclesScene:
-    """A recorded scene in Cycles' hands. There is one at a time: Blender has one main database."""
+    """A recorded scene in Cycles. Only one can exist: Blender has one main database."""
 
     def __init__(self, recorded: Recorded, settings: CyclesSettings, folder: Path) -> None:
-        """``folder``: where the files of volumes are."""
+        """``folder`` contains the volume files."""
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.recorded = recorded
         self._shadow_caustics = settings.shadow_caustics
@@ -89,7 +89,7 @@ class CyclesScene:
         return pixels.reshape(height, width, 4)[::-1, :, :3].copy()
 
     def _start(self, spp: int, seed: int) -> None:
-        # With persistent data Cycles sees new settings of the scene only where the frame changes.
+        # With persistent data, Cycles updates scene settings only when the frame changes.
         self.scene.cycles.samples = spp
         self.scene.cycles.seed = seed
         self.scene.update_tag()
@@ -152,7 +152,7 @@ class CyclesScene:
         if camera.get("lens_radius", 0.0) > 0.0:
             data.dof.use_dof = True
             data.dof.focus_distance = camera["focus_distance"]
-            # f-number from the radius; Blender's lens is in mm, its scene in metres.
+            # f-number from the radius; Blender's focal length is in mm, its scene in metres.
             data.dof.aperture_fstop = data.lens * 1e-3 / (2.0 * camera["lens_radius"])
         self.scene.camera = self._object("camera", data, camera["transform"])
 
@@ -177,13 +177,13 @@ class CyclesScene:
     def _sky(self, nodes: Nodes, dome: dict[str, Any]) -> Any:
         texture = self.recorded.textures[dome["texture"]]
         if texture["pixels"].dtype == np.uint8:
-            raise NotImplementedError("a dome of 8 bit")
+            raise NotImplementedError("an 8-bit dome image")
         colour = np.asarray(dome.get("color", (1.0, 1.0, 1.0)), np.float32)
         pixels = texture["pixels"][:, :, :3].astype(np.float32) * colour
         frame = dome["transform"][:3, :3]
         frame = frame / np.linalg.norm(frame, axis=1)[:, None]
         direction = nodes.add("ShaderNodeTexCoord").outputs["Generated"]
-        # The rows of the frame are the axes of the dome: they take the world to it.
+        # The rows of the frame are the dome's axes, so the matrix maps world to dome.
         turned = nodes.add("ShaderNodeMapping", Vector=direction)
         turn = BlenderMatrix((_DOME @ frame).tolist())
         turned.inputs["Rotation"].default_value = turn.to_euler("XYZ")
@@ -210,7 +210,7 @@ class CyclesScene:
                 data.shape = "DISK"
                 data.size = 2.0 * light["radius"]
                 area = np.pi * light["radius"] ** 2 * size[0] * size[1]
-            # Power of a one-sided Lambertian lamp: pi A L.
+            # Power of a one-sided Lambertian emitter: pi A L.
             power = np.pi * radiance * (1.0 if light.get("normalize") else area)
         elif kind == "sphere":
             radius = light["radius"] * abs(np.linalg.det(rows[:3, :3])) ** (1 / 3)
@@ -239,7 +239,7 @@ class CyclesScene:
             key = (placed.mesh, placed.material)
             mesh = self.recorded.meshes[placed.mesh]
             if key not in made and placed.mesh in shapes and mesh.face_materials is None:
-                # A copy shares its arrays; Cycles has one set of triangles for each, all the same.
+                # Copies share their arrays, so Cycles stores the triangles once.
                 made[key] = shapes[placed.mesh].copy()
                 made[key].materials[0] = self._material(placed.material)
             elif key not in made:

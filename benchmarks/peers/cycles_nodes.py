@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded materials and textures as shader nodes of Cycles."""
+"""Convert recorded materials and textures to shader nodes of Cycles."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from recorded import Recorded
 
 _SMOOTH = 0.0317
-"""Below this roughness Wavecomb takes a surface for smooth."""
+"""Wavecomb treats surfaces below this roughness as smooth."""
 
 
 class Nodes:
-    """A material under construction: nodes and their links."""
+    """A material under construction: its nodes and their connections."""
 
     def __init__(self, tree: Any, images: Images) -> None:
         self.tree = tree
@@ -23,7 +23,7 @@ class Nodes:
         tree.nodes.clear()
 
     def add(self, kind: str, **inputs: Any) -> Any:
-        """A node; inputs by the names on it, underscores for blanks: values or sockets."""
+        """Add a node. Keywords set inputs to values or sockets; underscores mean blanks."""
         node = self.tree.nodes.new(kind)
         for name, value in inputs.items():
             socket = node.inputs[name.replace("_", " ")]
@@ -36,7 +36,7 @@ class Nodes:
         return node
 
     def out(self, kind: str, socket: Any, use: str = "Surface") -> None:
-        """The output node of a material or world."""
+        """Connect a socket to the output node of a material or world."""
         self.tree.links.new(socket, self.add(kind).inputs[use])
 
     def vector(self, operation: str, *operands: Any) -> Any:
@@ -51,12 +51,12 @@ class Nodes:
         return node.outputs["Vector"]
 
     def texture(self, use: dict[str, Any], signed: bool = False) -> Any:
-        """Texel * scale + bias; signed: as it is stored, for a node that takes [0, 1] itself."""
+        """Texel * scale + bias; with `signed`, as stored, for nodes that map [0, 1]."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
         node.image, node.extension = self.images.get(use["texture"])
         a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
         if b or d:
-            raise NotImplementedError("a texture that is turned")
+            raise NotImplementedError("a rotated texture")
         if (a, c, e, f) != (1.0, 0.0, 1.0, 0.0):
             uv = self.add("ShaderNodeUVMap").outputs["UV"]
             moved = self.vector("MULTIPLY_ADD", uv, (a, e, 1.0), (c, f, 0.0))
@@ -80,20 +80,20 @@ class Nodes:
         return value
 
     def parameter(self, m: dict[str, Any], name: str, default: Any) -> Any:
-        """A parameter: texture or value."""
+        """A parameter as a texture or a value."""
         use = m.get("textures", {}).get(name)
         return self.texture(use) if use is not None else m.get(name, default)
 
 
 class Images:
-    """Textures as images, each made once. 8 bit stays 8 bit."""
+    """Blender images of recorded textures, each made once; 8-bit textures stay 8-bit."""
 
     def __init__(self, recorded: Recorded) -> None:
         self.recorded = recorded
         self._made: dict[int, Any] = {}
 
     def get(self, number: int) -> tuple[Any, str]:
-        """An image and how it goes on beyond its edges."""
+        """Return an image and its extension mode."""
         texture = self.recorded.textures[number]
         if number not in self._made:
             pixels = texture["pixels"]
@@ -106,7 +106,7 @@ class Images:
 
 
 def image(values: NDArray[np.float32], space: str, small: bool) -> Any:
-    """An image of (height, width, 1 to 4) values, top row first."""
+    """Make an image of (height, width, 1 to 4) values, top row first."""
     height, width, channels = values.shape
     four = np.ones((height, width, 4), np.float32)
     four[:, :, :channels] = values
@@ -122,7 +122,7 @@ def image(values: NDArray[np.float32], space: str, small: bool) -> Any:
 
 
 def make_material(recorded: Recorded, number: int, images: Images) -> Any:
-    """A material of Blender for a recorded one; the nearest nodes."""
+    """Make a Blender material for a recorded one, with the closest nodes."""
     m = recorded.materials[number]
     made = bpy.data.materials.new(m.get("name") or f"material{number}")
     made.use_nodes = True
@@ -187,7 +187,7 @@ def _metal(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Glass whose colour tints what goes through only: Principled takes the root of it."""
+    """Glass whose colour tints transmission only; Principled takes the square root of it."""
     tint = np.asarray(m.get("base_color", (1.0,) * 3))
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
@@ -202,7 +202,7 @@ def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Plastic, too: a diffuse base under an interface."""
+    """Principled, and plastic: a diffuse base under an interface."""
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
         Base_Color=nodes.parameter(m, "base_color", (0.18,) * 3),
@@ -218,7 +218,7 @@ def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Base, specular, coat and what is below; without film, fuzz and transmission."""
+    """Base, specular, coat and subsurface; without film, fuzz and transmission."""
     layers = m.get("openpbr", {})
     below = float(layers.get("subsurface_weight", 0.0))
     radius = np.asarray(layers.get("subsurface_radius", (0.0,) * 3), np.float64)
@@ -243,7 +243,7 @@ def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _hair(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Fibres by the colour of many; what graphs say of each strand is left out."""
+    """Hair by the colour of many fibres; graphs per strand are ignored."""
     node = nodes.tree.nodes.new("ShaderNodeBsdfHairPrincipled")
     node.model = "CHIANG"
     node.parametrization = "COLOR"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded volumes for Cycles: grids by the .vdb file of ``write_volumes``, even ones in a box."""
+"""Convert recorded volumes to Cycles: grids by the .vdb files of ``write_volumes``, or boxes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from cycles_nodes import Images, Nodes
 
 
 def make_volume(volume: dict[str, Any], folder: Path, images: Images) -> Any:
-    """The data of an object of Blender, whose place is the volume's ``to_world``."""
+    """Make the data of a Blender object, which is placed by the volume's ``to_world``."""
     if volume.get("color") is not None or any(volume.get("emission", (0.0,))):
-        raise NotImplementedError("volumes that shine, or whose colour a grid says")
+        raise NotImplementedError("volumes with emission or a colour grid")
     if volume.get("density") is None:
         low, high = (np.array(end, np.float64) for end in volume["bounds"])
         corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]

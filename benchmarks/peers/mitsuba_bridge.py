@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded scene for Mitsuba 3: the same arrays, lights, camera and nearest materials.
+"""Convert a recorded scene to Mitsuba 3: the same arrays, lights, camera and closest materials.
 
-What corresponds exactly: geometry; rect, disk, sphere and dome lights; emissive meshes that are
-closed (ours shine to both sides, Mitsuba's outwards); diffuse, smooth metal of a measured index,
-smooth dielectric; the camera, with a box filter. GGX agrees to within noise where little is
-scattered between facets (Mitsuba does not give that back). What is only the nearest: metal by
-colour (no Schlick there), plastic, principled, OpenPBR but for its glass and its metal without a
-tint. A distant light of some angle becomes a far sphere.
+Exact equivalents: geometry; rect, disk, sphere and dome lights; closed emissive meshes (Wavecomb's
+emit to both sides, Mitsuba's outwards); diffuse, smooth metal with measured index, smooth
+dielectric; the camera with a box filter. GGX agrees within noise if multiple scattering between
+microfacets is small, which Mitsuba does not compensate. Approximations: metal by colour (no Schlick
+in Mitsuba), plastic, principled, and OpenPBR except for its glass and its metal without a tint. A
+distant light with an angle becomes a distant sphere.
 """
 
 from __future__ import annotations
@@ -25,20 +25,22 @@ from recorded import INHERIT, Mesh, Placed, Recorded
 
 Matrix = NDArray[np.float64]
 _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
-"""Half a turn about y: between what looks or shines along -z and what does along +z."""
+"""Half a turn about y, from objects that point along -z to Mitsuba's, which point along +z."""
 
 MOST_PATHS = 1 << 25
-"""Of one pass: the vectorized variants hold all paths of a pass in memory, some 100 bytes each.
-A timed picture must be one pass (600 x 600 x 64 is): each further seed is compiled anew."""
+"""Maximum number of paths per pass: the vectorised variants hold all paths of a pass in memory,
+about 100 bytes each. A timed image must be one pass (600 x 600 x 64 is): each further seed compiles
+anew.
+"""
 
 _FAR = 1e4
-"""Distance of the sphere that stands for a distant light, in sizes of the scene."""
+"""Distance of the sphere that replaces a distant light, in sizes of the scene."""
 
 
 def find_llvm() -> bool:
-    """Names a libLLVM that Dr.Jit can use (16 or newer), where the environment does not.
+    """Set the path of a libLLVM that Dr.Jit can use (16 or newer), unless the environment has one.
 
-    Returns whether there is one: with an older one Dr.Jit ends the process.
+    Returns whether there is one; with an older one Dr.Jit would end the process.
     """
     if "DRJIT_LIBLLVM_PATH" in os.environ:
         return True
@@ -56,10 +58,10 @@ def find_llvm() -> bool:
 
 
 def load_mitsuba(variant: str | None = None, threads: int | None = None) -> ModuleType:
-    """Mitsuba in a variant; None: llvm_ad_rgb where it runs, else scalar_rgb.
+    """Import Mitsuba in a variant. None: llvm_ad_rgb if it works, else scalar_rgb.
 
     Raises:
-        ImportError: Mitsuba or the variant is not there.
+        ImportError: Mitsuba or the variant is missing.
     """
     has_llvm = find_llvm()
     if not has_llvm and (variant or "").startswith("llvm"):
@@ -76,23 +78,23 @@ def load_mitsuba(variant: str | None = None, threads: int | None = None) -> Modu
                 dr.eval(dr.arange(mi.Float, 3) + 1)
             mi.set_log_level(mi.LogLevel.Error)
             return mi
-        except Exception as error:  # Dr.Jit raises several kinds where LLVM is missing
+        except Exception as error:  # Dr.Jit raises various exceptions without LLVM
             last = error
     raise ImportError(f"Mitsuba has no variant that runs here: {last}")
 
 
 @dataclass(frozen=True)
 class PeerSettings:
-    """How Mitsuba renders.
+    """Render settings of Mitsuba.
 
     Attributes:
         width: Pixels.
         height: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
-        rr_depth: Vertices before roulette; by default none.
-        instancing: Shape groups, as far as Mitsuba allows them; else all is copied.
-        sampler: Mitsuba's name of one.
-        integrator: Mitsuba's name of one, where there are volumes; or ptracer, paths from lights.
+        rr_depth: Vertices before roulette; by default there is none.
+        instancing: Use shape groups where Mitsuba supports them; otherwise copy all instances.
+        sampler: Name of a Mitsuba sampler.
+        integrator: Name of the integrator for volumes; or ptracer for light tracing.
     """
 
     width: int
@@ -105,7 +107,7 @@ class PeerSettings:
 
 
 class MitsubaScene:
-    """A recorded scene in Mitsuba's hands."""
+    """A recorded scene in Mitsuba."""
 
     def __init__(self, mi: ModuleType, recorded: Recorded, settings: PeerSettings) -> None:
         self.mi = mi
@@ -134,7 +136,7 @@ class MitsubaScene:
         self.scene = mi.load_dict(scene)
 
     def render(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
-        """(height, width, 3); in passes where all paths at once would not fit into memory."""
+        """Render (height, width, 3); in several passes if all paths would not fit into memory."""
         pixels = self.settings.width * self.settings.height
         passes = -(-spp * pixels // MOST_PATHS)
         most = -(-spp // passes)
@@ -181,7 +183,7 @@ class MitsubaScene:
         if camera.get("projection") == "orthographic":
             if camera.get("lens_radius", 0.0) > 0:
                 raise NotImplementedError("an orthographic camera with a lens")
-            # Mitsuba's sees from -1 to 1: its transform says how much that is.
+            # Mitsuba's window is from -1 to 1, so the transform contains its size.
             del sensor["fov"], sensor["fov_axis"]
             window = np.diag([half_x, half_x, 1.0, 1.0])
             sensor["type"] = "orthographic"
@@ -191,7 +193,7 @@ class MitsubaScene:
         return sensor
 
     def _transform(self, rows: Matrix) -> Any:
-        """A transform of row vectors (translation in the last row)."""
+        """Transform from a matrix for row vectors (translation in the last row)."""
         return self.mi.ScalarTransform4f(np.ascontiguousarray(rows.T))
 
     # ---- lights ----------------------------------------------------------------------------------
@@ -233,7 +235,7 @@ class MitsubaScene:
         return {"type": "rgb", "value": [float(v) for v in colour]}
 
     def _lamp(self, shape: dict[str, Any], radiance: NDArray[Any]) -> dict[str, Any]:
-        """A shape that shines and reflects nothing (Mitsuba's default would reflect a half)."""
+        """An emissive shape without reflection; Mitsuba's default BSDF would reflect a half."""
         shape["emitter"] = {"type": "area", "radiance": self._rgb(radiance)}
         shape["bsdf"] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
         return shape
@@ -293,13 +295,13 @@ class MitsubaScene:
         return out
 
     def _may_be_instanced(self, mesh: Mesh, placed: Placed) -> bool:
-        """Mitsuba allows no emitters in a group."""
+        """Whether the mesh may be instanced: Mitsuba allows no emitters in a shape group."""
         ids = [placed.material] if mesh.face_materials is None else np.unique(mesh.face_materials)
         unit = np.array_equal(placed.transform, np.eye(4))
         return not unit and not any(self._emission(int(number)) for number in ids)
 
     def _parts(self, mesh: Mesh, inherited: int, transform: Matrix, name: str) -> dict[str, Any]:
-        """A mesh, cut by material."""
+        """Split a mesh by material."""
         if mesh.curves is not None:
             raise NotImplementedError("curves")
         if mesh.face_materials is None:
@@ -424,7 +426,7 @@ class MitsubaScene:
         return self._rough(out, m)
 
     def _rough(self, out: dict[str, Any], m: dict[str, Any]) -> dict[str, Any]:
-        """The rough twin of a smooth material where roughness asks for it."""
+        """Return the rough variant of a plugin if the roughness requires it."""
         use = m.get("textures", {}).get("roughness")
         roughness = m.get("roughness", 0.5)
         if use is None and roughness < 0.0317:
@@ -482,7 +484,7 @@ class MitsubaScene:
         return self._bitmap(use, np.clip(self._values(use), 0.0, 1.0))
 
     def _values(self, use: dict[str, Any]) -> NDArray[np.float32]:
-        """Texels of a use, channel chosen, scaled and biased: (h, w, 1 or 3)."""
+        """Texels of a texture use after channel selection, scale and bias: (h, w, 1 or 3)."""
         pixels = _linear(self.recorded.textures[use["texture"]])
         four = np.ones((*pixels.shape[:2], 4), np.float32)
         four[:, :, : pixels.shape[2]] = pixels
@@ -501,7 +503,7 @@ class MitsubaScene:
         if key not in self._textures:
             texture = self.recorded.textures[use["texture"]]
             wrap = {"repeat": "repeat", "mirror": "mirror"}.get(texture.get("wrap_s", ""), "clamp")
-            # Mitsuba's v runs down: w = 1 - v.
+            # Mitsuba's v points down: w = 1 - v.
             to_uv = np.array([[a, -b, b + c], [-d, e, 1.0 - e - f], [0.0, 0.0, 1.0]])
             self._textures[key] = self.mi.load_dict(
                 {
@@ -516,7 +518,7 @@ class MitsubaScene:
 
 
 def _linear(texture: dict[str, Any]) -> NDArray[np.float32]:
-    """Pixels of a recorded texture, linear float32."""
+    """Pixels of a recorded texture as linear float32."""
     pixels = texture["pixels"]
     if pixels.dtype != np.uint8:
         return np.asarray(pixels, np.float32)
@@ -530,9 +532,9 @@ def _linear(texture: dict[str, Any]) -> NDArray[np.float32]:
 
 
 def _rows_to_poles(image: NDArray[Any]) -> NDArray[np.float32]:
-    """A latlong image whose first and last rows are at the poles, as Mitsuba takes them.
+    """Resample a latlong image to Mitsuba's convention, with the first and last rows at the poles.
 
-    Ours and OpenEXR's rows have their centres half a row inwards.
+    In Wavecomb and OpenEXR the centres of these rows are half a row inside.
     """
     height = len(image)
     at = np.arange(height) * (height / (height - 1)) - 0.5

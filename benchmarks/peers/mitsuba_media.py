@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded volumes as media of Mitsuba, each in a box that is not seen.
+"""Convert recorded volumes to Mitsuba media, each in an invisible box.
 
-Mitsuba has no overlapping media, and none that shine; a look's colour by a grid is left to tests.
+Mitsuba has no overlapping and no emissive media. Colours by grid are left to the tests.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Matrix = NDArray[np.float64]
 
 
 class Media:
-    """What a scene's dictionary gets of volumes, and the medium that the camera is in."""
+    """The scene dictionary entries of volumes, and the medium that contains the camera."""
 
     def __init__(self, mi: ModuleType, recorded: Recorded) -> None:
         self._mi = mi
@@ -26,7 +26,7 @@ class Media:
         at = recorded.camera["transform"][3] if recorded.camera else np.array([0, 0, 0, 1.0])
         for k, volume in enumerate(recorded.volumes):
             if volume.get("color") is not None or any(volume.get("emission", (0.0,))):
-                raise NotImplementedError("volumes that shine, or whose colour a grid says")
+                raise NotImplementedError("volumes with emission or a colour grid")
             box, medium = self._medium(volume)
             self.entries[f"medium{k}"] = medium
             self.entries[f"volume{k}"] = {
@@ -43,7 +43,7 @@ class Media:
         return self._mi.ScalarTransform4f(np.ascontiguousarray(rows.T))
 
     def _medium(self, volume: dict[str, Any]) -> tuple[Matrix, dict[str, Any]]:
-        """A volume's box, as rows from the unit cube to the world, and the medium in it."""
+        """Transform of a volume's box from the unit cube to the world, and its medium."""
         extinction = np.asarray(volume["extinction"], np.float64)
         medium: dict[str, Any] = {
             "phase": {"type": "hg", "g": float(volume.get("anisotropy", 0.0))},
@@ -59,7 +59,7 @@ class Media:
         values, box = dense(volume["density"])
         box = box @ volume["to_world"]
         scale = float(extinction.max())
-        # Mitsuba's are z, y, x; one channel where light of all colours goes as far.
+        # Mitsuba's arrays are indexed z, y, x; one channel suffices if extinction is grey.
         grid = np.ascontiguousarray(values.T)[..., None]
         if np.ptp(extinction) > 0.0:
             grid = grid * (extinction / scale).astype(np.float32)
@@ -73,7 +73,7 @@ class Media:
 
 
 def _from_minus_one() -> Matrix:
-    """From [-1, 1]^3 to the unit cube, in rows."""
+    """Transform from [-1, 1]^3 to the unit cube, for row vectors."""
     rows = np.diag([0.5, 0.5, 0.5, 1.0])
     rows[3, :3] = 0.5
     return rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Noise at equal samples: relMSE of each renderer against its own converged picture."""
+"""Noise at equal samples: relMSE of each renderer against its converged image."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from renderers import RENDERERS, Job, Process
 
 Picture = NDArray[np.float64]
 _BATCH = 256
-"""Samples per pixel of a batch of a converged picture: a square, for multijitter."""
+"""Samples per pixel of one batch of a converged image; a square, as multijitter requires."""
 _REFERENCE = {"mitsuba": "mitsuba-llvm-multijitter", "cycles": "cycles-no-tree"}
-"""Who makes the converged picture of a family; else the renderer itself."""
+"""Renderer that makes the converged image of a family; by default the renderer itself."""
 
 
 _OUTLIERS = 1e-3
-"""Share of pixels, the worst ones, that the trimmed error leaves out."""
+"""Fraction of pixels, the worst ones, that the trimmed error leaves out."""
 
 
 def rel_errors(picture: Picture, reference: Picture) -> Picture:
-    """(x - r)^2 / (r^2 + 0.01) of each pixel, the worst last. Their mean is the relMSE."""
+    """Return (x - r)^2 / (r^2 + 0.01) per pixel in ascending order; the mean is the relMSE."""
     errors = (picture - reference) ** 2 / (reference**2 + 0.01)
     return np.sort(errors.mean(axis=2).ravel())
 
 
 class Noise:
-    """Pictures and their error for one stage; all is kept in a folder and found again."""
+    """Images and errors of one stage, cached in a folder."""
 
     def __init__(
         self, job: Job, cache: Path, spp: int, seeds: int, reference_spp: int, ours: dict[str, Any]
@@ -44,10 +44,10 @@ class Noise:
         self.ours = ours
 
     def measure(self, name: str) -> dict[str, Any]:
-        """Error of each seed, less the converged picture's own; the mean it converges to.
+        """Error of each seed minus that of the converged image, and the converged mean.
 
-        relMSE is a matter of chance where a few pixels catch a bright caustic path, so there is a
-        trimmed one as well: without the worst 0.1 % of pixels, over 1 + N / N_ref.
+        A few pixels with bright caustic paths make relMSE vary by chance. The trimmed error leaves
+        out the worst 0.1 % of pixels and is divided by 1 + N / N_ref instead.
         """
         options = self.ours if name == "wavecomb" else {}
         family = RENDERERS[name].family
@@ -78,21 +78,21 @@ class Noise:
         }
 
     def converged(self, name: str) -> Picture:
-        """The converged picture of a renderer."""
+        """Return the converged image of a renderer."""
         return self._converged(_REFERENCE.get(RENDERERS[name].family, name))[0]
 
     def noisy(self, name: str) -> Picture:
-        """The picture of the first seed."""
+        """Return the image of the first seed."""
         options = self.ours if name == "wavecomb" else {}
         with _Lazy(name, self.job, self.cache, options) as process:
             found = np.load(self.cache / f"{process.key()}-noise{self.spp}.npz")["pictures"][0]
         return np.asarray(found, np.float64)
 
     def _converged(self, name: str) -> tuple[Picture, float]:
-        """Mean of batches of other seeds, and its relMSE as their spread tells it.
+        """Mean of batches with other seeds, and its relMSE estimated from their spread.
 
-        E (x - r)^2 = var x + var r, so that the second is taken off; where errors fall as 1 / N it
-        is the same as dividing by 1 + N / N_ref.
+        E (x - r)^2 = var x + var r, so var r is subtracted. Where errors fall as 1 / N, this equals
+        division by 1 + N / N_ref.
         """
         options = self.ours if name == "wavecomb" else {}
         batches = max(2, self.reference_spp // _BATCH)
@@ -111,7 +111,7 @@ class Noise:
 
 
 class _Lazy:
-    """A process that is started when a picture is asked for, or to learn its version once."""
+    """A process that starts when an image, or once its version, is needed."""
 
     _versions: ClassVar[dict[str, str]] = {}
 
@@ -134,7 +134,7 @@ class _Lazy:
         return self._process
 
     def key(self) -> str:
-        """A name for the pictures: renderer, its version, stage and settings."""
+        """Cache key of the images: renderer, version, stage and settings."""
         kind = RENDERERS[self.name].kind
         if kind not in self._versions:
             self._started()
@@ -145,7 +145,7 @@ class _Lazy:
         return f"{self.job.stage.stem}-{self.name}-{number}"
 
     def picture(self, spp: int, seed: int) -> tuple[Picture, int]:
-        """A picture, and the samples per pixel it got."""
+        """Return an image and the samples per pixel that were taken."""
         file = self.cache / "picture.npy"
         answer = self._started().render(spp, seed, file)
         print(f"{self.name}: {spp} spp, {answer['seconds']:.1f} s", file=sys.stderr)

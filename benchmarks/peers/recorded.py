@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scene is made of, as plain arrays: from one renderer's process to another's.
+"""Scene contents as plain arrays, for exchange between the processes of renderers.
 
-Needs NumPy only, so that it loads in an environment of its own (Blender's).
+Needs only NumPy, so that it loads in Blender's environment.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curves:
-    """What ``SceneBuilder.add_curves`` is given beside what a mesh is; points are positions."""
+    """Arguments of ``SceneBuilder.add_curves`` beside those of ``Mesh``."""
 
     kind: str
     segments: NDArray[np.uint32]
     radii: NDArray[np.float32]
 
     def strands(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Points that curves pass through, by number, and how many each curve has."""
+        """Indices of the points that each curve passes through, and their number per curve."""
         ahead = 3 if self.kind.startswith("cubic") else 1
         first = (self.segments & 0x3FFFFFFF).astype(np.int64)
         ends = (self.segments & (1 << 30)) == 0
@@ -39,7 +39,7 @@ class Curves:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Arguments of ``SceneBuilder.add_mesh``; of curves, with ``curves`` and no triangles."""
+    """Arguments of ``SceneBuilder.add_mesh``; for curves, with ``curves`` and without triangles."""
 
     positions: NDArray[np.float32]
     indices: NDArray[np.uint32]
@@ -53,7 +53,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Placed:
-    """A mesh as it is seen once: its number, its transform (row vectors), what it inherits."""
+    """One instance of a mesh: mesh index, transform (row vectors), inherited material."""
 
     mesh: int
     transform: Matrix
@@ -62,7 +62,7 @@ class Placed:
 
 @dataclass
 class Group:
-    """Meshes and groups that are placed together."""
+    """Meshes and groups that are instanced together."""
 
     meshes: list[int] = field(default_factory=list)
     children: list[tuple[int, Matrix, NDArray[np.uint32] | None]] = field(default_factory=list)
@@ -70,7 +70,7 @@ class Group:
 
 @dataclass
 class Recorded:
-    """Arguments of all calls to a ``SceneBuilder``; bounds: (2, 3) of the scene in world space."""
+    """Arguments of all calls to a ``SceneBuilder``. ``bounds`` (2, 3) are in world space."""
 
     textures: list[dict[str, Any]] = field(default_factory=list)
     materials: list[dict[str, Any]] = field(default_factory=list)
@@ -82,7 +82,7 @@ class Recorded:
     bounds: Matrix = field(default_factory=lambda: np.zeros((2, 3)))
 
     def placed(self) -> list[Placed]:
-        """All meshes as seen, instances one by one."""
+        """Return all visible meshes, with instances expanded."""
 
         def expand(group: int, matrix: Matrix, inherited: int) -> Iterator[Placed]:
             for number in self.groups[group].meshes:
@@ -97,7 +97,7 @@ class Recorded:
         return list(expand(0, np.eye(4), INHERIT))
 
     def save(self, folder: Path) -> None:
-        """Writes scene.json and one .npy for each array. A folder that is there is taken over."""
+        """Write scene.json and one .npy per array; an existing folder is reused."""
         folder.mkdir(parents=True, exist_ok=True)
         count = 0
 
@@ -123,15 +123,15 @@ class Recorded:
             for mesh in self.meshes
         ]
         scene["groups"] = [plain(asdict(group)) for group in self.groups]
-        # Last: a folder with a scene.json is whole.
+        # Written last: its presence means that the folder is complete.
         (folder / "scene.json").write_text(json.dumps(scene))
 
 
 def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
-    """All voxels of a recorded grid, with a border of its background.
+    """All voxels of a recorded grid, with a border of its background value.
 
-    Returns values by x, y, z, and a transform of rows from the unit cube, whose equal cells they
-    are, to object space.
+    Returns values by x, y, z, and the transform (row vectors) from the unit cube, which they divide
+    into equal cells, to object space.
     """
     origins, values = grid["origins"], grid["values"]
     edge = values.shape[1]
@@ -146,7 +146,7 @@ def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
 
 
 def load(folder: Path) -> Recorded:
-    """Reads what ``Recorded.save`` wrote."""
+    """Read a folder that ``Recorded.save`` wrote."""
 
     def rich(value: Any) -> Any:
         if isinstance(value, dict):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene builder that keeps what it is given, beside making the native scene of it.
+"""A scene builder that records its arguments while it builds the native scene.
 
-Other renderers are fed from the record, so that they get the very arrays that Wavecomb gets.
+Other renderers read the recording, so that they use exactly Wavecomb's arrays.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from wavecomb.usd import load_stage
 
 @dataclass(frozen=True)
 class _Grid:
-    """A grid as the native builder has it, and what it was made of."""
+    """A native grid and the arrays that it was made of."""
 
     native: _core.VolumeGrid
     arrays: dict[str, Any]
 
 
 class RecordingBuilder(Recorded):
-    """Stands in for ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``.
+    """Replaces ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``.
 
-    What only ``native``, the builder itself, is told is not kept.
+    Calls that go directly to ``native``, the builder itself, are not recorded.
     """
 
     def __init__(self) -> None:
@@ -38,17 +38,17 @@ class RecordingBuilder(Recorded):
         self.scene: _core.Scene | None = None
 
     def add_texture(self, pixels: NDArray[Any], **options: Any) -> int:
-        """Keeps a texture."""
+        """Record a texture."""
         self.textures.append({"pixels": pixels, **options})
         return self.native.add_texture(pixels, **options)
 
     def add_material(self, program: str, **parameters: Any) -> int:
-        """Keeps a material."""
+        """Record a material."""
         self.materials.append({"program": program, **parameters})
         return self.native.add_material(program, **parameters)
 
     def add_graph(self, *arrays: Any) -> int:
-        """Passes a graph on; peers get a material's constants."""
+        """Pass a graph on; peers use the material's constants."""
         return self.native.add_graph(*arrays)
 
     def add_mesh(
@@ -63,7 +63,7 @@ class RecordingBuilder(Recorded):
         name: str = "",
         **labels: Any,
     ) -> int:
-        """Keeps a mesh; labels, as for AOVs, are passed on."""
+        """Record a mesh; labels for AOVs are passed on."""
         number = self.native.add_mesh(
             positions,
             indices,
@@ -85,7 +85,7 @@ class RecordingBuilder(Recorded):
         radii: NDArray[np.float32],
         **options: Any,
     ) -> int:
-        """Keeps curves as a mesh without triangles; normals of ribbons are left out."""
+        """Record curves as a mesh without triangles; normals of ribbons are ignored."""
         number = self.native.add_curves(kind, positions, segments, radii, **options)
         none = np.zeros((0, 3), np.uint32)
         inherited, name = options.get("material", INHERIT), options.get("name", "")
@@ -94,11 +94,11 @@ class RecordingBuilder(Recorded):
         return number
 
     def make_surfaces(self, descriptions: list[dict[str, Any]], threads: int = 0) -> list[Any]:
-        """Refines subdivision surfaces; what comes of it is added as any mesh."""
+        """Refine subdivision surfaces; the results are added as meshes."""
         return self.native.make_surfaces(descriptions, threads)
 
     def replace_mesh(self, mesh: int, *arrays: Any, **options: Any) -> None:
-        """Gives a kept mesh other arrays."""
+        """Replace the arrays of a recorded mesh."""
         self.native.replace_mesh(mesh, *arrays, **options)
         old = self.meshes[mesh]
         names = ("normals", "uvs", "face_materials")
@@ -108,12 +108,12 @@ class RecordingBuilder(Recorded):
         )
 
     def add_group(self, name: str = "", root: str = "") -> int:
-        """Keeps an empty group."""
+        """Record an empty group."""
         self.groups.append(Group())
         return self.native.add_group(name, root)
 
     def add_to_group(self, group: int, mesh: int) -> None:
-        """Keeps a mesh in a group."""
+        """Record a mesh in a group."""
         self.groups[group].meshes.append(mesh)
         self.native.add_to_group(group, mesh)
 
@@ -125,19 +125,19 @@ class RecordingBuilder(Recorded):
         materials: NDArray[np.uint32] | None = None,
         **labels: Any,
     ) -> None:
-        """Keeps placements of a group; labels are passed on."""
+        """Record instances of a group; labels are passed on."""
         self.groups[parent].children.append((child, np.asarray(transforms), materials))
         self.native.add_instances(parent, child, transforms, materials, **labels)
 
     def add_light(self, kind: str, transform: NDArray[Any], **options: Any) -> int:
-        """Keeps a light."""
+        """Record a light."""
         self.lights.append(
             {"kind": kind, "transform": np.asarray(transform, np.float64), **options}
         )
         return self.native.add_light(kind, transform, **options)
 
     def add_mesh_light(self, transform: NDArray[Any], material_sync: str, **options: Any) -> int:
-        """Passes the light of a mesh on; peers get its material alone."""
+        """Pass a mesh light on; peers use only its material."""
         return self.native.add_mesh_light(transform, material_sync, **options)
 
     def make_volume_grid(
@@ -149,40 +149,40 @@ class RecordingBuilder(Recorded):
         name: str = "",
         is_signed: bool = False,
     ) -> _Grid:
-        """A grid for ``add_volume``, which keeps it."""
+        """Make a grid for ``add_volume``, which records it."""
         native = _core.VolumeGrid(origins, values, index_to_object, background, name, is_signed)
         arrays = {"origins": origins, "values": values, "background": background,
                   "index_to_object": np.asarray(index_to_object, np.float64)}  # fmt: skip
         return _Grid(native, arrays)
 
     def add_volume(self, to_world: NDArray[Any], **options: Any) -> int:
-        """Keeps a volume."""
+        """Record a volume."""
         kept = {k: v.arrays if isinstance(v, _Grid) else v for k, v in options.items()}
         self.volumes.append({"to_world": np.asarray(to_world, np.float64), **kept})
         given = {k: v.native if isinstance(v, _Grid) else v for k, v in options.items()}
         return self.native.add_volume(to_world, **given)
 
     def set_camera(self, transform: NDArray[Any], **options: Any) -> None:
-        """Keeps the camera."""
+        """Record the camera."""
         self.camera = {"transform": np.asarray(transform, np.float64), **options}
         self.native.set_camera(transform, **options)
 
     def build(self) -> RecordingBuilder:
-        """Makes the native scene, and stands in for it."""
+        """Build the native scene; return this object in its place."""
         self.scene = self.native.build()
         self.bounds = np.array(self.scene.bounds, np.float64).reshape(2, 3)
         return self
 
 
 def record(stage: Path) -> RecordingBuilder:
-    """Loads a USD stage, and keeps what the scene was made of."""
+    """Load a USD stage and return the recorded scene."""
     factory: Any = RecordingBuilder
     recorded: Any = load_stage(stage, builder_factory=factory).scene
     return recorded
 
 
 def write_volumes(recorded: Recorded, folder: Path) -> None:
-    """Writes densities of volumes as .vdb files, which Cycles reads, and names these there."""
+    """Write volume densities as .vdb files for Cycles, and store their names in the recording."""
     from wavecomb import vdb
 
     folder.mkdir(parents=True, exist_ok=True)

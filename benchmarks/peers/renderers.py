@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The renderers that are compared, and their processes."""
+"""The compared renderers and their processes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ CYCLES_PYTHON = ROOT / ".deps" / "cycles" / "bin" / "python"
 
 @dataclass(frozen=True)
 class Renderer:
-    """One column of the comparison.
+    """A column of the comparison.
 
     Attributes:
-        kind: Of worker.py.
-        options: Of that kind.
-        spp: Short and long render of a timed turn; slower ones take fewer samples, so that turns
-            last alike. Squares, which Mitsuba's multijitter keeps.
-        warm: Renders both counts before they are timed: Dr.Jit compiles for each.
+        kind: Renderer of worker.py.
+        options: Options of that renderer.
+        spp: Samples of the short and of the long timed render. Slower renderers take fewer, so that
+            turns last equally long. Squares, as Mitsuba's multijitter requires.
+        warm: Whether to render both counts before timing, because Dr.Jit compiles for each.
     """
 
     kind: str
@@ -34,7 +34,7 @@ class Renderer:
 
     @property
     def family(self) -> str:
-        """What converges to the same picture."""
+        """Name shared by renderers that converge to the same image."""
         return self.kind
 
 
@@ -61,12 +61,12 @@ RENDERERS = {
 }
 _APART = ("mitsuba-llvm-volpath", "mitsuba-llvm-ptracer", "cycles-shadow-caustics")
 USUAL = tuple(name for name in RENDERERS if name not in _APART)
-"""Without those for volumes and for caustics alone."""
+"""All but those for volumes and caustics only."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What all renderers of a stage share; digest: of the recorded arrays."""
+    """Data shared by all renderers of a stage. ``digest`` is a hash of the recorded arrays."""
 
     stage: Path
     recorded: Path
@@ -77,7 +77,7 @@ class Job:
 
 
 class Process:
-    """A renderer at work; ``start_s`` is from its start to its first picture."""
+    """Process of a renderer; ``start_s`` is the time from its start to its first image."""
 
     def __init__(self, name: str, job: Job, log: Path, options: dict[str, Any]) -> None:
         chosen = RENDERERS[name]
@@ -110,7 +110,7 @@ class Process:
         return answer
 
     def render(self, spp: int, seed: int, image: Path | None = None) -> dict[str, Any]:
-        """What worker.py answers."""
+        """Request a render; return the answer of worker.py."""
         assert self._process.stdin is not None
         job = {"spp": spp, "seed": seed, "image": str(image) if image else None}
         self._process.stdin.write(json.dumps(job) + "\n")
@@ -118,7 +118,7 @@ class Process:
         return self._read()
 
     def close(self) -> None:
-        """Ends the process."""
+        """End the process."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a comparison: ratios with intervals, tables, what it was measured on."""
+"""Results of a comparison: ratios with intervals, tables, and the machine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DRAWS = 4000
 def summary(
     turns: dict[str, list[dict[str, Any]]], noise: dict[str, dict[str, Any]], size: int
 ) -> dict[str, Any]:
-    """Medians of each renderer, and Wavecomb's ratio to each other one."""
+    """Return medians of each renderer, and the ratio of Wavecomb to each other one."""
     renderers: dict[str, Any] = {}
     for name in dict.fromkeys([*turns, *noise]):
         facts: dict[str, Any] = {}
@@ -44,7 +44,7 @@ def summary(
 
 
 def _ratios(ours: dict[str, Any], theirs: dict[str, Any]) -> dict[str, Any]:
-    """Ratio of medians over rounds and of means over seeds; 95 % by bootstrap of both."""
+    """Ratio of medians over rounds and of means over seeds, with 95 % bootstrap intervals."""
     rng = np.random.default_rng(1)
     out: dict[str, Any] = {}
 
@@ -77,7 +77,7 @@ def _ratios(ours: dict[str, Any], theirs: dict[str, Any]) -> dict[str, Any]:
 
 
 def tables(scenes: dict[str, Any]) -> str:
-    """Markdown: figures, then ratios."""
+    """Return Markdown tables: results, then ratios."""
     head = ["stage", "renderer", "M samples/s", "marginal", "M rays/s", "spp", "relMSE", "trimmed"]
     head += ["efficiency", "peak MB", "start to first picture, s"]
     lines = _row(head) + _row(["---"] * len(head))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rounds of timed turns: fresh processes in an order that is shuffled each time."""
+"""Timed rounds: new processes in shuffled order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from renderers import RENDERERS, Job, Process
 def rounds(
     names: list[str], job: Job, count: int, seed: int, logs: Path, ours: dict[str, Any]
 ) -> dict[str, list[dict[str, Any]]]:
-    """Turns of each renderer, by name, in rounds."""
+    """Return the turns of each renderer, by name, in rounds."""
     rng = random.Random(seed)
     turns: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
     for number in range(count):
@@ -29,10 +29,10 @@ def rounds(
 def turn(
     name: str, job: Job, number: int, rng: random.Random, logs: Path, ours: dict[str, Any]
 ) -> dict[str, Any]:
-    """A process from its start to its end, with a short and a long render.
+    """Run a process from start to end, with a short and a long render.
 
-    The rate is that of the long one; the marginal rate, more samples over more time, leaves out
-    what a call costs once.
+    The rate is that of the long render. The marginal rate, the difference in samples over the
+    difference in time, excludes the constant cost of a call.
     """
     chosen = RENDERERS[name]
     process = Process(name, job, logs / f"{name}.log", ours if name == "wavecomb" else {})

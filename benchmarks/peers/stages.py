@@ -11,20 +11,20 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol
 from wavecomb.scenes import write_scene
 
 VOLUMES = ("smoke-200", "smoke-500", "clouds-200", "clouds-500", "fog-cornell", "fog-room")
-"""Grids of so many voxels along an edge, without fire; and stages that are filled with fog."""
+"""Smoke grids by voxels per edge, without fire; and stages filled with fog."""
 
 BELOW = ("head", "candles")
-"""With light that walks below surfaces, and hair."""
+"""Stages with subsurface scattering and hair."""
 
 _BROWN = (0.248, 0.435, 0.923)
-"""Absorption of scene head's mean melanin, 0.52, a third of it red."""
+"""Absorption for the mean melanin of scene head, 0.52, a third of it pheomelanin (red)."""
 
 _FOG = {"cornell": 0.5, "room": 0.25}
-"""Extinction that fills a stage, over the size of its bounds."""
+"""Optical thickness of the fog over the size of the stage's bounds."""
 
 
 def write_stage(name: str, path: Path, plain: bool) -> Path:
-    """Writes a stage; that with a volume is a layer over a generated one. Returns its path."""
+    """Write a stage, those with volumes as a layer over a generated one; return its path."""
     if name in BELOW:
         return _write_below(name, path)
     if name not in VOLUMES:
@@ -42,7 +42,7 @@ def write_stage(name: str, path: Path, plain: bool) -> Path:
     if kind == "fog":
         _fill(stage, _FOG[detail])
     else:
-        # Mitsuba's media do not shine.
+        # Mitsuba's media cannot emit.
         for prim in stage.Traverse():
             edf = UsdShade.Shader(prim).GetInput("edf")
             if edf:
@@ -52,7 +52,7 @@ def write_stage(name: str, path: Path, plain: bool) -> Path:
 
 
 def _write_below(name: str, path: Path) -> Path:
-    """Hair of one colour: peers are not told what is each strand's own."""
+    """Hair of one colour, because peers do not support colours per strand."""
     base = path.with_name(f"{path.stem}-base.usdc")
     write_scene(name, base, aspect=1.0)
     stage = Usd.Stage.Open(str(base))
@@ -67,7 +67,7 @@ def _write_below(name: str, path: Path) -> Path:
 
 
 def _fill(stage: Usd.Stage, thickness: float) -> None:
-    """Fog in all of a stage but at its walls, which rays of Mitsuba that leave it would miss."""
+    """Fill a stage with fog, with a gap at the walls: Mitsuba misses rays that leave the stage."""
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
     low, high = np.array(box.GetMin()), np.array(box.GetMax())

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One renderer in a process of its own: lines of JSON in, lines of JSON out.
+"""Run one renderer in a separate process, controlled by lines of JSON.
 
-It loads a stage, renders one sample per pixel, and says so:
+The process loads a stage, renders one sample per pixel, and writes
 
     {"load_s", "version", "settings"}
 
@@ -9,9 +9,9 @@ Then it answers each {"spp", "seed", "image": path or null} with
 
     {"spp", "seconds", "mean", "rays", "peak_mb"}
 
-where spp is what the sampler made of it, seconds is the call to render alone, rays may be null, and
-the picture is at the path, as .npy (height, width, 3). compare.py starts it; Cycles wants the
-Python of benchmarks/peers/setup.
+where spp is the number after rounding by the sampler, seconds is the time of the render call, and
+rays may be null. The image is saved at the path as .npy (height, width, 3). compare.py starts this
+program; Cycles needs the Python of benchmarks/peers/setup.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ import numpy as np
 from recorded import load
 
 Render = Callable[[int, int], "tuple[Any, int, int | None]"]
-"""(spp, seed) -> picture, samples per pixel done, rays traced."""
+"""Function of (spp, seed) that returns the image, samples per pixel and number of rays."""
 Opened = tuple[Render, dict[str, Any]]
 
 
 def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
-    """Reads the stage itself."""
+    """Load the USD stage."""
     import wavecomb
     from wavecomb import _core
 
-    # A scene keeps nothing from render to render: each weighs its lights anew.
+    # A scene keeps no state between renders: each render calibrates light shares anew.
     stage = wavecomb.load(args.stage).scene
     settings = {
         "filter": "box",
@@ -61,7 +61,7 @@ def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
 
 
 def open_mitsuba(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
-    """Gets the recorded arrays. options: variant, sampler."""
+    """Load the recorded arrays. Options: variant, sampler."""
     from mitsuba_bridge import MitsubaScene, PeerSettings, load_mitsuba
 
     variant = options.pop("variant")
@@ -83,7 +83,7 @@ def open_mitsuba(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
 
 
 def open_cycles(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
-    """Gets the recorded arrays. options: light_tree, pattern."""
+    """Load the recorded arrays. Options: light_tree, pattern."""
     import bpy
     from cycles_bridge import CyclesScene, CyclesSettings
 
@@ -102,14 +102,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kind", choices=OPENERS)
     parser.add_argument("--options", type=json.loads, default={})
-    parser.add_argument("--stage", type=Path, required=True, help="USD")
+    parser.add_argument("--stage", type=Path, required=True, help="USD file")
     parser.add_argument("--recorded", type=Path, required=True, help="folder of Recorded.save")
     parser.add_argument("--size", type=int, required=True)
     parser.add_argument("--threads", type=int, required=True)
     parser.add_argument("--max-depth", type=int, required=True)
     args = parser.parse_args()
     out = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # what libraries print goes to the log
+    os.dup2(2, 1)  # output of libraries goes to the log
     started = time.perf_counter()
     render, facts = OPENERS[args.kind](args, args.options)
     facts["load_s"] = time.perf_counter() - started
@@ -121,9 +121,9 @@ def main() -> None:
         begin = time.perf_counter()
         picture, spp, rays = render(job["spp"], job["seed"])
         seconds = time.perf_counter() - begin
-        # Black for any seed is what Mitsuba's ptracer gives where its light paths miss the stage.
+        # Mitsuba's ptracer returns black for any seed if its light paths miss the stage.
         if last and last[0] != job["seed"] and picture.any() and np.array_equal(last[1], picture):
-            raise RuntimeError(f"{args.kind}: another seed gave the same picture")
+            raise RuntimeError(f"{args.kind}: a different seed gave the same image")
         last = job["seed"], picture
         if job.get("image"):
             np.save(job["image"], picture)
@@ -138,7 +138,7 @@ def main() -> None:
 
 
 def peak_mb() -> float:
-    """Of this program alone: what getrusage says begins with the process that started it."""
+    """Peak memory of this program; getrusage would include the process that started it."""
     for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024

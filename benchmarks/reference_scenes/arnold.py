@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tests of Autodesk's arnold-usd as stages for Wavecomb.
+"""Convert the tests of Autodesk's arnold-usd to stages for Wavecomb.
 
-The USD file of a test is used as it is, below a layer that adds what only Arnold would read: the
-camera and light of the .ass file, and for Arnold's shaders what UsdShade has alike. Everything that
-is translated is named in the notes.
+The USD file of a test is used unchanged, below a layer that replaces what only Arnold reads: the
+camera and light of the .ass file, and UsdShade equivalents of Arnold's shaders. The notes list
+everything that is translated.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from reference_scenes.shapes import write_checker, write_magnified
 from reference_scenes.stage import Image, StageWriter
 
 SIZE = (160, 120)
-"""Of all their pictures."""
+"""Size of all reference images."""
 GAUSSIAN_WIDTH = 3.0
-"""Of our filter that is like Arnold's gaussian of width 2, exp(-2 r^2)."""
+"""Width of our Gaussian filter that corresponds to Arnold's of width 2, exp(-2 r^2)."""
 
 
 @dataclass
@@ -32,9 +32,9 @@ class Test:
 
     Attributes:
         stage: The file to render.
-        covered_only: Only pixels that the reference's alpha fills: its dome is not seen.
-        space: What Arnold rendered in: linear values are of it, the picture is Rec.709.
-        notes: What was translated.
+        covered_only: Compare only pixels with alpha in the reference, whose dome is invisible.
+        space: Colour space of Arnold's render; the image is Rec.709.
+        notes: Description of the translation.
     """
 
     stage: Path
@@ -44,12 +44,12 @@ class Test:
 
 
 def to_stage(folder: Path, file: Path) -> Test:
-    """Writes the stage of a test."""
+    """Write the stage of a test."""
     return _Translator(folder, file).test
 
 
 def ass_nodes(text: str) -> dict[str, dict[str, list[str]]]:
-    """Nodes of an .ass file: type -> parameter -> words. Of each type the last one counts."""
+    """Nodes of an .ass file: type -> parameter -> words. The last node of each type counts."""
     nodes: dict[str, dict[str, list[str]]] = {}
     for kind, body in re.findall(r"^(\w+)\s*\{(.*?)^\s*\}", text, re.MULTILINE | re.DOTALL):
         found: dict[str, list[str]] = {}
@@ -65,7 +65,7 @@ def ass_nodes(text: str) -> dict[str, dict[str, list[str]]]:
 
 
 class _Translator:
-    """One test on its way."""
+    """Translation of one test."""
 
     def __init__(self, folder: Path, file: Path) -> None:
         self.test = Test(file)
@@ -100,7 +100,7 @@ class _Translator:
     def _ass(self, nodes: dict[str, dict[str, list[str]]]) -> None:
         placed = _matrix(nodes.get("usd", {}))
         camera = UsdGeom.Camera.Define(self.stage, "/ass_camera")
-        # The file is moved by a shift alone; the camera goes the other way.
+        # The file is only translated, so the camera moves the opposite way.
         camera.AddTransformOp().Set(_matrix(nodes["persp_camera"]) * placed.GetInverse())
         half = math.tan(math.radians(float(nodes["persp_camera"]["fov"][0])) / 2)
         camera.CreateFocalLengthAttr(10.0)
@@ -112,7 +112,7 @@ class _Translator:
         settings.GetAttribute("resolution").Set(Gf.Vec2i(*SIZE))
         aspect = float(nodes["options"].get("pixel_aspect_ratio", ["1"])[0])
         settings.GetAttribute("pixelAspectRatio").Set(aspect)
-        # Arnold's fov is horizontal, whatever the shape of the picture.
+        # Arnold's fov is horizontal for any aspect ratio.
         settings.GetAttribute("aspectRatioConformPolicy").Set("adjustApertureHeight")
         self.stage.SetMetadata("renderSettingsPrimPath", "/Render/Ass")
         light = nodes.get("distant_light")
@@ -131,7 +131,7 @@ class _Translator:
                 self._standard_surface(UsdGeom.Gprim(prim))
 
     def _standard_surface(self, gprim: UsdGeom.Gprim) -> None:
-        """Arnold's default shader, or that of the .ass file: MaterialX has the same model."""
+        """Arnold's default shader, or that of the .ass file; MaterialX has the same model."""
         colours = gprim.GetDisplayColorAttr().Get()
         colour = colours[0] if colours else (0.8, 0.8, 0.8)
         inputs = {"base": 1.0, "base_color": colour}
@@ -156,14 +156,14 @@ class _Translator:
             self._note(f"{kind} is drawn grey")
 
     def _flat(self, material: UsdShade.Material, shader: UsdShade.Shader) -> None:
-        """The colour as it is: emission."""
+        """A flat shader shows the plain colour: translate it to emission."""
         image = _source(shader, "inputs:color")
         kind, path = _kind(image), str(material.GetPath())
         uv, repeats = "st", 1.0
         if kind == "arnold:checkerboard":
             file = self.test.stage.with_name(f"{self.test.stage.stem}_checker.exr")
             colours = [list(image.GetInput(name).Get()) for name in ("color1", "color2")]
-            # Arnold has the second one at the uv of 0.
+            # Arnold has the second colour at uv 0.
             write_checker(file, colours[1], colours[0])
             uv, repeats = "uv", float(image.GetInput("u_frequency").Get())
             space = "raw"
@@ -186,7 +186,7 @@ class _Translator:
         self._note(f"{_kind(shader)} of {kind} is emission of its image")
 
     def _coloured_instances(self, reader: UsdShade.Shader) -> None:
-        """user_data_rgb of point instancers: displayColor of instances without a material."""
+        """Make user_data_rgb of point instancers the displayColor of unbound instances."""
         name = str(reader.GetInput("attribute").Get())
         for prim in list(self.stage.Traverse()) + list(self.stage.TraverseAll()):
             primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
@@ -200,7 +200,7 @@ class _Translator:
         self._note(f"the instances' {name} is displayColor, without standard_surface's reflection")
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> None:
-        """Arnold takes what says no subdivisionScheme for polygons, and smooths their shading."""
+        """Arnold treats meshes without a subdivisionScheme as polygons with smooth shading."""
         scheme = mesh.GetSubdivisionSchemeAttr()
         if scheme.HasAuthoredValue():
             return
@@ -248,7 +248,7 @@ def _kind(shader: UsdShade.Shader) -> str:
 def averaged_normals(
     points: NDArray[np.float64], counts: NDArray[Any], indices: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """Normals of points: those of their faces, weighted by area."""
+    """Point normals: area-weighted means of the adjacent face normals."""
     starts = np.cumsum(counts) - counts
     following = np.arange(len(indices)) + 1
     following[starts + counts - 1] = starts

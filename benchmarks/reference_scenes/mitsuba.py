@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba 3's XML scenes as USD stages.
+"""Convert Mitsuba 3's XML scenes to USD stages.
 
-Mitsuba's own parser reads the file and its own loaders the meshes; what each plugin means is said
-here. Exact: diffuse, smooth conductors by index, smooth dielectrics, plastic, GGX where little is
-scattered between facets, all emitters but spots and projectors, cameras. Not so, and what
-``Film.notes`` lists: Beckmann becomes GGX of the same alpha, plastic is linear, and lamps
-reflect nothing. ``mitsuba_scene.referee`` changes a scene likewise, so that Mitsuba itself tells
-what that does to the picture.
+Mitsuba's parser reads the file and its loaders the meshes; this module translates each plugin.
+Exact equivalents: diffuse, smooth conductors by index, smooth dielectrics, plastic, GGX with little
+multiple scattering, all emitters except spots and projectors, and cameras. Approximations, listed
+in ``Film.notes``: Beckmann becomes GGX of the same alpha, plastic is linear, and emitters do not
+reflect. ``mitsuba_scene.referee`` applies the same changes to the Mitsuba scene, so that Mitsuba
+shows their effect on the image.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from reference_scenes.stage import TURN, Image, Inexpressible, Matrix, StageWrit
 
 MESHES = ("obj", "ply", "serialized")
 GAUSSIAN_WIDTH = 3.0
-"""Of our filter that has the standard deviation of Mitsuba's default, half a pixel."""
+"""Width of our Gaussian filter with the standard deviation of Mitsuba's default, half a pixel."""
 
 
 @dataclass
 class Film:
-    """What a scene asks of its picture.
+    """Image settings of a scene.
 
     Attributes:
         size: Width and height.
-        filter: Ours.
+        filter: Filter of Wavecomb.
         filter_width: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
-        left_out: (height, width), pixels that show what could not be drawn.
-        notes: What is not said exactly.
+        left_out: Mask (height, width) of pixels that show objects which cannot be drawn.
+        notes: Approximations that were made.
     """
 
     size: tuple[int, int]
@@ -50,16 +50,16 @@ class Film:
 
 
 def to_stage(scene: Scene, file: Path) -> Film:
-    """Writes the stage of a scene; gives what the picture is like.
+    """Write the stage of a scene; return its image settings.
 
     Raises:
-        Inexpressible: A stage cannot say what the scene asks for.
+        Inexpressible: A stage cannot express a feature of the scene.
     """
     return _Translator(scene, file).film
 
 
 class _Translator:
-    """One scene on its way."""
+    """Translation of one scene."""
 
     def __init__(self, scene: Scene, file: Path) -> None:
         self.scene = scene
@@ -90,7 +90,7 @@ class _Translator:
                 if not inner:
                     kind, props = self.scene.kind(number), self.scene.props(number)
                     if kind not in ("path", "direct", "ptracer"):
-                        raise Inexpressible(f"the integrator {kind} is none of ours")
+                        raise Inexpressible(f"Wavecomb has no integrator {kind}")
                     most = int(props["max_depth"]) if "max_depth" in props else -1
                     return 1 if kind == "direct" else (64 if most < 0 else most - 1)
                 number = inner[0]
@@ -104,7 +104,7 @@ class _Translator:
         if kinds in ([], ["gaussian"]):
             film.filter, film.filter_width = "gaussian", GAUSSIAN_WIDTH
         elif kinds != ["box"]:
-            raise Inexpressible(f"the reconstruction filter {kinds[0]} is none of ours")
+            raise Inexpressible(f"Wavecomb has no reconstruction filter {kinds[0]}")
         to_world, half, orthographic = self._view(sensor, film)
         props = self.scene.props(sensor)
         near, far = (
@@ -115,7 +115,7 @@ class _Translator:
         return film
 
     def _view(self, sensor: int, film: Film) -> tuple[Matrix, tuple[float, float], bool]:
-        """Transform without scale, half the picture's extent, whether it is orthographic."""
+        """Transform without scale, half the image extent, and whether it is orthographic."""
         kind, props = self.scene.kind(sensor), self.scene.props(sensor)
         to_world = self._matrix(sensor)
         scale = np.linalg.norm(to_world[:3, :3], axis=0)
@@ -124,13 +124,13 @@ class _Translator:
         if kind == "orthographic":
             return to_world, (float(scale[0]), float(scale[0]) * height / width), True
         if kind != "perspective":
-            raise Inexpressible(f"the sensor {kind} is none of ours")
+            raise Inexpressible(f"Wavecomb has no sensor {kind}")
         x_fov = float(np.array(self.mi.parse_fov(props, width / height)).item())
         half = math.tan(math.radians(x_fov) / 2)
         return to_world, (half, half * height / width), False
 
     def _left_out(self, sensor: int) -> NDArray[np.bool_]:
-        """The pixels of what was dropped, as boxes around it."""
+        """Mask of pixels that may show dropped objects: their projected bounding boxes."""
         width, height = self.film.size
         mask = np.zeros((height, width), bool)
         to_world, half, orthographic = self._view(sensor, self.film)
@@ -154,7 +154,7 @@ class _Translator:
     def _emitter(self, number: int) -> None:
         kind, props = self.scene.kind(number), self.scene.props(number)
         if kind == "area":
-            return  # shapes name it
+            return  # a shape refers to it
         if missing := self.scene.missing_file(number):
             raise Inexpressible(f"{missing}, which lights the scene, is not among the assets")
         if kind == "constant":
@@ -182,7 +182,7 @@ class _Translator:
                 "UsdLux's cone falls by smoothstep, and only RectLight and DomeLight have textures"
             )
         elif kind == "projector":
-            raise Inexpressible("UsdLux has no projector: no image thrown from a point")
+            raise Inexpressible("UsdLux has no projector light")
         else:
             raise Inexpressible(f"the emitter {kind} has no counterpart in UsdLux")
 
@@ -194,7 +194,9 @@ class _Translator:
             if emitters or missing == str(self.scene.props(number).get("filename", "")):
                 raise Inexpressible(f"{missing} is not among the assets")
             self._dropped.append(self._arrays(number)[0])
-            self.film.notes.append(f"{missing} is not among the assets: what it covers is left out")
+            self.film.notes.append(
+                f"{missing} is not among the assets; pixels that it covers are not compared"
+            )
             return
         if emitters:
             self._lamp(number, emitters[0])
@@ -218,7 +220,7 @@ class _Translator:
         return (to_world @ centre)[:3], float(props.get("radius", 1.0)) * size
 
     def _arrays(self, number: int) -> tuple[Any, Any, Any, Any, Any]:
-        """Points and normals in the world, triangles, uv with v up, Mitsuba's mesh."""
+        """World-space points and normals, triangles, uv with v up, and Mitsuba's mesh."""
         kind, props = self.scene.kind(number), self.scene.props(number)
         to_world = self._matrix(number)
         if kind in ("rectangle", "cube"):
@@ -263,7 +265,7 @@ class _Translator:
         return self.out.material("diffuse", {"diffuseColor": (0.5, 0.5, 0.5)}), None
 
     def _material(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """A material's path, and what takes the colours of a mesh where it asks for them."""
+        """Path of a material, and a function for the mesh colours if it needs them."""
         scene, kind, props = self.scene, self.scene.kind(number), self.scene.props(number)
         if kind == "twosided":
             return self._material(next(scene.all_of(number, "BSDF")))
@@ -282,9 +284,9 @@ class _Translator:
             "roughdielectric",
             "roughplastic",
         ):
-            raise Inexpressible(f"the material {kind} has no counterpart among ours")
+            raise Inexpressible(f"Wavecomb has no equivalent of the material {kind}")
         if scene.children(number) and any(scene.all_of(number, "Texture")):
-            raise Inexpressible(f"{kind} with textures of its roughness is not translated")
+            raise Inexpressible(f"{kind} with a roughness texture is not translated")
         return self._microfacets(kind, number, props), None
 
     def _microfacets(self, kind: str, number: int, props: Any) -> str:
@@ -319,7 +321,7 @@ class _Translator:
         return eta.tolist(), k.tolist()
 
     def _brushed(self, eta: list[float], k: list[float], u: float, v: float) -> str:
-        """OpenPBR's metal with these alphas: its reflectance and tint fit the index."""
+        """OpenPBR metal with these alphas; its reflectance and tint match the index."""
         along, across = max(u, v), min(u, v)
         anisotropy = 1.0 - across / along
         roughness = math.sqrt(along / math.sqrt(2.0 / (1.0 + (1.0 - anisotropy) ** 2)))
@@ -358,7 +360,7 @@ class _Translator:
                 self.scene.colour(texture, "color0", 0.4),
                 self.scene.colour(texture, "color1", 0.2),
             )
-            # Mitsuba's v runs down: it is 1 - t.
+            # Mitsuba's v points down: it is 1 - t.
             u, v = float(scale[0, 0]), float(scale[1, 1])
             use = Image(file, "raw", (u, -v), (0.0, v))
         else:
@@ -366,12 +368,12 @@ class _Translator:
         return self.out.material("diffuse", {}, textures={"diffuseColor": use}), None
 
     def _blend(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """Two diffuse parts by an attribute of the mesh: diffuse in the mean colour."""
+        """A blend of two diffuse BSDFs by a mesh attribute: diffuse with the mean colour."""
         parts = list(self.scene.all_of(number, "BSDF"))
         (texture,) = self.scene.all_of(number, "Texture")
         simple = all(self.scene.kind(p) == "diffuse" and not self.scene.children(p) for p in parts)
         if not simple or self.scene.kind(texture) != "mesh_attribute":
-            raise Inexpressible("a blend of other than plain diffuse parts is not translated")
+            raise Inexpressible("only blends of plain diffuse BSDFs are translated")
         first, second = (np.array(self.scene.colour(p, "reflectance")) for p in parts)
         weight = _attribute(str(self.scene.props(texture)["name"]))
 
@@ -394,7 +396,7 @@ def _attribute(name: str) -> Callable[[Any], tuple[NDArray[np.float64], str]]:
 
 
 def conductor_reflectance(eta: Any, k: Any, degrees: float) -> NDArray[np.float64]:
-    """Fresnel reflectance of a conductor, unpolarized (PBRT, 4th edition, 9.3.6)."""
+    """Unpolarised Fresnel reflectance of a conductor (PBRT, 4th edition, 9.3.6)."""
     cosine = math.cos(math.radians(degrees))
     index = np.asarray(eta, np.float64) + 1j * np.asarray(k, np.float64)
     inner = np.sqrt(1.0 - (1.0 - cosine**2) / index**2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba's scenes laid out as its repository has them, with stand-ins for plain meshes."""
+"""Lay out Mitsuba's scenes as in its repository, with replacements for common meshes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 SEGMENTS = 96
-"""Of the stand-in for the sphere, round its axis."""
+"""Segments around the axis of the replacement sphere."""
 
 
 def load_mitsuba() -> Any:
-    """Mitsuba 3 as the peers have it; the scalar variant, which compiles nothing.
+    """Import Mitsuba 3 in its scalar variant, which needs no compilation.
 
     Raises:
-        ImportError: It is not there.
+        ImportError: Mitsuba is missing.
     """
     sys.path.append(str(Path(__file__).resolve().parents[1] / "peers"))
     from mitsuba_bridge import load_mitsuba as load
@@ -28,10 +28,10 @@ def load_mitsuba() -> Any:
 
 
 def lay_out(assets: Path, folder: Path) -> Path:
-    """Links to the scenes below ``folder``; gives the folder of the scenes.
+    """Link the scenes below ``folder``; return the folder of the scenes.
 
-    common/meshes has a rectangle and a sphere in place of files that are not among the assets: of
-    the sphere the references show that it is smooth and of radius 1.
+    common/meshes gets a generated rectangle and sphere, because the assets do not include these
+    files. The reference images show that the sphere is smooth and of radius 1.
     """
     assets, scenes = assets.resolve(), folder / "mitsuba"
     shutil.rmtree(folder, ignore_errors=True)
@@ -63,7 +63,7 @@ f 1/1/1 2/2/1 3/3/1 4/4/1
 
 
 def sphere(segments: int = SEGMENTS) -> str:
-    """An OBJ file of a unit sphere about y with the normals of the true one."""
+    """OBJ file of a unit sphere around y with exact normals."""
     rings = segments // 2
     polar, around = np.meshgrid(
         np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, segments + 1), indexing="ij"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba 3's XML scenes as its own parser reads them, and Mitsuba as a referee."""
+"""Mitsuba 3's XML scenes read by its parser, and Mitsuba as a reference renderer."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 
 
 class Scene:
-    """A parsed scene: nodes that refer to others by number."""
+    """A parsed scene: nodes that refer to others by index."""
 
     def __init__(self, mi: Any, file: Path, width: int = 0) -> None:
-        """``width``: of the picture, which keeps its shape; 0: as the scene says."""
+        """``width`` of the image, with unchanged aspect ratio; 0 means the scene's size."""
         self.mi = mi
         self.file = file
         self.config = mi.parser.ParserConfig(mi.variant())
@@ -31,11 +31,11 @@ class Scene:
                 node.props["width"], node.props["height"] = width, height
 
     def kind(self, number: int) -> str:
-        """Name of a node's plugin."""
+        """Plugin name of a node."""
         return str(self.state.nodes[number].props.plugin_name())
 
     def category(self, number: int) -> str:
-        """Shape, BSDF, Emitter ..."""
+        """Category of a node: Shape, BSDF, Emitter and others."""
         return str(self.state.nodes[number].type).rsplit(".", 1)[-1]
 
     def props(self, number: int) -> Any:
@@ -43,7 +43,7 @@ class Scene:
         return self.state.nodes[number].props
 
     def children(self, number: int) -> dict[str, int]:
-        """Nodes that a node refers to, by name."""
+        """Child nodes by name."""
         props = self.props(number)
         reference = self.mi.Properties.Type.ResolvedReference
         names = list(props.keys())
@@ -54,7 +54,7 @@ class Scene:
         return (n for n in self.children(number).values() if self.category(n) == category)
 
     def path(self, name: str) -> Path | None:
-        """A file that the scene names; None where it is not there."""
+        """A file that the scene refers to; None if it does not exist."""
         here = self.file.parent
         for folder in (here, *(here / file for file in self.folders)):
             if (folder / name).is_file():
@@ -62,7 +62,7 @@ class Scene:
         return None
 
     def missing_file(self, number: int) -> str:
-        """The first file below a node that is not there, else ""."""
+        """First missing file below a node, or ""."""
         props = self.props(number)
         if "filename" in props and self.path(str(props["filename"])) is None:
             return str(props["filename"])
@@ -88,9 +88,10 @@ class Scene:
 
 
 def referee(scene: Scene, as_ours: bool) -> Any:
-    """The scene in Mitsuba, ready to render; without shapes whose files are missing.
+    """Load the scene in Mitsuba, without shapes whose files are missing.
 
-    ``as_ours``: with the approximations of ``to_stage``. Uses up the parsed scene.
+    ``as_ours`` applies the approximations of ``to_stage``. The parsed scene cannot be used
+    afterwards.
     """
     root = scene.props(0)
     if not any(scene.category(n) == "Integrator" for n in scene.children(0).values()):

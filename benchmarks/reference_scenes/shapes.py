@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plain shapes of the translators, and the images that they write."""
+"""Simple shapes and images that the translators write."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from pictures import linear, read
 from reference_scenes.stage import Inexpressible, Matrix
 
 CHECKER_TEXELS = 128
-"""Of a cell of a checkerboard: a UsdUVTexture blurs its edges by one of them."""
+"""Texels per checkerboard cell; bilinear lookups blur cell edges by one texel."""
 
 _QUAD = np.array([[0, 1, 2, 3]])
 
 
 def rectangle(to_world: Matrix) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """From -1 to 1 in x and y, its normal +z: points, quads, normals, uv."""
+    """Points, quads, normals and uv of a square from -1 to 1 in x and y with normal +z."""
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float64)
     uv = 0.5 + 0.5 * corners[:, :2]
     return _placed(corners, to_world), _QUAD, _turned([[0, 0, 1.0]] * 4, to_world), uv
@@ -29,7 +29,7 @@ def rectangle(to_world: Matrix) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any
 def cube(
     to_world: Matrix, half: float = 1.0
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """From -half to half: points, quads, normals, uv of each face."""
+    """Points, quads, normals and uv of a box from -half to half; uv covers each face."""
     points, normals = [], []
     for axis in range(3):
         for side in (-1.0, 1.0):
@@ -45,10 +45,10 @@ def cube(
 
 
 def as_rectangle(points: NDArray[Any], faces: NDArray[Any]) -> tuple[Matrix, float, float]:
-    """A flat mesh of four right-angled corners as a RectLight: transform, width, height.
+    """Convert a flat rectangular mesh to a RectLight: transform, width, height.
 
     Raises:
-        Inexpressible: It is none.
+        Inexpressible: The mesh is not a rectangle.
     """
     used = points[np.unique(faces)]
     corners = np.unique(used.round(9), axis=0)
@@ -60,7 +60,7 @@ def as_rectangle(points: NDArray[Any], faces: NDArray[Any]) -> tuple[Matrix, flo
     flat = abs((corners - centre) @ normal).max() <= 1e-5 * far.max()
     if len(corners) != 4 or not flat or np.ptp(far) > 1e-4 * far.max():
         raise Inexpressible(
-            "an area light that is no rectangle: a mesh of ours shines from both sides"
+            "an area light that is not a rectangle: meshes in Wavecomb emit to both sides"
         )
     others = sorted((p for p in corners[1:]), key=lambda p: float(np.linalg.norm(p - corners[0])))
     edge = others[0] - corners[0]
@@ -74,18 +74,18 @@ def as_rectangle(points: NDArray[Any], faces: NDArray[Any]) -> tuple[Matrix, flo
 
 
 def write_checker(file: Path, first: Sequence[float], second: Sequence[float]) -> None:
-    """Two by two cells; the first colour is at the uv of 0 and at that of 1."""
+    """Write a checkerboard of two by two cells; the first colour is at uv 0 and at uv 1."""
     cells = np.indices((2, 2)).sum(axis=0) % 2
-    # Rows go down and v goes up: the lowest row has the first colour at its left.
+    # Rows go down and v goes up: the lowest row starts with the first colour.
     colours = np.array([first, second], np.float32)
     image = colours[cells[::-1]]
     write_exr(file, image.repeat(CHECKER_TEXELS, axis=0).repeat(CHECKER_TEXELS, axis=1))
 
 
 def write_dome(source: Path, file: Path) -> None:
-    """A latlong image of Mitsuba, whose first and last rows are at the poles, as USD has it.
+    """Convert a latlong image of Mitsuba, with the first and last rows at the poles, to USD.
 
-    There the centres of rows are half a row inwards.
+    In USD the centres of these rows are half a row inside.
     """
     image = read(source)
     height = len(image)
@@ -96,7 +96,7 @@ def write_dome(source: Path, file: Path) -> None:
 
 
 def write_magnified(source: Path, file: Path, edge: int = 256) -> None:
-    """An sRGB image, that repeats, at ``edge`` texels by a uniform cubic B-spline; linear."""
+    """Magnify a repeating sRGB image to ``edge`` texels by a uniform cubic B-spline; linear."""
     image = linear(read(source))
     for axis in (0, 1):
         count = image.shape[axis]
@@ -113,7 +113,7 @@ def write_magnified(source: Path, file: Path, edge: int = 256) -> None:
 
 
 def write_exr(file: Path, image: NDArray[np.float32]) -> None:
-    """Linear colours, 32 bit."""
+    """Write linear colours as 32-bit EXR."""
     file.parent.mkdir(parents=True, exist_ok=True)
     pixels = np.ascontiguousarray(image, np.float32)
     out = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the USD stages of the references: cameras, lights, meshes and materials of a translator.
+"""Write USD stages for translated reference scenes: cameras, lights, meshes and materials.
 
-Matrices are of column vectors, (4, 4), and map to the world; prims are named in order.
+Matrices are for column vectors, (4, 4), and map to world space; prims are named in order.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ Matrix = NDArray[np.float64]
 Colour = Sequence[float]
 
 TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
-"""Half a turn about y: between what looks or shines along +z and USD's -z."""
+"""Half a turn about y, between objects that point along +z and USD's, which point along -z."""
 
 
 class Inexpressible(Exception):
-    """What a scene asks for and a stage for Wavecomb cannot say; one sentence."""
+    """A feature that a Wavecomb stage cannot express; the message is one sentence."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Image:
     """A texture that repeats.
 
     Attributes:
-        file: Of the image.
+        file: Image file.
         space: "raw" or "sRGB".
-        scale: Of the texture coordinates, and
-        translation: what is added then.
-        uv: Their primvar.
+        scale: Scale of the texture coordinates.
+        translation: Offset added after the scale.
+        uv: Primvar of the texture coordinates.
     """
 
     file: Path
@@ -46,7 +46,7 @@ class Image:
 
 
 class StageWriter:
-    """A stage in the making; ``stage``: one to write on, by default an empty one."""
+    """A stage under construction; ``stage`` is one to add to, by default an empty one."""
 
     def __init__(self, file: Path, stage: Usd.Stage | None = None) -> None:
         self.file = file
@@ -56,7 +56,7 @@ class StageWriter:
         self._count = 0
 
     def save(self) -> None:
-        """Writes the file."""
+        """Write the file."""
         self.file.parent.mkdir(parents=True, exist_ok=True)
         self.stage.GetRootLayer().Export(str(self.file))
 
@@ -77,7 +77,7 @@ class StageWriter:
         clip: tuple[float, float] = (1e-4, 1e6),
         orthographic: bool = False,
     ) -> None:
-        """A camera along -z; ``half``: extent of the picture at distance 1, or in world units."""
+        """Add a camera along -z with half extents ``half`` at distance 1, or in world units."""
         camera = UsdGeom.Camera.Define(self.stage, "/camera")
         camera.CreateFocalLengthAttr(10.0)
         camera.CreateHorizontalApertureAttr(20.0 * half[0])
@@ -88,7 +88,7 @@ class StageWriter:
         self._place(camera, to_world)
 
     def _light(self, light: Any, to_world: Matrix, colour: Colour) -> Any:
-        """Intensity is the largest channel: UsdLux's colours are within 0 and 1."""
+        """Set intensity to the largest channel, because UsdLux colours are between 0 and 1."""
         most = max(*(float(c) for c in colour), 1e-12)
         light.CreateIntensityAttr(most)
         light.CreateColorAttr(Gf.Vec3f(*(float(c) / most for c in colour)))
@@ -96,32 +96,32 @@ class StageWriter:
         return light
 
     def rect_light(self, to_world: Matrix, colour: Colour, width: float, height: float) -> None:
-        """Shines along its -z with this radiance."""
+        """Add a rect that emits this radiance along its -z."""
         light = UsdLux.RectLight.Define(self.stage, self._path("rectLight"))
         self._light(light, to_world, colour)
         light.CreateWidthAttr(width)
         light.CreateHeightAttr(height)
 
     def disk_light(self, to_world: Matrix, colour: Colour) -> None:
-        """Of radius 1; shines along its -z with this radiance."""
+        """Add a disk of radius 1 that emits this radiance along its -z."""
         light = UsdLux.DiskLight.Define(self.stage, self._path("diskLight"))
         self._light(light, to_world, colour).CreateRadiusAttr(1.0)
 
     def sphere_light(self, centre: Sequence[float], radius: float, colour: Colour) -> None:
-        """Of this radiance; with a radius of 0 a point of this radiant intensity."""
+        """Add a sphere of this radiance; with radius 0, a point of this radiant intensity."""
         light = UsdLux.SphereLight.Define(self.stage, self._path("sphereLight"))
         to_world = np.eye(4)
         to_world[:3, 3] = centre
         light.CreateRadiusAttr(radius)
         if radius == 0.0:
-            # A normalized sphere has the radiance I / (4 pi r^2), and pi r^2 of it is seen.
+            # A normalised sphere has radiance I / (4 pi r^2) over a visible area of pi r^2.
             light.CreateTreatAsPointAttr(True)
             light.CreateNormalizeAttr(True)
             colour = [4.0 * float(c) for c in colour]
         self._light(light, to_world, colour)
 
     def distant_light(self, along: Sequence[float], irradiance: Colour) -> None:
-        """One direction, with the irradiance of a surface across it."""
+        """Add a parallel light with this irradiance on a perpendicular surface."""
         light = UsdLux.DistantLight.Define(self.stage, self._path("distantLight"))
         z = -np.asarray(along, np.float64) / np.linalg.norm(along)
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
@@ -131,7 +131,7 @@ class StageWriter:
         self._light(light, to_world, irradiance).CreateAngleAttr(0.0)
 
     def dome_light(self, to_world: Matrix, colour: Colour, image: Path | None = None) -> None:
-        """Of this radiance, or of its image times it."""
+        """Add a dome of this radiance, multiplied by its image if there is one."""
         light = UsdLux.DomeLight.Define(self.stage, self._path("domeLight"))
         self._light(light, to_world, colour)
         if image is not None:
@@ -149,7 +149,7 @@ class StageWriter:
         uv: NDArray[Any] | None = None,
         colours: tuple[NDArray[Any], str] | None = None,
     ) -> None:
-        """Triangles or quads in the world; uv with v up; colours with their interpolation."""
+        """Add world-space triangles or quads; uv with v up; colours with their interpolation."""
         mesh = UsdGeom.Mesh.Define(self.stage, self._path("mesh"))
         counts = np.full(len(faces), faces.shape[1], np.int32)
         mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(_floats(points)))
@@ -171,14 +171,14 @@ class StageWriter:
         self.bind(mesh, material)
 
     def sphere(self, to_world: Matrix, radius: float, material: str) -> None:
-        """A sphere about the origin of ``to_world``."""
+        """Add a sphere at the origin of ``to_world``."""
         sphere = UsdGeom.Sphere.Define(self.stage, self._path("sphere"))
         sphere.CreateRadiusAttr(radius)
         self._place(sphere, to_world)
         self.bind(sphere, material)
 
     def bind(self, gprim: Any, material: str) -> None:
-        """Gives a gprim a material."""
+        """Bind a material to a gprim."""
         prim = gprim.GetPrim()
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(UsdShade.Material.Get(self.stage, material))
 
@@ -193,10 +193,10 @@ class StageWriter:
         primvar: str = "",
         path: str = "",
     ) -> str:
-        """UsdPreviewSurface with one of Wavecomb's programs; gives its path.
+        """Add a UsdPreviewSurface with one of Wavecomb's programs; return its path.
 
-        ``own``: attributes such as wavecomb:eta. ``primvar``: what diffuseColor is read from.
-        ``path``: of a material that is there; by default a new one.
+        ``own`` are attributes such as wavecomb:eta. ``primvar`` is the source of diffuseColor.
+        ``path`` names an existing material; by default a new one is made.
         """
         path = path or self._path("material")
         material = UsdShade.Material.Define(self.stage, path)
@@ -220,7 +220,7 @@ class StageWriter:
         return path
 
     def materialx(self, model: str, inputs: dict[str, Any]) -> str:
-        """MaterialX's open_pbr_surface or standard_surface with these inputs; gives its path."""
+        """Add a MaterialX open_pbr_surface or standard_surface; return its path."""
         path = self._path("material")
         material = UsdShade.Material.Define(self.stage, path)
         surface = UsdShade.Shader.Define(self.stage, f"{path}/surface")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why pictures differ from their references, and what is not compared.
+"""Reasons why images differ from their references, and scenes that are not compared.
 
-Beside what the translators note; each sentence was derived as it says.
+These complement the notes of the translators. Each sentence says how it was verified.
 """
 
 _LAMP = "Ours are black from the front, too: with a black lamp Mitsuba gives our picture (as ours)"

@@ -88,7 +88,7 @@ def test_a_process_that_is_left_does_not_hold_it(tmp_path: Path) -> None:
         ("test a setup - side cpu 9\n", "line 1: a row has"),
         ("test a setup - front cpu nine\n", "line 1: a budget is"),
         ("test a setup b front cpu 9\n", "line 1: needs 'b'"),
-        ("test a setup - front cpu 9\n", "no tier 'test' that ends with its total"),
+        ("test a setup - front cpu 9\n", "tier 'test' is missing, or does not end"),
     ],
 )
 def test_a_file_that_is_wrong_is_one_line(tmp_path: Path, rows: str, said: str) -> None:

@@ -57,10 +57,10 @@ def naive_module() -> ModuleType:
             core = folder.parents[1] / "libwavecomb.a"
             if core.exists() and core.stat().st_mtime > module.stat().st_mtime:
                 # Its scenes could have a different memory layout.
-                raise ImportError("is older than the core: make build-test-tools")
+                raise ImportError("it is older than the core; run make build-test-tools")
             sys.path.insert(0, str(folder))
             return importlib.import_module("wavecomb_naive")
-    raise ImportError("is not built: make build-test-tools")
+    raise ImportError("it is not built; run make build-test-tools")
 
 
 @dataclass(frozen=True)
@@ -197,9 +197,11 @@ def save(found: Comparison, folder: Path) -> None:
 def main() -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("seed", nargs="?", type=int, help="of one scene")
+    parser.add_argument("seed", nargs="?", type=int, help="seed of a single scene")
     parser.add_argument("--from", dest="first", type=int, default=0, metavar="SEED")
-    parser.add_argument("--count", type=int, default=30, help="scenes, where no seed is given")
+    parser.add_argument(
+        "--count", type=int, default=30, help="number of scenes, if no seed is given"
+    )
     parser.add_argument("-o", "--out", type=Path, default=ROOT / "out" / "naive")
     options = parser.parse_args()
     one = options.seed is not None

@@ -107,7 +107,7 @@ def key_of(*values: Any) -> str:
         elif value is None or isinstance(value, (bool, int, float, str)):
             told.update(f"{type(value).__name__} {len(repr(value))} {value!r} ".encode())
         else:
-            raise TypeError(f"the content of a {type(value).__name__} is not known")
+            raise TypeError(f"cannot hash a {type(value).__name__}")
 
     for value in values:
         tell(value)
