@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What MkDocs is told beside the pages of docs/: those of the root, and reference pages."""
+"""MkDocs hooks that add pages of the repository root and generated reference pages to docs/."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import reference  # noqa: E402
 
 PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
-"""Pages of the root, and where they are in the site."""
+"""Pages of the repository root, and their paths in the site."""
 LINK = re.compile(r"(!?\[[^\]]*\])\(([^)\s]+)\)")
 CODE = re.compile(r"^(```.*?^```$|    .*?$)", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"`[^`\n]+`")
@@ -30,7 +30,7 @@ STYLE = """
 
 
 def on_config(config: Any) -> Any:
-    """Lists all decisions in the navigation, in the order of their page."""
+    """List all decisions in the navigation, in the order of their page."""
     text = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
     pages = ["decisions/README.md"]
     pages += [f"decisions/{name}" for name in re.findall(r"\]\(([a-z0-9-]+\.md)\)", text)]
@@ -42,7 +42,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Adds what is not in docs/."""
+    """Add the pages that are not in docs/."""
     made = {f"reference/{name}": text for name, text in reference.pages().items()}
     made["site.css"] = STYLE
     made["iframe-worker.js"] = Path(__file__).with_name("iframe-worker.js").read_text("utf-8")
@@ -54,7 +54,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Links of and to pages of the root lead to where those are in the site."""
+    """Adapt links from and to pages of the repository root."""
     name = page.file.src_uri
     at_root = name in PAGES.values()
 
@@ -66,10 +66,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         if target.startswith("../") and file in PAGES:
             return f"{text}({'../' * name.count('/')}{PAGES[file]})"
         if not target.startswith("#") and "://" not in target and _is_elsewhere(name, target):
-            return text[1:-1]  # a file that is no page
+            return text[1:-1]  # a file that is not a page
         return match[0]
 
-    # GitHub wants the bar of a table escaped in code, too; here the stroke would be seen.
+    # GitHub needs table bars in code to be escaped; here the backslash would be visible.
     markdown = INLINE.sub(lambda match: match[0].replace("\\|", "|"), markdown)
     parts = CODE.split(markdown)
     return "".join(part if k % 2 else LINK.sub(link, part) for k, part in enumerate(parts))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference pages, made of the tables that the program itself goes by, and of docstrings."""
+"""Reference pages, generated from the program's tables and from docstrings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ABOUT = {
 
 
 def pages() -> dict[str, str]:
-    """Name -> Markdown."""
+    """Return page name -> Markdown."""
     return {
         "options.md": options_page(),
         "settings.md": settings_page(),
@@ -43,26 +43,26 @@ def pages() -> dict[str, str]:
 
 
 def cell(text: object) -> str:
-    """Text that does not end a cell of a table, and is no markup."""
+    """Escape text for a table cell."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return plain.replace("<", "&lt;").replace("{", "&#123;").replace("*", "\\*")
 
 
 def code(text: object) -> str:
-    """A name in a cell."""
+    """Format a name in a table cell."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return f"`{plain}`" if plain else ""
 
 
 def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
-    """A table of Markdown."""
+    """Format a Markdown table."""
     lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
     lines += [f"| {' | '.join(row)} |" for row in body]
     return "\n".join(lines) + "\n"
 
 
 def bounds(least: float | None, most: float | None) -> str:
-    """The numbers that there are."""
+    """Format the limits that exist."""
     ends = [f"{end:.10g}" if end is not None and abs(end) < 1e30 else "" for end in (least, most)]
     if ends[0] and ends[1]:
         return f"{ends[0]} to {ends[1]}"
@@ -70,7 +70,7 @@ def bounds(least: float | None, most: float | None) -> str:
 
 
 def options_page() -> str:
-    """Every command with its options."""
+    """Page of every command with its options."""
     parts = ["# Options of all commands\n", NOTE]
     root = click.Context(main, info_name="wavecomb")
     for path, command, context in walk(main, root):
@@ -88,10 +88,10 @@ def options_page() -> str:
 
 
 def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
-    """Cells of an option: names, value, effect, default, from what its help says.
+    """Split the help of an option into cells: names, value, effect, default.
 
-    >>> option_row("-o, --output FILE", "Image.  [default: out.exr]")
-    ('`-o, --output`', '`FILE`', 'Image.', 'out.exr')
+    >>> option_row("-o, --output FILE", "Image.  [default: out.exr]") ('`-o, --output`', '`FILE`',
+    'Image.', 'out.exr')
     """
     names, value = re.fullmatch(r"((?:-\S+(?:,| /)? ?)*)(.*)", usage, re.DOTALL).groups()  # type: ignore[union-attr]
     if not names:  # an argument of the command
@@ -113,7 +113,7 @@ def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
 
 
 def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple[str, Any, Any]]:
-    """Commands of a group and below, with their paths."""
+    """Yield the commands of a group and below, with their paths."""
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         if command is None or command.hidden:
@@ -126,7 +126,7 @@ def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple
 
 
 def settings_page() -> str:
-    """The settings of a render."""
+    """Page of the render settings."""
     parts = ["# Settings of a render\n", NOTE,
              "Keywords of `wavecomb.render`, fields of `wavecomb.Settings`, keys of a suite. As "
              "options of commands they have `-` for `_`. *Expectation*: whether the image that "
@@ -149,7 +149,7 @@ def settings_page() -> str:
 
 
 def loading_page() -> str:
-    """How a stage is read."""
+    """Page of the options for loading a stage."""
     item = re.compile(r"^    (\w+): (.+?)(?=^    \w+:|\Z)", re.DOTALL | re.MULTILINE)
     about = dict(item.findall(attributes(LoadOptions)))
     body = []
@@ -165,12 +165,12 @@ def loading_page() -> str:
 
 
 def attributes(owner: Any) -> str:
-    """The part "Attributes" of a class's docstring."""
+    """Return the section "Attributes" of a class's docstring."""
     return inspect.getdoc(owner).partition("Attributes:\n")[2] + "\n"  # type: ignore[union-attr]
 
 
 def layers_page() -> str:
-    """The AOVs."""
+    """Page of the AOVs."""
     body = [(code(row.name), str(row.channels or ""), cell(row.kind.replace("_", " ")),
              cell(row.title)) for row in aovs.core_aovs().values()]  # fmt: skip
     several = [(code(name), ", ".join(map(code, names))) for name, names in aovs.groups().items()]
@@ -184,7 +184,7 @@ def layers_page() -> str:
 
 
 def lights_page() -> str:
-    """The parameters of lights."""
+    """Page of the light parameters."""
     body = []
     for row in light_parameters().values():
         values = ", ".join(map(code, row.choices)) or bounds(row.least, row.most) or row.kind
@@ -195,7 +195,7 @@ def lights_page() -> str:
 
 
 def materials_page() -> str:
-    """The parameters of materials."""
+    """Page of the material parameters."""
     body = [(code(row.name), row.kind, code(row.default), bounds(row.least, row.most),
              code(row.program)) for row in material_parameters().values()]  # fmt: skip
     head = ("parameter", "kind", "default", "values", "of the program alone")
@@ -204,7 +204,7 @@ def materials_page() -> str:
 
 
 def cameras_page() -> str:
-    """The parameters of cameras."""
+    """Page of the camera parameters."""
     body = []
     for row in camera_parameters().values():
         values = ", ".join(map(code, row.choices)) or bounds(row.least, None) or row.kind
@@ -215,7 +215,7 @@ def cameras_page() -> str:
 
 
 def python_page() -> str:
-    """What `wavecomb` names, from its docstrings."""
+    """Page of the names in `wavecomb`, from docstrings."""
     parts = ["# Python\n", "What `import wavecomb` gives, from its docstrings.\n"]
     for name in wavecomb.__all__:
         thing = getattr(wavecomb, name)
@@ -235,7 +235,7 @@ def python_page() -> str:
 
 
 def signature(function: Any) -> str:
-    """As Python writes it, a line for each argument where there are many."""
+    """Format a signature as Python writes it, with a line per argument if there are many."""
     text = str(inspect.signature(function)).replace("'", "")
     if len(text) < 70:
         return text
@@ -245,7 +245,7 @@ def signature(function: Any) -> str:
 
 
 def docstring(thing: Any) -> str:
-    """Google's sections as headings and lists; examples as code."""
+    """Convert Google-style sections to headings and lists, and examples to code."""
     out: list[str] = []
     text = (inspect.getdoc(thing) or "").replace("``", "`").replace("  # doctest: +SKIP", "")
     is_code = False
@@ -268,5 +268,5 @@ def docstring(thing: Any) -> str:
 
 
 def escaped(line: str) -> str:
-    """A line whose angle brackets are no markup."""
+    """Escape angle brackets that are not markup."""
     return line.replace("<", "&lt;")
