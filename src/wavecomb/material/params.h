@@ -129,7 +129,7 @@ WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const
                                             const MakePoint& make_point, const Mask<F>& active) {
   constexpr size_t kOwn = info_of(Bsdf::kProgram).own_count();
   if constexpr (requires { typename Bsdf::Params; }) {
-    static_assert(kOwn == 0, "What a program has to itself beside Params is read by Params::fetch");
+    static_assert(kOwn == 0, "Params::fetch must read the program-specific parameters");
     return Bsdf::Params::template fetch<kInputs, Bsdf::kTextured>(materials, material, uv,
                                                                   footprint, make_point, active);
   } else if constexpr (kOwn == 0) {
