@@ -292,7 +292,7 @@ class LightCharts {
     return {h / s.size, turn < 0 ? turn + 1 : turn};
   }
 
-  /// Distance across to the near side, at an angle.
+  /// Perpendicular distance from the receiver to the near side of a cylinder, at an angle across.
   static double across(const Seen& s, double angle) {
     const double off = s.distance * std::sin(angle);
     return s.distance * std::cos(angle) - std::sqrt(std::max(0.0, s.radius * s.radius - off * off));

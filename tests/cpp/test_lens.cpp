@@ -65,7 +65,7 @@ TEST(Lens, WhatFoldsOverIsRefused) {
 TEST(Lens, AMapMovesPixels) {
   const FilterTable filter(FilterKind::kBox, 1);
   Camera camera;
-  // 2 x 2 nodes: the image shrinks to its middle half.
+  // A lens map of 2 x 2 nodes that shrinks the image to its middle half.
   camera.lens_map = {{0.25f, 0.25f, 0.75f, 0.25f}, {0.25f, 0.75f, 0.75f, 0.75f}};
   const CameraSetup setup(camera, 100, 100, filter);
   Camera plain;

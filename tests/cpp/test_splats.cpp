@@ -29,7 +29,7 @@ TEST(FixedPoint, RoundsCutsAndForgivesNan) {
   EXPECT_EQ(unit.from(3e38f), FixedPoint::kMost);
   EXPECT_EQ(unit.to_double(24), 1.5);
   EXPECT_EQ(FixedPoint{3}.from(20.f), 2) << "2.5, and ties go to even";
-  // The guaranteed number of maximum summands does not overflow.
+  // The sum of as many maximum values as FixedPoint guarantees does not overflow.
   EXPECT_GE(std::numeric_limits<int64_t>::max() / FixedPoint::kMost, int64_t{1} << 21);
 }
 

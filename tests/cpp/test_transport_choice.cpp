@@ -66,7 +66,8 @@ TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
 }
 
 TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
-  // Variance 1 + 3 without light paths, and 1 + 1 at s = 1.
+  // Variance of camera paths plus that of the remaining light: 1 + 3 without light paths, and 1 + 1
+  // with one light path per camera path.
   const TransportGain gain = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
   const double path = kRays + 0.7 * kRecords, joint = kRays + 0.8 * kRecords;
   EXPECT_EQ(gain.share.exponent, 0);

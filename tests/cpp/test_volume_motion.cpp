@@ -68,7 +68,7 @@ TEST(VolumeMotion, TransmittanceIsThatOfThePlaceAtTheTime) {
       squares += x * x;
     }
     const double mean = sum / kCount, error = std::sqrt((squares / kCount - mean * mean) / kCount);
-    // Sixteen steps of a voxel, plus one at each end that falls to 0.
+    // The ramp is 16 voxel steps long, and falls to 0 within another step at each end.
     EXPECT_NEAR(mean, std::exp(-0.5 * 1.5 * 17. / 16), 4.2 * error + 1e-5) << time;
     EXPECT_LT(error, 3e-3);
   }

@@ -62,7 +62,7 @@ def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
 
 
 def bounds(least: float | None, most: float | None) -> str:
-    """Format the limits that exist."""
+    """Format the minimum and the maximum, as far as they exist."""
     ends = [f"{end:.10g}" if end is not None and abs(end) < 1e30 else "" for end in (least, most)]
     if ends[0] and ends[1]:
         return f"{ends[0]} to {ends[1]}"

@@ -9,6 +9,7 @@
 
 namespace wavecomb {
 
+/// UsdGeomMesh::subdivisionScheme.
 enum class Scheme : uint8_t { kCatmullClark, kLoop, kBilinear };
 /// UsdGeomMesh::interpolateBoundary: none, edgeOnly, edgeAndCorner.
 enum class BoundaryRule : uint8_t { kNone, kEdgeOnly, kEdgeAndCorner };
@@ -57,6 +58,8 @@ struct Welded {
   std::vector<int32_t> indices;
   std::vector<float> values;
 };
+/// Merges equal values of corners that share a vertex, bit for bit. `corners` are vertex indices
+/// below `vertex_count`; `values` is (corners, width). Throws Error if indices or sizes are invalid.
 Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
                     std::span<const float> values, uint32_t width);
 

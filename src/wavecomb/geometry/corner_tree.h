@@ -10,6 +10,7 @@
 
 namespace wavecomb {
 
+/// Corner of a polygon in the plane.
 struct Corner {
   double x, y;
   bool operator==(const Corner&) const = default;
@@ -59,7 +60,9 @@ class CornerTree {
     for (uint32_t& place : place_of_) place = rank[place];
   }
 
+  /// Number of different positions.
   size_t place_count() const { return places_.size(); }
+  /// Index of the position of a corner.
   uint32_t place_of(uint32_t corner) const { return place_of_[corner]; }
 
   /// Removes a corner. Returns whether it was the last one at its position.

@@ -10,6 +10,7 @@
 
 namespace wavecomb {
 
+/// Point or vector in double precision.
 using Point = Vec3<double>;
 
 inline double dot_of(const Point& a, const Point& b) {

@@ -41,6 +41,7 @@ class Subdivision {
   /// Whether at most two faces meet at each edge and one fan of faces at each vertex. Non-manifold
   /// edges and vertices are kept sharp.
   bool is_manifold() const;
+  /// Number of vertices of the finest level.
   uint32_t vertex_count() const;
 
   /// Returns the visible faces: without holes and without faces that have no limit

@@ -25,6 +25,7 @@ struct Displacement {
 /// Interpolation of a primvar.
 enum class PrimvarKind : uint8_t { kNone, kVertex, kVarying, kFaceVarying };
 
+/// Values of a primvar on the cage, or on triangles at level 0.
 struct SurfacePrimvar {
   PrimvarKind kind = PrimvarKind::kNone;
   /// (points, width), or (values of the channel, width). At level 0, face-varying values other than

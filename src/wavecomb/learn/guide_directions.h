@@ -18,6 +18,7 @@ using DirectionBins = std::array<double, kGuideBins>;
 /// Returns the unit vector at the centre of a bin.
 Vec3<float> bin_direction(uint32_t bin);
 
+/// Training bounces of one region; not owned.
 using Bounces = std::span<const TrainingRecord* const>;
 
 /// Fits the sphere on which the incident light of a region is assumed to lie. Its centre is the

@@ -51,6 +51,7 @@ struct GuideFacts {
   double guided_share = 0, moment_ratio = 1;
 };
 
+/// A guiding field and the arrays that kernels read. Immutable except for weigh_bounces.
 class GuideField {
  public:
   /// Creates an empty field. It guides nothing but defines the grid for bounce_place.
@@ -69,7 +70,9 @@ class GuideField {
   /// (learn/worth.h).
   void weigh_bounces(std::span<const BounceLesson> lessons, const PathLesson& paths);
 
+  /// Pointers to the arrays; valid while the field exists and weigh_bounces is not called.
   GuideView view() const;
+  /// Memory of the arrays.
   size_t bytes() const;
   const GuideFacts& facts() const { return facts_; }
   const GuideParts& parts() const { return parts_; }

@@ -22,7 +22,7 @@ struct PathStep {
   double survival;     ///< survival probability q
   double vertex_cost;  ///< shading cost including the light sample
 
-  /// Contribution for a throughput of 1: l.
+  /// Contribution l for a throughput of 1.
   double value() const { return left > 0 ? brought / arrived : 0; }
 };
 

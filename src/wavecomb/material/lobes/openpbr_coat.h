@@ -10,6 +10,7 @@
 
 namespace wavecomb {
 
+/// Parameters of the coat that do not depend on directions.
 template <typename F>
 struct OpenPbrCoat {
   F weight, roughness, ior, f0, darkening;

@@ -6,6 +6,7 @@
 
 namespace wavecomb {
 
+/// BSDF that reflects nothing.
 template <typename F>
 class EmissiveBsdf : public BsdfTraits {
  public:
