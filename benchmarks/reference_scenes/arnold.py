@@ -149,11 +149,11 @@ class _Translator:
             colour = Gf.Vec3f(shader.GetInput("Kd_color").Get()) * shader.GetInput("Kd").Get()
             path = str(material.GetPath())
             self.out.material("diffuse", {"diffuseColor": colour}, path=path)
-            self._note("arnold:lambert is diffuse")
+            self._note("arnold:lambert becomes diffuse")
         elif kind == "arnold:standard_surface":
             self._coloured_instances(_source(shader, "inputs:base_color"))
         elif kind:
-            self._note(f"{kind} is drawn grey")
+            self._note(f"{kind} becomes grey")
 
     def _flat(self, material: UsdShade.Material, shader: UsdShade.Shader) -> None:
         """A flat shader shows the plain colour: translate it to emission."""
@@ -183,7 +183,7 @@ class _Translator:
             raise NotImplementedError(f"{kind} below {_kind(shader)}")
         use = Image(file, space, (repeats, repeats), uv=uv)
         self.out.material("emissive", {}, textures={"emissiveColor": use}, path=path)
-        self._note(f"{_kind(shader)} of {kind} is emission of its image")
+        self._note(f"{_kind(shader)} of {kind} becomes emission by its image")
 
     def _coloured_instances(self, reader: UsdShade.Shader) -> None:
         """Make user_data_rgb of point instancers the displayColor of unbound instances."""
@@ -197,7 +197,9 @@ class _Translator:
                 shown.Set(primvar.Get(Usd.TimeCode.EarliestTime()))
             elif prim.IsA(UsdGeom.Gprim) and primvar:
                 UsdShade.MaterialBindingAPI(prim).UnbindAllBindings()
-        self._note(f"the instances' {name} is displayColor, without standard_surface's reflection")
+        self._note(
+            f"the instances' {name} becomes displayColor, without standard_surface's reflection"
+        )
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> None:
         """Arnold treats meshes without a subdivisionScheme as polygons with smooth shading."""
@@ -205,12 +207,14 @@ class _Translator:
         if scheme.HasAuthoredValue():
             return
         scheme.Set(UsdGeom.Tokens.none)
-        self._note("a mesh whose subdivisionScheme is not authored is polygons, not catmullClark")
+        self._note(
+            "a mesh without an authored subdivisionScheme is drawn as polygons, not catmullClark"
+        )
         normals = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
         if normals and normals.HasValue() and normals.GetInterpolation() == "vertex":
             return
         if normals:
-            self._note("normals of an elementSize that USD cannot read are averaged ones")
+            self._note("normals with an elementSize that USD cannot read are replaced by averages")
             for name in ("primvars:normals", "primvars:normals:indices"):
                 mesh.GetPrim().GetAttribute(name).Block()
         found = averaged_normals(
@@ -225,7 +229,9 @@ class _Translator:
         seen = prim.GetAttribute("primvars:arnold:camera")
         if seen and seen.Get() == 0:
             self.test.covered_only = True
-            self._note("primvars:arnold:camera = 0: compared where the reference is covered")
+            self._note(
+                "primvars:arnold:camera = 0: only pixels that the reference covers are compared"
+            )
 
 
 def _matrix(node: dict[str, list[str]]) -> Gf.Matrix4d:

@@ -195,7 +195,7 @@ class _Translator:
                 raise Inexpressible(f"{missing} is not among the assets")
             self._dropped.append(self._arrays(number)[0])
             self.film.notes.append(
-                f"{missing} is not among the assets; pixels that it covers are not compared"
+                f"{missing} is not among the assets: pixels that it covers are not compared"
             )
             return
         if emitters:
@@ -248,7 +248,7 @@ class _Translator:
         kind = self.scene.kind(number)
         for bsdf in self.scene.all_of(number, "BSDF"):
             if any(self.scene.colour(bsdf, "reflectance")):
-                self.film.notes.append("lamps reflect nothing")
+                self.film.notes.append("lights do not reflect")
         if kind == "sphere":
             centre, radius = self._sphere(number)
             self.out.sphere_light([float(v) for v in centre], radius, radiance)
@@ -291,7 +291,7 @@ class _Translator:
 
     def _microfacets(self, kind: str, number: int, props: Any) -> str:
         if kind.startswith("rough") and str(props.get("distribution", "beckmann")) != "ggx":
-            self.film.notes.append("Beckmann facets are GGX ones of the same alpha")
+            self.film.notes.append("GGX of the same alpha replaces Beckmann")
         alpha = float(props.get("alpha", 0.1)) if kind.startswith("rough") else 0.0
         inputs: dict[str, Any] = {"roughness": math.sqrt(alpha)}
         if kind.endswith("conductor"):
@@ -306,7 +306,9 @@ class _Translator:
         if kind.endswith("dielectric"):
             return self.out.material("dielectric", {**inputs, "diffuseColor": (1.0, 1.0, 1.0)})
         if props.get("nonlinear", False):
-            self.film.notes.append("plastic is linear: what its base scatters back keeps its hue")
+            self.film.notes.append(
+                "plastic is linear: interreflection does not change the hue of its base"
+            )
         colour = self.scene.colour(number, "diffuse_reflectance")
         return self.out.material("plastic", {**inputs, "diffuseColor": colour})
 
@@ -328,7 +330,7 @@ class _Translator:
         normal, edge = (conductor_reflectance(eta, k, angle) for angle in (0.0, 82.0))
         cosine = math.cos(math.radians(82.0))
         schlick = normal + (1.0 - normal) * (1.0 - cosine) ** 5
-        self.film.notes.append("the metal is OpenPBR's: F82 fitted to the index")
+        self.film.notes.append("the metal is OpenPBR's, with F82 fitted to the index")
         inputs = {
             "base_metalness": 1.0,
             "base_color": normal,

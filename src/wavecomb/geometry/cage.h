@@ -59,7 +59,8 @@ struct Welded {
   std::vector<float> values;
 };
 /// Merges equal values of corners that share a vertex, bit for bit. `corners` are vertex indices
-/// below `vertex_count`; `values` is (corners, width). Throws Error if indices or sizes are invalid.
+/// below `vertex_count`; `values` is (corners, width). Throws Error if indices or sizes are
+/// invalid.
 Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
                     std::span<const float> values, uint32_t width);
 
