@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Samples of a light at its vertices, each with a = g / q and r = b / q.
+/// Share of a part, and a = g / q and r = b / q at each vertex where it was selected.
 struct Samples {
   double share;
   std::vector<std::pair<double, double>> found;

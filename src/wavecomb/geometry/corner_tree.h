@@ -74,9 +74,9 @@ class CornerTree {
   }
 
   /// Finds a position inside or on the counter-clockwise triangle a, b, c that still has corners
-  /// and is not a vertex of the triangle. Returns kNone if there is none. The search order is
-  /// pseudo-random: the same blocking corner is then seldom found again just before it is removed.
-  /// Adds the number of visited nodes to `steps`.
+  /// and is not a vertex of the triangle. Returns kNone if there is none. Of several, it
+  /// returns a pseudo-random one, which is seldom the next to be removed; its removal would require
+  /// another search. Adds the number of visited nodes to `steps`.
   uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {
     const double lo_x = std::min({a.x, b.x, c.x}), hi_x = std::max({a.x, b.x, c.x});
     const double lo_y = std::min({a.y, b.y, c.y}), hi_y = std::max({a.y, b.y, c.y});

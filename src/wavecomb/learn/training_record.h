@@ -13,8 +13,8 @@ struct TrainingRecord {
   float nearness;  ///< 1 / distance to the next hit; 0: no hit; negative: unknown
   uint32_t material;
   uint8_t axis;  ///< guide_axis of the surface
-  /// Radiance that returned along wi times BSDF over density: a one-sample estimate of the integral
-  /// of f Le |cos| over directions.
+  /// Radiance that returned along wi, times f |cos| over pdf: a one-sample estimate of the integral
+  /// of f L |cos| over directions, with L the incident radiance.
   float value;
   float pdf;        ///< density with which wi was sampled
   float bsdf_pdf;   ///< density of wi under the BSDF alone
