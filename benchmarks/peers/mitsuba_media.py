@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert recorded volumes to Mitsuba media, each in an invisible box.
 
-Mitsuba has no overlapping and no emissive media. Colours by grid are left to the tests.
+Mitsuba has no overlapping and no emissive media. Only tests cover colour grids.
 """
 
 from __future__ import annotations

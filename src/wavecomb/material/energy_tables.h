@@ -54,7 +54,7 @@ const float* energy_tables(std::span<const Material> materials);
 template <typename F>
 struct EnergyLookup {
   const float* table;
-  UInt<F> node;  ///< index of the node below in cosine and roughness
+  UInt<F> node;  ///< index of the lower node in cosine and roughness
   F at_cosine, at_roughness;
 
   EnergyLookup(const float* values, const F& cosine, const F& roughness) : table(values) {
