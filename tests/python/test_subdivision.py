@@ -589,7 +589,7 @@ BROKEN = {
     "a crease refers to a point that does not exist": (
         "int[] creaseIndices = [0, 9]; int[] creaseLengths = [2]; float[] creaseSharpnesses = [5]"
     ),
-    "a sharp corner refers to a point": "int[] cornerIndices = [-3]; float[] cornerSharpnesses = [5]",
+    "a sharp corner refers to": "int[] cornerIndices = [-3]; float[] cornerSharpnesses = [5]",
 }
 
 
