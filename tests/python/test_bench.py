@@ -18,14 +18,13 @@ import pytest
 from click.testing import CliRunner
 from parts import not_here
 
-from wavecomb.bench import columns, counters, noise, peers
-from wavecomb.bench.estimate import Estimator
+from wavecomb.bench import columns, counters, machine, peers
 from wavecomb.bench.oracle import policy_of
-from wavecomb.bench.plan import Limits, chosen, configurations, schedule
+from wavecomb.bench.plan import Estimator, Limits, chosen, configurations, schedule
 from wavecomb.bench.process import run_process
 from wavecomb.bench.results import ResultFolder
-from wavecomb.bench.stage_folder import naming_folder, with_folder
 from wavecomb.bench.suite import find_suite, load_suite, suite_names
+from wavecomb.bench.suite_model import naming_folder, with_folder
 from wavecomb.cli import main
 from wavecomb.errors import WavecombError
 
@@ -235,16 +234,19 @@ def rows_with(spread: float, noisy_share: float) -> list[dict[str, Any]]:
 
 
 def test_noise_is_found_and_quiet_is_not() -> None:
-    quiet = noise.judge(rows_with(0.02, 0.05))
+    quiet = machine.judge(rows_with(0.02, 0.05))
     assert not quiet.noisy and quiet.variation == pytest.approx(0.02, rel=0.2)
-    assert "vary by" in noise.judge(rows_with(0.2, 0.0)).lines[0]
-    assert "were disturbed" in noise.judge(rows_with(0.02, 0.6)).lines[0]
-    assert noise.judge([]).variation is None
+    assert "vary by" in machine.judge(rows_with(0.2, 0.0)).lines[0]
+    assert "were disturbed" in machine.judge(rows_with(0.02, 0.6)).lines[0]
+    assert machine.judge([]).variation is None
     spins = [0.0100 + 0.0001 * (k % 7) for k in range(80)] + [0.02] * 10
-    reference = noise.spin_reference(spins)
+    reference = machine.spin_reference(spins)
     assert reference == pytest.approx(0.0101, abs=1e-4)
-    assert not noise.is_noisy(0.0, 0.0105, reference) and noise.is_noisy(0.0, 0.0120, reference)
-    assert noise.is_noisy(0.06, 0.0100, reference) and not noise.is_noisy(None, 0.0100, reference)
+    assert not machine.is_noisy(0.0, 0.0105, reference)
+    assert machine.is_noisy(0.0, 0.0120, reference)
+    assert machine.is_noisy(0.06, 0.0100, reference) and not machine.is_noisy(
+        None, 0.0100, reference
+    )
 
 
 def test_estimates_follow_what_was_measured() -> None:

@@ -23,8 +23,7 @@ from wavecomb.bench.analysis_interval import (
     to_column,
     verdict,
 )
-from wavecomb.bench.analysis_order import order_effects, regrets
-from wavecomb.bench.analysis_ratios import ratios
+from wavecomb.bench.analysis_ratios import order_effects, ratios, regrets
 from wavecomb.errors import WavecombError
 
 

@@ -16,8 +16,7 @@ import pytest
 from bench_results import everything, policy_rows, runs_of, write_folder
 
 from wavecomb.bench.analysis_data import load
-from wavecomb.bench.report import LARGEST_PNG, LARGEST_SVG, build
-from wavecomb.bench.report_facts import equality, warnings_of
+from wavecomb.bench.report import LARGEST_PNG, LARGEST_SVG, build, equality, warnings_of
 from wavecomb.bench.report_parts import number, table
 from wavecomb.picture.image import read_image
 

@@ -10,7 +10,7 @@ import pytest
 
 import wavecomb
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.clear_stages import LENS_FOCUS, lens, water
+from wavecomb.scenes.caustics import LENS_FOCUS, lens, water
 from wavecomb.scenes.mesh import face_areas, signed_volume
 
 

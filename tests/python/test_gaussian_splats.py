@@ -20,7 +20,7 @@ from wavecomb import _core
 from wavecomb.cli import main
 from wavecomb.picture.image import linear_from_srgb
 from wavecomb.scenes import write_scene
-from wavecomb.scenes.capture import basis, linear_harmonics
+from wavecomb.scenes.splats import basis, linear_harmonics
 from wavecomb.usd import load_stage
 
 Floats = NDArray[np.float64]

@@ -18,8 +18,7 @@ from wavecomb.cli import main
 from wavecomb.picture.collect import collect, pictures_of
 from wavecomb.picture.compare_folders import pair_up
 from wavecomb.picture.image import display, read_codes, write_exr, write_png
-from wavecomb.picture.sheet import contact_sheet, wipe
-from wavecomb.picture.thumbnails import Look, fitted
+from wavecomb.picture.thumbnails import Look, contact_sheet, fitted, wipe
 from wavecomb.run.frame_names import matching
 
 RED, GREEN, BLUE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from wavecomb.bench.figures_style import (
     BLUE,
     FAINT,
     GREEN,
+    INTERVALS,
+    MOST_PANELS,
     ORANGE,
     PURPLE,
     RED,
@@ -31,6 +33,7 @@ from wavecomb.bench.figures_style import (
     Drawn,
     clipped,
     colour,
+    count_words,
     figure,
     label_ends,
     marker,
@@ -42,7 +45,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-INTERVALS = "Whiskers: 95 % intervals"
 STACK = (
     ("camera, film", ("generate_s", "collect_s", "resolve_s"), GREEN),
     ("order of rays", ("order_rays_s",), PURPLE),
@@ -58,7 +60,6 @@ COHERENCE = (
     ("texture_homogeneity", "same texture place", False),
     ("lane_utilisation", "lanes full", False),
 )
-MOST_PANELS = 12
 
 
 def ratio_figure(
@@ -268,12 +269,6 @@ def intervals(runs: pd.DataFrame, x: str, metric: str) -> list[tuple[float, floa
     order = np.argsort(levels)
     found = bootstrap(values, lambda means: means, positive=True)
     return [(float(levels[k]), found[k].value, found[k].low, found[k].high) for k in order]
-
-
-def count_words(sizes: Any) -> str:
-    """How many: "8", or "3 to 8"."""
-    low, high = int(min(sizes)), int(max(sizes))
-    return str(low) if low == high else f"{low} to {high}"
 
 
 def _line(

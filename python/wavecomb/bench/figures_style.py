@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wavecomb.extras import needed
 from wavecomb.picture.files import replacing
@@ -25,6 +25,9 @@ INK = "#1a1b1e"
 FAINT = "#8a8d93"
 WHISKERS = 4.0
 """How far a logarithmic axis goes beyond the points, as a factor."""
+INTERVALS = "Whiskers: 95 % intervals"
+MOST_PANELS = 12
+"""Figures with more panels are left out."""
 WIDTH = 7.4
 """Width of a figure in inches: a column of text in print."""
 
@@ -133,6 +136,12 @@ def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> Non
             if moved > 2.0
             else None,
         )
+
+
+def count_words(sizes: Any) -> str:
+    """How many: "8", or "3 to 8"."""
+    low, high = int(min(sizes)), int(max(sizes))
+    return str(low) if low == high else f"{low} to {high}"
 
 
 def fixed(value: float, digits: int) -> str:

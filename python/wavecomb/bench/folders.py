@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wavecomb.bench.analysis_data import load
 from wavecomb.bench.analysis_interval import LEVEL, Estimate, holm, verdict
 from wavecomb.bench.analysis_ratios import GAINS
-from wavecomb.bench.noise import MAX_SPIN, spin_reference
+from wavecomb.bench.machine import MAX_SPIN, spin_reference
 from wavecomb.errors import WavecombError
 from wavecomb.extras import needed
 

@@ -6,17 +6,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from wavecomb.bench import figures_runs, figures_verdicts
+from wavecomb.bench import figures_forest, figures_runs
+from wavecomb.bench.analysis_costs import PREDICTIONS, calibration, material_costs
 from wavecomb.bench.analysis_data import BASELINES, BOUNDS
-from wavecomb.bench.analysis_order import order_effects, regrets
-from wavecomb.bench.analysis_ratios import means, ratios
+from wavecomb.bench.analysis_factorial import effects, factors_of
+from wavecomb.bench.analysis_ratios import means, order_effects, ratios, regrets
 from wavecomb.bench.columns import COUNTER_COLUMNS
+from wavecomb.bench.figures_style import count_words, fixed
 from wavecomb.bench.oracle import BEST, COSTS, WORST
 from wavecomb.bench.report_parts import Text, Writer, interval, key_of
-from wavecomb.bench.report_tables import mean_table, order_table, ratio_table, regret_table
+from wavecomb.bench.report_tables import (
+    calibration_table,
+    effects_table,
+    mean_table,
+    order_table,
+    ratio_table,
+    regret_table,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from wavecomb.bench.analysis_data import Results
 
 _LABELS = {
     **{"shade": "shade time", "shade + order": "shade + order time", "render": "render time"},
@@ -28,7 +39,7 @@ SCHEDULING = ("lanes", "wave_size", "policy", "roulette", "ray_order", "shadow_o
 def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
     """Writes everything about one experiment."""
     out.begin(f"Experiment {name}")
-    repetitions = figures_runs.count_words(runs.groupby("config").size())
+    repetitions = count_words(runs.groupby("config").size())
     out.add(
         Text(
             f"{runs['config'].nunique()} configurations, {len(runs)} runs, {repetitions} of each, "
@@ -174,13 +185,13 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     if not order.empty:
         out.add(Text("The verdict on order", "heading"))
         out.add(order_table(order, "Each order apart from roulette: shade + order time"))
-        out.draw(figures_verdicts.order_figure(order, f"{key}-order", "shade + order time"))
+        out.draw(figures_forest.order_figure(order, f"{key}-order", "shade + order time"))
         out.findings += _order_findings(name, order)
     regret = regrets(runs)
     if not regret.empty:
         out.add(Text("Regret", "heading"))
         out.add(regret_table(regret, "Regret of a policy for all cells: render time"))
-        out.draw(figures_verdicts.regret_figure(regret, f"{key}-regret"))
+        out.draw(figures_forest.regret_figure(regret, f"{key}-regret"))
         adaptive = regret[regret["policy"] == "adaptive"]
         if not adaptive.empty:
             worst = adaptive.loc[adaptive["regret"].idxmax()]
@@ -232,3 +243,66 @@ def _bound_words(part: pd.DataFrame) -> str:
         if policy != WORST and not row.placebo_high < 1.0:
             text += ": it is not shown to beat it"
     return text
+
+
+# ---- Sections about a suite as a whole: roulette, effects, costs ---------------------------------
+
+
+def suite(out: Writer, results: Results) -> None:
+    """Writes the sections that go across experiments."""
+    ours = results.runs[results.runs["renderer"] == "wavecomb"]
+    flat = ours[ours["factor"] == ""]
+    if flat["roulette"].nunique() > 1:
+        _roulette(out, flat)
+    if len(factors_of(flat)) > 1:
+        _effects(out, flat)
+    costs = material_costs(results)
+    lines = {column: calibration(costs, column) for column in PREDICTIONS}
+    if any(lines.values()):
+        out.begin("Predicted cost")
+        out.add(calibration_table(lines, PREDICTIONS))
+        out.draw(figures_forest.cost_figure(costs, lines, "costs"))
+        first = lines["calibrated_ns"] or lines["predicted_ns"]
+        out.findings.append(
+            f"Calibration predicts what materials cost with r² = {fixed(first['r2'], 2)} and "
+            f"slope {first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
+        )
+
+
+def _roulette(out: Writer, runs: pd.DataFrame) -> None:
+    columns = {
+        **{"rays": "rays", "records": "records", "relMSE": "rel_mse", "efficiency": "efficiency"},
+        **{"shade + order": "shade_and_order_s", "render": "render_s"},
+    }
+    across = ("experiment", "factor", "factor_value")
+    metrics = compared(runs, "roulette", columns, across)
+    if "render" not in metrics:
+        return
+    title = "Roulette at the same policy, ratio of means to throughput"
+    out.begin("Roulette apart from order")
+    out.add(
+        Text(
+            "Roulette changes how much is shaded, and with it the noise; order does not. So it is "
+            "judged by efficiency, with the policy the same on both sides."
+        ),
+        ratio_table(
+            "Roulette at the same policy, ratio of means to throughput", metrics, "roulette"
+        ),
+    )
+    if "efficiency" in metrics:
+        name, title = "roulette-efficiency", "Roulette: efficiency"
+        table = metrics["efficiency"]
+        out.draw(figures_runs.ratio_figure(table, name, title, "efficiency", "roulette"))
+
+
+def _effects(out: Writer, runs: pd.DataFrame) -> None:
+    out.begin("Effects of the factors")
+    for metric, words in (
+        ("render_s", "render time"),
+        ("shade_and_order_s", "shade + order time"),
+        ("efficiency", "efficiency"),
+    ):
+        table = effects(runs, metric)
+        if not table.empty:
+            out.draw(figures_forest.effects_figure(table, f"effects-{key_of(words)}", words))
+            out.add(effects_table(table, f"Effects on {words}"))

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.bench.analysis_data import in_order
+from wavecomb.bench.figures_forest import difference_figure
 from wavecomb.bench.figures_style import Drawn
-from wavecomb.bench.figures_verdicts import difference_figure
 from wavecomb.bench.report_parts import Viewer, key_of
 from wavecomb.errors import WavecombError
 from wavecomb.picture.embedded import data_uri, smaller

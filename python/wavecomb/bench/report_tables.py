@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.bench.analysis_data import BOUNDS
-from wavecomb.bench.figures_runs import count_words
-from wavecomb.bench.figures_style import fixed
+from wavecomb.bench.figures_style import count_words, fixed
 from wavecomb.bench.report_parts import Cell, Table, interval, number, table
 
 if TYPE_CHECKING:

@@ -13,19 +13,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wavecomb.bench import machine, noise, peers
+from wavecomb.bench import machine, peers
+from wavecomb.bench.columns import run_row
 from wavecomb.bench.counters import available
-from wavecomb.bench.estimate import Estimator, calibrate, from_results
-from wavecomb.bench.jobs import Jobs
+from wavecomb.bench.jobs import Jobs, check_files, generate, make_profile
 from wavecomb.bench.oracle import ORACLES
-from wavecomb.bench.plan import Config, Run, chosen, configurations, schedule
+from wavecomb.bench.plan import (
+    Config,
+    Estimator,
+    Run,
+    calibrate,
+    chosen,
+    configurations,
+    from_results,
+    schedule,
+)
 from wavecomb.bench.process import Outcome, run_worker
-from wavecomb.bench.recordings import make_profile
 from wavecomb.bench.results import ResultFolder
-from wavecomb.bench.rows import run_row
-from wavecomb.bench.stage_folder import only_stages
-from wavecomb.bench.stages import check_files, generate
-from wavecomb.bench.suite_model import WAVECOMB, Suite
+from wavecomb.bench.suite_model import WAVECOMB, Suite, only_stages
 from wavecomb.bench.worker import judge_picture
 from wavecomb.errors import WavecombError
 from wavecomb.run.progress import time_text
@@ -249,13 +254,13 @@ class Sitting:
         after = machine.spin(threads)
         self.spins += [before, after]
         spin_s = 0.5 * (before + after)
-        reference = noise.spin_reference(self.spins)
+        reference = machine.spin_reference(self.spins)
         row = run_row(self.suite, run, len(self.folder.objects), outcome.answer)
         row |= {
             "wall_s": outcome.wall_s,
             "others_share": outcome.others_share,
             "spin_s": spin_s,
-            "noisy": noise.is_noisy(outcome.others_share, spin_s, reference),
+            "noisy": machine.is_noisy(outcome.others_share, spin_s, reference),
             "load_average": outcome.load_average,
             "started": outcome.started,
         }
@@ -285,7 +290,7 @@ class Sitting:
     # ---- after the last ------------------------------------------------------------------------
 
     def _end(self) -> None:
-        verdict = noise.judge(entry["row"] for entry in self.folder.objects)
+        verdict = machine.judge(entry["row"] for entry in self.folder.objects)
         self._document["noise"] = verdict.to_dict()
         self._document["sittings"][-1]["ended"] = machine.now()
         self._keep_machine()

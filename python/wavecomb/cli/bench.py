@@ -98,8 +98,8 @@ def run_command(
     """
     from wavecomb.bench.results import ResultFolder
     from wavecomb.bench.runner import Options, Sitting
-    from wavecomb.bench.stage_folder import naming_folder
     from wavecomb.bench.suite import find_suite, load_suite
+    from wavecomb.bench.suite_model import naming_folder
 
     chosen = load_suite(find_suite(suite))
     if stages is not None:

@@ -69,7 +69,7 @@ def write_page(
     tolerance: float | None, kind: str, look: Look,
 ) -> None:  # fmt: skip
     """Writes the page of pairs, whole or not at all."""
-    from wavecomb.picture.compare_page import compare_page
+    from wavecomb.picture.compare_folders import compare_page
 
     chosen: Kind = next((one for one in KINDS if one == kind), "absolute")
     text = compare_page(
@@ -92,7 +92,7 @@ def write_wipe(file: str, a: str, b: str, at: float, look: Look) -> None:
         WavecombError: They have other sizes.
     """
     from wavecomb.picture.image import write_png_codes
-    from wavecomb.picture.sheet import wipe
+    from wavecomb.picture.thumbnails import wipe
 
     shown = look.codes(a), look.codes(b)
     if shown[0].shape != shown[1].shape:

@@ -75,7 +75,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
     from wavecomb.errors import WavecombError
     from wavecomb.picture.image import write_png_codes
-    from wavecomb.picture.sheet import MOST, contact_sheet
+    from wavecomb.picture.thumbnails import MOST, contact_sheet
 
     if len(found) > MOST:
         raise WavecombError(f"{len(found)} pictures: a sheet has {MOST} at most")

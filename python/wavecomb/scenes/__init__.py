@@ -13,8 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from wavecomb.scenes.candles import build_candles
-from wavecomb.scenes.caustics import build_caustics
-from wavecomb.scenes.clear_stages import build_landscape, build_lens, build_pool, build_prism
+from wavecomb.scenes.caustics import (
+    build_caustics,
+    build_landscape,
+    build_lens,
+    build_pool,
+    build_prism,
+)
 from wavecomb.scenes.cornell import build_cornell, build_cornell_dragon
 from wavecomb.scenes.drinks import build_drinks
 from wavecomb.scenes.errors import SceneError

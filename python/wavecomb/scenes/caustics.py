@@ -6,12 +6,14 @@ Paths from the camera hardly find the light that comes by way of them.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.mesh import Mesh, grid_faces, smooth_normals
+from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces, smooth_normals
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.shapes import placed, turned
+from wavecomb.scenes.shapes import placed, turn_about, turned
 from wavecomb.scenes.stage import StageWriter
 
 _LAMP_RADIUS = 0.08
@@ -61,3 +63,173 @@ def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
         writer.bind(writer.mesh(f"/World/Objects/{name}", mesh).GetPrim(), material)
     writer.sphere_light("Lamp", (2.5, 4.1, -1.1), _LAMP_RADIUS, _LAMP_RADIANCE)
     writer.camera((0.0, 4.2, 6.4), (0.0, 0.35, 0.1), 40.0, options.aspect or 1.0)
+
+
+# ---- Light through clear things: waves on a pool, a lens, a prism, a ring in a wide landscape ----
+
+
+_SUN_ANGLE = 0.53
+_WATER_IOR = 1.333
+
+_POOL = (3.0, 2.0)
+"""Half of its length along x and z, metres; it is ``_DEPTH`` deep, with its water at y = 0."""
+_DEPTH, _RIM = 1.3, 0.12
+_WAVES = (
+    # direction in degrees, length and height in metres, phase
+    (20.0, 1.30, 0.020, 0.4),
+    (75.0, 0.85, 0.012, 1.9),
+    (-35.0, 0.62, 0.008, 3.1),
+    (130.0, 0.41, 0.005, 5.0),
+)
+
+LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
+"""Of the thin lens, and half its width: the lamp stands at twice its focus, and its picture is as
+far on the other side, as large as it is."""
+
+_LAND = 100.0
+"""Half of the landscape's length along x and z; the ring in it is one wide."""
+_HILL = 6.0
+
+
+def land(cells: int) -> Mesh:
+    """Hills, flat around the middle, of ``cells`` cells along each side."""
+    x, z = np.meshgrid(*[np.linspace(-_LAND, _LAND, cells + 1)] * 2)
+    far = np.clip(np.hypot(x, z) / (0.3 * _LAND) - 0.3, 0.0, 1.0)
+    waves = 1.0 + np.sin(0.11 * x + 0.7) * np.cos(0.083 * z - 0.4)
+    points = np.stack([x, 0.5 * _HILL * far * far * waves, z], axis=2)
+    points = points.reshape(-1, 3).astype(np.float32)
+    faces = grid_faces(cells + 1, cells + 1)
+    uv = (points[:, [0, 2]] / (2.0 * _LAND) + 0.5).astype(np.float32)
+    return Mesh(points, faces, smooth_normals(points, faces), uv)
+
+
+def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
+    """Wide hills in the sun, and a glass ring on the ground, which the camera is close to.
+
+    Nearly all light of the sun comes down where the camera does not look.
+    """
+    writer.material("Soil", looks.diffuse((0.45, 0.40, 0.33)))
+    writer.material("Glass", looks.CLEAR_GLASS)
+    level = options.teapot_level
+    writer.bind(writer.mesh("/World/Set/Land", land(16 * level)).GetPrim(), "Soil")
+    glass = writer.mesh("/World/Objects/Ring", placed(ring(0.5, 0.12, 0.3, level), (0.0, 0.002, 0)))
+    writer.bind(glass.GetPrim(), "Glass")
+    writer.sun("Sun", (0.55, -0.62, -0.35), _SUN_ANGLE, (3.0, 2.8, 2.5))
+    writer.dome_light("Sky", 90.0, 0.1)
+    writer.camera((0.4, 1.7, 2.6), (0.2, 0.1, -0.15), 42.0, options.aspect or 1.0)
+
+
+def water(level: int) -> Mesh:
+    """Waves over the pool, of ``level`` cells for each metre, with the normals of their formula."""
+    x0, z0 = _POOL
+    columns, rows = 2 * round(x0 * level) + 1, 2 * round(z0 * level) + 1
+    x, z = np.meshgrid(np.linspace(-x0, x0, columns), np.linspace(-z0, z0, rows))
+    height, slope_x, slope_z = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for degrees, length, amplitude, phase in _WAVES:
+        k = 2.0 * math.pi / length
+        kx, kz = k * math.cos(math.radians(degrees)), k * math.sin(math.radians(degrees))
+        angle = kx * x + kz * z + phase
+        height += amplitude * np.sin(angle)
+        slope_x += amplitude * kx * np.cos(angle)
+        slope_z += amplitude * kz * np.cos(angle)
+    normals = np.stack([-slope_x, np.ones_like(x), -slope_z], axis=2).reshape(-1, 3)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = np.stack([x, height, z], axis=2).reshape(-1, 3).astype(np.float32)
+    uv = np.stack([x, z], axis=2).reshape(-1, 2).astype(np.float32)
+    return Mesh(points, grid_faces(rows, columns), normals.astype(np.float32), uv)
+
+
+def _basin() -> tuple[FloatArray, list[list[int]]]:
+    """Floor and walls, seen from within, and the rim around."""
+    (x, z), low, high, out = _POOL, -_DEPTH, _RIM, 0.6
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    points = [(sx * x, low, sz * z) for sx, sz in corners]
+    points += [(sx * x, high, sz * z) for sx, sz in corners]
+    points += [(sx * (x + out), high, sz * (z + out)) for sx, sz in corners]
+    faces = [[3, 2, 1, 0]]
+    for low_ring in (0, 4):
+        faces += [
+            [low_ring + i, low_ring + (i + 1) % 4, low_ring + 4 + (i + 1) % 4, low_ring + 4 + i]
+            for i in range(4)
+        ]
+    return np.array(points, float), faces
+
+
+def build_pool(writer: StageWriter, options: SceneOptions) -> None:
+    """A pool with waves, and the sun, seen from under the water.
+
+    From above the light on the floor would come by way of the water twice, which no path finds.
+    """
+    writer.material("Stone", looks.diffuse((0.55, 0.53, 0.50)))
+    writer.material("Tiles", looks.diffuse((0.35, 0.62, 0.68)))
+    writer.material("Water", looks.dielectric((1.0, 1.0, 1.0), 0.0, _WATER_IOR))
+    points, faces = _basin()
+    writer.polygons("/World/Set/Basin", points[:8], faces[:5], "Tiles")
+    writer.polygons("/World/Set/Rim", points, faces[5:], "Stone")
+    surface = writer.mesh("/World/Objects/Water", water(2 * options.teapot_level))
+    writer.bind(surface.GetPrim(), "Water")
+    writer.sun("Sun", (0.45, -1.0, -0.25), _SUN_ANGLE, (2.6, 2.4, 2.1))
+    writer.dome_light("Sky", 90.0, 0.15)
+    writer.camera((-2.7, -0.4, 1.6), (0.3, -1.05, -0.4), 80.0, options.aspect or 1.0)
+
+
+def lens(level: int) -> Mesh:
+    """A lens about the origin whose axis is x: two caps of spheres of radius ``LENS_FOCUS``.
+
+    With an index of 1.5 that is its focal length, too: 1 / f = (n - 1) 2 / r.
+    """
+    r, a = LENS_FOCUS, _LENS_RADIUS
+    rings, columns = 2 * level, 8 * level
+    centre = math.sqrt(r * r - a * a)
+    angle = np.linspace(0.0, math.asin(a / r), rings + 1)
+    turn = np.linspace(0.0, 2.0 * math.pi, columns + 1)
+    turn[-1] = 0.0
+    radial = np.sin(angle)[:, None]
+    axial = np.broadcast_to(np.cos(angle)[:, None], (rings + 1, columns + 1))
+    outward = np.stack([axial, radial * np.cos(turn), radial * np.sin(turn)], axis=2).reshape(-1, 3)
+    faces = grid_faces(rings + 1, columns + 1)
+    cap = r * outward - np.array([centre, 0.0, 0.0])
+    mirrored = np.array([-1.0, 1.0, 1.0])
+    corners = np.concatenate([cap, cap * mirrored]).astype(np.float32)
+    normals = np.concatenate([outward, outward * mirrored]).astype(np.float32)
+    both = np.concatenate([faces, faces[:, ::-1] + len(outward)])
+    return Mesh(corners, both, normals, corners[:, 1:].copy())
+
+
+def build_lens(writer: StageWriter, options: SceneOptions) -> None:
+    """A lens between a small lamp and a wall, in a stop; a floor."""
+    writer.material("Matt", looks.diffuse((0.6, 0.6, 0.6)))
+    writer.material("Dark", looks.diffuse((0.04, 0.04, 0.04)))
+    writer.material("Glass", looks.CLEAR_GLASS)
+    far, h, up = 2.0 * LENS_FOCUS, 6.0, 1.4
+    floor = np.array([[-9, 0, h], [far, 0, h], [far, 0, -h], [-9, 0, -h]], float)
+    wall = np.array([[far, 0, h], [far, 2 * h, h], [far, 2 * h, -h], [far, 0, -h]], float)
+    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Matt")
+    writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Matt")
+    glass = writer.mesh("/World/Objects/Lens", placed(lens(options.teapot_level), (0.0, up, 0.0)))
+    writer.bind(glass.GetPrim(), "Glass")
+    writer.bind(
+        writer.mesh("/World/Objects/Foot", placed(ball(0.18, 8), (0.0, up - 1.08, 0.0))).GetPrim(),
+        "Dark",
+    )
+    writer.sphere_light("Lamp", (-far, up, 0.0), _LAMP_RADIUS, (2700.0, 2580.0, 2340.0))
+    writer.camera((-2.6, 3.4, 6.2), (1.6, 1.1, 0.0), 52.0, options.aspect or 1.0)
+
+
+def build_prism(writer: StageWriter, options: SceneOptions) -> None:
+    """An upright prism on a floor, a wall behind it, and the sun."""
+    writer.material("Matt", looks.diffuse((0.6, 0.58, 0.55)))
+    writer.material("Glass", looks.CLEAR_GLASS)
+    h = 6.0
+    floor = np.array([[-h, 0, h], [h, 0, h], [h, 0, -2.5], [-h, 0, -2.5]])
+    wall = np.array([[-h, 0, -2.5], [h, 0, -2.5], [h, h, -2.5], [-h, h, -2.5]])
+    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Matt")
+    writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Matt")
+    side = np.array([[math.cos(a), 0.0, math.sin(a)] for a in np.radians((90.0, 210.0, 330.0))])
+    side = 0.8 * side @ turn_about(1, 20.0).T
+    up = np.array([0.0, 1.0, 0.0])
+    points = np.concatenate([side + 0.01 * up, side + 2.0 * up])
+    faces = [[0, 1, 2], [5, 4, 3], [1, 0, 3, 4], [2, 1, 4, 5], [0, 2, 5, 3]]
+    writer.polygons("/World/Objects/Prism", points, faces, "Glass")
+    writer.sun("Sun", (-0.75, -0.38, -0.8), _SUN_ANGLE, (5.0, 4.8, 4.4))
+    writer.camera((1.2, 3.0, 6.0), (-0.4, 0.9, -0.6), 48.0, options.aspect or 1.0)

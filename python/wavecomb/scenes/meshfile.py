@@ -21,8 +21,7 @@ from wavecomb.scenes.mesh import (
     smooth_normals,
     without_flat_faces,
 )
-from wavecomb.scenes.ply import read_ply
-from wavecomb.scenes.raw_mesh import RawMesh, fans
+from wavecomb.scenes.ply import RawMesh, fans, read_ply
 
 TARGET_DIAGONAL = 3.05
 """Diagonal of our dragon's bounding box, scene units; imported meshes are scaled to it."""

@@ -8,15 +8,154 @@ changes with the view.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pxr import Gf, Vt
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.capture import Splats, add_splats, linear_harmonics, read_capture
+from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import FloatArray, Mesh, face_areas
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.ply import ply_vertices
 from wavecomb.scenes.stage import StageWriter
+
+_COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
+"""Degree by how many coefficients there are beside the first."""
+_DIRECTIONS = 128
+"""In which colours are looked at."""
+_CHUNK = 1 << 15
+"""Splats whose colours are worked out at once."""
+
+
+@dataclass
+class Splats:
+    """Gaussian splats, as UsdVol has them.
+
+    Attributes:
+        positions: (n, 3).
+        scales: (n, 3), lengths.
+        orientations: (n, 4) quaternions w, x, y, z.
+        opacities: (n,) from 0 to 1.
+        harmonics: (n, k, 3) of the colour less 0.5.
+    """
+
+    positions: FloatArray
+    scales: FloatArray
+    orientations: FloatArray
+    opacities: FloatArray
+    harmonics: FloatArray
+
+
+def read_capture(path: Path) -> Splats:
+    """Reads what 3DGS and its kin write.
+
+    Columns x, y, z, scale_* (logarithms), rot_*, opacity (a logit), f_dc_*, f_rest_* (by channel).
+
+    Raises:
+        SceneError: The file is something else.
+    """
+    try:
+        columns = ply_vertices(path.read_bytes())
+    except (OSError, ValueError, KeyError, IndexError) as error:
+        raise SceneError(f"{path}: not a capture of Gaussian splats: {error}") from error
+    rest = sum(name.startswith("f_rest_") for name in columns)
+    names = [
+        "x", "y", "z", "opacity", *(f"scale_{k}" for k in range(3)),
+        *(f"rot_{k}" for k in range(4)), *(f"f_dc_{k}" for k in range(3)),
+        *(f"f_rest_{k}" for k in range(rest)),
+    ]  # fmt: skip
+    missing = [name for name in names if name not in columns]
+    if missing or rest not in _COUNTS:
+        what = (
+            f"no {missing[0]}" if missing else f"{rest} values f_rest_*; 0, 9, 24 or 45 are known"
+        )
+        raise SceneError(f"{path}: not a capture of Gaussian splats: {what}")
+
+    def table(prefix: str, count: int) -> FloatArray:
+        return np.stack([columns[f"{prefix}{k}"] for k in range(count)], axis=1)
+
+    n = len(columns["x"])
+    first = table("f_dc_", 3)[:, None]
+    if rest:
+        others = table("f_rest_", rest).reshape(n, 3, rest // 3).transpose(0, 2, 1)
+        first = np.concatenate([first, others], axis=1)
+    with np.errstate(over="ignore"):
+        opacities = 1.0 / (1.0 + np.exp(-columns["opacity"]))
+        scales = np.exp(table("scale_", 3))
+    positions = np.stack([columns[axis] for axis in "xyz"], axis=1)
+    return Splats(positions, scales, table("rot_", 4), opacities, first)
+
+
+def basis(directions: FloatArray) -> FloatArray:
+    """Real spherical harmonics up to degree 3 of unit directions (n, 3): (n, 16).
+
+    With the phase of Condon and Shortley, as curve/harmonics.h has them.
+    """
+    x, y, z = directions.T
+    xx, yy, zz = x * x, y * y, z * z
+    high = 4 * zz - xx - yy
+    return np.stack(
+        [
+            np.full_like(x, 0.28209479),
+            -0.48860251 * y, 0.48860251 * z, -0.48860251 * x,
+            1.09254843 * x * y, -1.09254843 * y * z, 0.31539157 * (2 * zz - xx - yy),
+            -1.09254843 * x * z, 0.54627422 * (xx - yy),
+            -0.59004359 * y * (3 * xx - yy), 2.89061144 * x * y * z, -0.45704580 * y * high,
+            0.37317633 * z * (2 * zz - 3 * (xx + yy)), -0.45704580 * x * high,
+            1.44530572 * z * (xx - yy), -0.59004359 * x * (xx - 3 * yy),
+        ],
+        axis=1,
+    )  # fmt: skip
+
+
+def linear_harmonics(harmonics: FloatArray) -> FloatArray:
+    """Harmonics of linear light (n, k, 3), less 0.5, for those of colours in sRGB.
+
+    Colours are decoded in directions all over the sphere, and the harmonics are those of least
+    squares. What is below 0 there is 0.
+    """
+    from wavecomb.picture.image import linear_from_srgb
+
+    turn = np.arange(_DIRECTIONS) * (np.pi * (3.0 - 5.0**0.5))
+    z = 1.0 - (2.0 * np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+    r = np.sqrt(1.0 - z * z)
+    seen = basis(np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1))
+    seen = seen[:, : harmonics.shape[1]]
+    fit = np.linalg.pinv(seen)
+    out = np.empty(harmonics.shape, np.float64)
+    for first in range(0, len(harmonics), _CHUNK):
+        chunk = slice(first, first + _CHUNK)
+        colours = np.maximum(0.5 + seen @ harmonics[chunk], 0.0)
+        out[chunk] = fit @ (linear_from_srgb(colours) - 0.5)
+    return out
+
+
+def add_splats(writer: StageWriter, path: str, splats: Splats) -> None:
+    """Adds a prim of splats to a stage."""
+    prim = writer.stage.DefinePrim(path, "ParticleField3DGaussianSplat")
+
+    def put(name: str, kind: Any, values: FloatArray) -> None:
+        prim.GetAttribute(name).Set(kind.FromNumpy(np.ascontiguousarray(values, np.float32)))
+
+    put("positions", Vt.Vec3fArray, splats.positions)
+    put("scales", Vt.Vec3fArray, splats.scales)
+    # In memory the real part of a quaternion comes last.
+    put("orientations", Vt.QuatfArray, splats.orientations[:, [1, 2, 3, 0]])
+    put("opacities", Vt.FloatArray, splats.opacities)
+    degree = round(splats.harmonics.shape[1] ** 0.5) - 1
+    prim.GetAttribute("radiance:sphericalHarmonicsDegree").Set(degree)
+    put(
+        "radiance:sphericalHarmonicsCoefficients",
+        Vt.Vec3fArray,
+        splats.harmonics.reshape(-1, 3),
+    )
+    reach = 3.0 * splats.scales.max(1, keepdims=True)
+    low, high = (splats.positions - reach).min(0), (splats.positions + reach).max(0)
+    prim.GetAttribute("extent").Set([Gf.Vec3f(*map(float, end)) for end in (low, high)])
+
 
 _Y0, _Y1 = 0.5 / math.sqrt(math.pi), math.sqrt(0.75 / math.pi)
 _LAMP = np.array([-3.2, 6.0, 4.5])

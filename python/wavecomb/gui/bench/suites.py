@@ -52,11 +52,10 @@ def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
     Raises:
         WavecombError: The suite is invalid; one line.
     """
-    from wavecomb.bench.estimate import Estimator
     from wavecomb.bench.machine import limits
-    from wavecomb.bench.plan import configurations
-    from wavecomb.bench.stage_folder import only_stages
+    from wavecomb.bench.plan import Estimator, configurations
     from wavecomb.bench.suite import find_suite, load_suite
+    from wavecomb.bench.suite_model import only_stages
 
     suite = load_suite(find_suite(name))
     configs = configurations(only_stages(suite, stages), limits())
