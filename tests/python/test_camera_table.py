@@ -148,7 +148,7 @@ def test_an_added_row_is_in_the_stub(with_rows: None) -> None:
 
 def test_an_added_row_is_kept_by_poses_of_the_window(with_rows: None) -> None:
     from wavecomb.gui.viewport import navigate
-    from wavecomb.gui.viewport.orbit import pose_of_scene
+    from wavecomb.gui.viewport.navigate import pose_of_scene
 
     camera = {**_scene(pixel_aspect=2).camera, "squint": 0.5}
     pose = navigate.orbit(pose_of_scene(camera, "/Cam"), np.zeros(3), 0.1, 0.0, "Y")

@@ -234,7 +234,7 @@ def test_fingerprints_tell_cameras_apart():
 
 def test_a_pose_of_the_window_keeps_the_camera(tmp_path):
     from wavecomb.gui.viewport import navigate
-    from wavecomb.gui.viewport.orbit import pose_of_scene
+    from wavecomb.gui.viewport.navigate import pose_of_scene
 
     text = SKY + f'def Camera "Cam" {{ {LENS} {back(7)} token projection = "orthographic" }}'
     scene = load_stage(write(tmp_path, text)).scene

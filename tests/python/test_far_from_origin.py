@@ -467,7 +467,7 @@ def test_what_floats_cannot_hold_is_said(
 
 def test_cameras_and_positions_of_the_window() -> None:
     """Poses are of the scene; what is shown of them is of the world."""
-    from wavecomb.gui.viewport.orbit import Pose
+    from wavecomb.gui.viewport.navigate import Pose
     from wavecomb.gui.viewport.scene_lookup import camera_pose
 
     usd = open_text(f"""def Camera "C" {{

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Views of lists: whole rows are chosen, and the roles of `headed_model` are painted."""
+"""Views of lists: whole rows are chosen, and the roles of `table_model` are painted."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.headed_model import ColourRole, ToneRole
 from wavecomb.gui.swatch import swatch
+from wavecomb.gui.table_model import ColourRole, ToneRole
 from wavecomb.gui.widgets import named
 
 Index = QModelIndex | QPersistentModelIndex

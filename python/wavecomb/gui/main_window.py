@@ -22,16 +22,14 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.about import make_about
-from wavecomb.gui.actions import make_action
-from wavecomb.gui.history_actions import HistoryActions, UnsavedMark
+from wavecomb.gui.actions import HistoryActions, UnsavedMark, make_action
 from wavecomb.gui.menus import CHECKED, MENUS, entries
 from wavecomb.gui.messages import MessageBar, log_folder
 from wavecomb.gui.panels import make_panels
 from wavecomb.gui.recent_stages import RecentStages
 from wavecomb.gui.scene.autosave import Autosave
 from wavecomb.gui.scene.scene_panel import ScenePanel
-from wavecomb.gui.shortcuts import ShortcutsDialog
+from wavecomb.gui.shortcuts import ShortcutsDialog, make_about
 from wavecomb.gui.status import StatusLine
 from wavecomb.gui.viewport.display_bar import DisplayBar
 from wavecomb.gui.viewport.inspector import Inspector

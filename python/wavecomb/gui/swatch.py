@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtGui import QColor, QIcon, QPainter, QPixmap
+from numpy.typing import NDArray
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPixmap
 
 from wavecomb.gui import theme
 
@@ -42,3 +43,14 @@ def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
     # Else a row that is selected would tint it.
     icon.addPixmap(pixmap, QIcon.Mode.Selected)
     return icon
+
+
+# ---- Pixels as Qt has them; for the window's thread ----------------------------------------------
+
+
+def to_qimage(pixels: NDArray[np.uint8]) -> QImage:
+    """(height, width, 3) 8-bit codes as an image that owns its data."""
+    height, width = pixels.shape[:2]
+    data = np.ascontiguousarray(pixels)
+    borrowed = QImage(data.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+    return borrowed.convertToFormat(QImage.Format.Format_RGB32)

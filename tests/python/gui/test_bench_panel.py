@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench_results import policy_rows, write_folder
 
 from wavecomb.errors import WavecombError
+from wavecomb.gui.bench.choice import Choice, suite_info, suite_infos
 from wavecomb.gui.bench.panel import BenchPanel
-from wavecomb.gui.bench.suites import Choice, suite_info, suite_infos
 
 LEFT = Qt.MouseButton.LeftButton
 TINY = """

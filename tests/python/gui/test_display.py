@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from wavecomb.errors import WavecombError
+from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport import display, ocio
 from wavecomb.gui.viewport.display import Look
-from wavecomb.gui.viewport.qimages import to_qimage
 from wavecomb.picture import image
 
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QDoubleSpinBox, QLineEdit, QToolButton
 import wavecomb
 from wavecomb.gui import theme
 from wavecomb.gui.main_window import MainWindow
-from wavecomb.gui.scene.ranges import Range, differs
+from wavecomb.gui.scene.form_model import Range, differs
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.scene.value_fields import (
     ColourField,

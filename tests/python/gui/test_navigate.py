@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from wavecomb.gui.viewport import navigate
-from wavecomb.gui.viewport.orbit import Pose
+from wavecomb.gui.viewport.navigate import Pose
 from wavecomb.usd.cameras.framing import corners
 
 BOX = np.array([[-1.0, -2.0, -3.0], [2.0, 1.0, 0.5]])

@@ -16,7 +16,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLineEdit, QPushButton, QSpinBox
 
 from wavecomb.gui import theme
-from wavecomb.gui.scene.material_costs import material_costs, short_names
+from wavecomb.gui.scene.material_plots import material_costs, short_names
 from wavecomb.gui.scheduling.plots import Curves
 from wavecomb.gui.scheduling.plots_panel import PlotsPanel
 from wavecomb.gui.scheduling.run_log import Run

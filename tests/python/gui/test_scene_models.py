@@ -11,16 +11,15 @@ from PySide6.QtWidgets import QApplication
 from scene_stage import write_stage
 
 import wavecomb.gui
-from wavecomb.gui.headed_model import ColourRole, ToneRole
 from wavecomb.gui.scene import lights_model, materials_model
-from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER, SWITCH
+from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER, SWITCH, Range
 from wavecomb.gui.scene.lights_model import LightForm, LightsModel
 from wavecomb.gui.scene.materials_model import MaterialForm, MaterialsModel
 from wavecomb.gui.scene.notes_model import NotesFilter, NotesModel, rows_of
-from wavecomb.gui.scene.ranges import Range
 from wavecomb.gui.scene.scene_edits import SceneEdits
 from wavecomb.gui.scene.scene_model import VISIBILITY, SceneModel, StateRole
 from wavecomb.gui.scene.variants_model import VariantsModel
+from wavecomb.gui.table_model import ColourRole, ToneRole
 from wavecomb.gui.viewport.cameras_model import CamerasModel
 
 KEY, BULB, SKY = (f"/World/Lights/{name}" for name in ("Key", "Bulb", "Sky"))

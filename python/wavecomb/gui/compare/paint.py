@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter
 
 from wavecomb.gui import theme
-from wavecomb.gui.viewport.qimages import to_qimage
+from wavecomb.gui.swatch import to_qimage
 from wavecomb.picture import image
 from wavecomb.picture.heatmap import Scale
 

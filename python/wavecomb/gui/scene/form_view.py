@@ -17,8 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, SWITCH, FieldRow, FormModel
-from wavecomb.gui.scene.ranges import differs
+from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, SWITCH, FieldRow, FormModel, differs
 from wavecomb.gui.scene.value_fields import (
     ColourField,
     DrivenField,

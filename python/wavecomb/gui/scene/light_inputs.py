@@ -9,8 +9,7 @@ from typing import Any
 
 from pxr import Gf, Sdf, Usd
 
-from wavecomb.gui.scene.form_model import COLOUR, NUMBER, SWITCH
-from wavecomb.gui.scene.ranges import Range
+from wavecomb.gui.scene.form_model import COLOUR, NUMBER, SWITCH, Range
 from wavecomb.light_table import EDITABLE, LightParameter, light_parameters, of_kind
 from wavecomb.usd.lights.light import KINDS
 from wavecomb.usd.looks.parameters import as_stored

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Qt
 
-from wavecomb.gui.headed_model import ColourRole, HeadedModel, ToneRole
 from wavecomb.gui.scene.form_model import FieldRow, FormModel
 from wavecomb.gui.scene.light_inputs import LightInput
 from wavecomb.gui.scene.visibility import uneditable
+from wavecomb.gui.table_model import ColourRole, HeadedModel, ToneRole
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits

@@ -9,11 +9,11 @@ from PySide6.QtCore import QModelIndex, Qt, Signal
 from PySide6.QtWidgets import QSplitter, QTableView, QVBoxLayout, QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.headed_model import HeadedModel
 from wavecomb.gui.list_view import lay_out_rows
 from wavecomb.gui.scene.form_model import FormModel
 from wavecomb.gui.scene.form_view import FormView
 from wavecomb.gui.scene.value_fields import Field
+from wavecomb.gui.table_model import HeadedModel
 
 
 class ListAndForm(QWidget):

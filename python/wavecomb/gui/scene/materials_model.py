@@ -8,9 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Qt
 
-from wavecomb.gui.headed_model import ColourRole, HeadedModel
-from wavecomb.gui.scene.form_model import COLOUR, DRIVEN, NUMBER, SWITCH, FieldRow, FormModel
-from wavecomb.gui.scene.ranges import UNIT, Colour, Range
+from wavecomb.gui.scene.form_model import (
+    COLOUR,
+    DRIVEN,
+    NUMBER,
+    SWITCH,
+    UNIT,
+    Colour,
+    FieldRow,
+    FormModel,
+    Range,
+)
+from wavecomb.gui.table_model import ColourRole, HeadedModel
 from wavecomb.material_table import material_parameters as known_parameters
 
 if TYPE_CHECKING:

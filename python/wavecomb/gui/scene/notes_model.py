@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, QSortFilterProxyModel, Qt
 
-from wavecomb.gui.headed_model import HeadedModel, ToneRole
+from wavecomb.gui.table_model import HeadedModel, ToneRole
 
 if TYPE_CHECKING:
     from wavecomb.usd import Finding, LoadedStage

@@ -10,8 +10,8 @@ from pxr import Sdf, Usd, UsdGeom
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, Qt
 from PySide6.QtGui import QFont
 
-from wavecomb.gui.headed_model import ToneRole
 from wavecomb.gui.scene.visibility import HIDDEN_ABOVE, NOT_DRAWN, VISIBLE, state, uneditable
+from wavecomb.gui.table_model import ToneRole
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits

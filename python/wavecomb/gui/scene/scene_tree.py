@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 from pxr import Sdf, UsdGeom
 from PySide6.QtCore import (
     QModelIndex,
+    QPersistentModelIndex,
     QPoint,
+    QRectF,
+    QSize,
     Qt,
     QTimer,
     Signal,
@@ -20,6 +23,9 @@ from PySide6.QtGui import (
     QGuiApplication,
     QKeyEvent,
     QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPen,
 )
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -27,6 +33,8 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMenu,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
     QTreeView,
     QVBoxLayout,
     QWidget,
@@ -34,7 +42,6 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import theme
 from wavecomb.gui.list_view import RowDelegate
-from wavecomb.gui.scene.eye import EyeDelegate
 from wavecomb.gui.scene.scene_model import (
     HEADERS,
     NAME,
@@ -43,11 +50,57 @@ from wavecomb.gui.scene.scene_model import (
     VISIBILITY,
     PathRole,
     SceneModel,
+    StateRole,
     search,
 )
+from wavecomb.gui.scene.visibility import HIDDEN, NOT_DRAWN, VISIBLE
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
+
+
+class EyeDelegate(QStyledItemDelegate):
+    """Paints an eye: open, crossed out, or faint where something above hides the prim."""
+
+    def sizeHint(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> QSize:
+        """As Qt has it: rows are high enough to be hit."""
+        return QSize(theme.em(2), theme.em(1.5))
+
+    def paint(
+        self,
+        painter: QPainter,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+    ) -> None:
+        """As Qt has it."""
+        super().paint(painter, option, index)
+        seen = index.data(StateRole)
+        if seen == NOT_DRAWN or seen is None:
+            return
+        size = min(option.rect.height() * 0.8, option.rect.width())
+        box = QRectF(0, 0, size, size * 0.6)
+        box.moveCenter(QRectF(option.rect).center())
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = theme.text() if seen in (VISIBLE, HIDDEN) else theme.dim()
+        painter.setPen(QPen(colour, size / 12))
+        left, right = box.center().x() - box.width() / 2, box.center().x() + box.width() / 2
+        middle = box.center().y()
+        lid = QPainterPath()
+        lid.moveTo(left, middle)
+        lid.quadTo(box.center().x(), box.top() - box.height() * 0.4, right, middle)
+        lid.quadTo(box.center().x(), box.bottom() + box.height() * 0.4, left, middle)
+        painter.drawPath(lid)
+        if seen == VISIBLE:
+            painter.setBrush(colour)
+        pupil = size * 0.14
+        painter.drawEllipse(box.center(), pupil, pupil)
+        if seen != VISIBLE:
+            painter.drawLine(box.bottomLeft(), box.topRight())
+        painter.restore()
+
 
 MAX_FOUND = 2000
 """Prims that a search shows."""

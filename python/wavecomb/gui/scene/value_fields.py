@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.scene.ranges import UNIT, Colour, Range
+from wavecomb.gui.scene.form_model import UNIT, Colour, Range
 from wavecomb.gui.swatch import from_display, swatch, to_display
 
 Control = Qt.KeyboardModifier.ControlModifier

@@ -9,11 +9,10 @@ from typing import Any
 from PySide6.QtWidgets import QGridLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.compare.picture_revision import PictureRevision
+from wavecomb.gui.compare.same_picture import PictureRevision
 from wavecomb.gui.scene.material_plots import MaterialsTab
 from wavecomb.gui.scheduling.choices import recipe_of, scheduling_of
-from wavecomb.gui.scheduling.phase_plot import PhasePlot
-from wavecomb.gui.scheduling.plots import Curves, Legend
+from wavecomb.gui.scheduling.plots import Curves, Legend, PhasePlot
 from wavecomb.gui.scheduling.run_log import Run, RunLog, Series, labels, last_of
 from wavecomb.gui.scheduling.run_rates import moments, rate
 from wavecomb.gui.scheduling.run_table import amount

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QObject, Qt, Signal
 
-from wavecomb.gui.viewport.orbit import Pose
+from wavecomb.gui.viewport.navigate import Pose
 from wavecomb.gui.viewport.session import Session
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.viewport.qimages import to_qimage
+from wavecomb.gui.swatch import to_qimage
 from wavecomb.picture.layer_view import heat
 
 

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.gui.viewport import ocio
+from wavecomb.gui.viewport.frames import Frame
 from wavecomb.picture import image
 from wavecomb.picture.layer_view import (
     NOT_FINITE,
@@ -99,3 +100,23 @@ def show(layer: NDArray[Any], look: Look) -> Shown:
     """
     light = functools.partial(develop, exposure=look.exposure, view=look.view)
     return show_layer(layer, look.layer, light, low=look.low, high=look.high)
+
+
+# ---- Turns a layer of a frame into what the screen shows. No Qt ----------------------------------
+
+
+@dataclass(frozen=True)
+class Developed:
+    """A frame, how it is looked at, and what that gives."""
+
+    frame: Frame
+    look: Look
+    shown: Shown
+
+
+def develop_frame(frame: Frame, look: Look) -> Developed:
+    """A layer of a frame for the screen; the beauty where it does not have the layer yet."""
+    layer = frame.layer(look.layer)
+    if layer is None:
+        return Developed(frame, look, show(frame.beauty, replace(look, layer="beauty")))
+    return Developed(frame, look, show(layer, look))

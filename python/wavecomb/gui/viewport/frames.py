@@ -97,3 +97,17 @@ def enlarged(image: Array, width: int, height: int) -> Array:
     rows = np.arange(height) * image.shape[0] // height
     columns = np.arange(width) * image.shape[1] // width
     return image[rows[:, None], columns[None, :]]
+
+
+# ---- A frame without its noise. No Qt ------------------------------------------------------------
+
+
+def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
+    """A frame and its beauty by Open Image Denoise; None where it lacks the layers for that."""
+    from wavecomb.picture.denoise import denoise
+
+    albedo = frame.layers.get("guide_albedo")
+    normal = frame.layers.get("guide_normal")
+    if albedo is None or normal is None:
+        return frame, None
+    return frame, denoise(frame.beauty, albedo, normal, threads=frame.setup.threads)

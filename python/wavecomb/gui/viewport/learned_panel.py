@@ -13,7 +13,7 @@ from wavecomb.gui import theme
 from wavecomb.gui.scheduling.plots import Bar, Bars
 from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.directions_view import DirectionsView
-from wavecomb.gui.viewport.orbit import UPS
+from wavecomb.gui.viewport.navigate import UPS
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.picture.directions import density_map, map_point
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from PySide6.QtCore import QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter
 
+from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport.display import Legend, ramp
-from wavecomb.gui.viewport.qimages import to_qimage
 
 _BEHIND = QColor(0, 0, 0, 190)
 _TEXT = QColor(240, 240, 240)

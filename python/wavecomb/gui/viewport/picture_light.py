@@ -12,9 +12,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.compare.picture_revision import PictureRevision
 from wavecomb.gui.compare.same_picture import (
     PictureBook,
+    PictureRevision,
     Verdict,
     even_samples,
     fingerprint,

@@ -7,10 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.gui.viewport.denoiser import denoised_frame
-from wavecomb.gui.viewport.develop import develop_frame
-from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look
-from wavecomb.gui.viewport.frames import Frame
+from wavecomb.gui.viewport.display import LINEAR, NEUTRAL, Look, develop_frame
+from wavecomb.gui.viewport.frames import Frame, denoised_frame
 from wavecomb.picture.image import Transfer, write_png_codes
 from wavecomb.picture.output import scene_metadata
 from wavecomb.picture.rendered import NOWHERE, Picture, in_world

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.gui.viewport.engine import Edit
-from wavecomb.gui.viewport.orbit import Pose, pose_of
+from wavecomb.gui.viewport.navigate import Pose, pose_of
 from wavecomb.usd.stage.origin import WORLD, Origin, moved_to
 
 if TYPE_CHECKING:

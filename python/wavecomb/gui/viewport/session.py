@@ -27,7 +27,7 @@ from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import Live
 from wavecomb.gui.viewport.lives import Lives
-from wavecomb.gui.viewport.orbit import Pose, pose_of_scene
+from wavecomb.gui.viewport.navigate import Pose, pose_of_scene
 from wavecomb.gui.viewport.saving import save_frame
 from wavecomb.gui.viewport.scene_lookup import (
     camera_pose,
@@ -36,8 +36,7 @@ from wavecomb.gui.viewport.scene_lookup import (
     make_renderer,
     prim_bounds,
 )
-from wavecomb.gui.viewport.tasks import Tasks
-from wavecomb.gui.worker import Worker
+from wavecomb.gui.worker import Tasks, Worker
 from wavecomb.usd.stage.origin import WORLD
 
 if TYPE_CHECKING:

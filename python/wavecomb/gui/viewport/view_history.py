@@ -15,7 +15,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from wavecomb.gui.viewport.orbit import Pose
+from wavecomb.gui.viewport.navigate import Pose
 from wavecomb.gui.viewport.session import Session
 
 MERGE_S = 0.7

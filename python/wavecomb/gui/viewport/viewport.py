@@ -18,14 +18,13 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from wavecomb.gui import theme
+from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport import navigate
-from wavecomb.gui.viewport.develop import Developed, develop_frame
-from wavecomb.gui.viewport.display import Look
+from wavecomb.gui.viewport.display import Developed, Look, develop_frame
 from wavecomb.gui.viewport.drags import Control, Drag, Left, Shift, drag_of
 from wavecomb.gui.viewport.frames import Frame
-from wavecomb.gui.viewport.orbit import Pose, Vector
+from wavecomb.gui.viewport.navigate import Pose, Vector
 from wavecomb.gui.viewport.picture_view import PictureView
-from wavecomb.gui.viewport.qimages import to_qimage
 from wavecomb.gui.viewport.session import Session
 from wavecomb.gui.worker import Worker
 from wavecomb.usd.cameras.framing import corners
