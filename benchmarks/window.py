@@ -91,7 +91,7 @@ class Run:
 
     def stop(self):
         """Seconds from stop to standstill."""
-        engine = self.session._live._engine
+        engine = self.session._engine
         self.session.restart()
         end = time.perf_counter() + 0.4
         self.until(lambda: time.perf_counter() > end)

@@ -257,9 +257,9 @@ def test_kept_picture_against_live_settings(qtbot, session):
         assert verdict(window).startswith("beauty: different")
         assert "seed 5" in window.findChild(QLabel, "titleB").text()
         window.a.follow()
-        assert window.a.side.name.startswith("viewport") and live in session._lives.twins
+        assert window.a.side.name.startswith("viewport") and live in session.twins
         window.b.keep()
-        assert live not in session._lives.twins  # it was given back
+        assert live not in session.twins  # it was given back
     finally:
         window.shutdown()
 

@@ -148,7 +148,7 @@ def test_cancel_within_100_ms(new_session, qtbot, cornell):
     qtbot.waitUntil(
         lambda: session.last_frame is not None and session.last_frame.scale == 1, timeout=20000
     )
-    engine, waits = session._live._engine, []
+    engine, waits = session._engine, []
     for _ in range(5):
         qtbot.wait(60)
         begun = time.perf_counter()
@@ -200,7 +200,7 @@ def test_pause_stop_and_resume(new_session, qtbot, cornell):
 
 def test_a_pause_that_comes_while_a_frame_is_made_is_told(new_session, qtbot, cornell):
     session = new_session(width=64, height=64, spp=100_000)
-    engine = session._live._engine
+    engine = session._engine
     take, taken = engine._listener.on_frame, []
 
     def pause_in_the_third(frame):

@@ -47,6 +47,10 @@ class Edit:
             for index, values in others.items():
                 mine[index] = {**mine.get(index, {}), **values}
 
+    def copied(self) -> Edit:
+        """A copy: each live render adds later edits to its own."""
+        return Edit(self.camera, dict(self.materials), dict(self.lights))
+
     def __bool__(self) -> bool:
         return bool(self.camera or self.materials or self.lights)
 

@@ -26,7 +26,6 @@ from wavecomb.gui.viewport.display import Look
 from wavecomb.gui.viewport.engine import Edit
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.live import Live
-from wavecomb.gui.viewport.lives import Lives
 from wavecomb.gui.viewport.navigate import Pose, pose_of_scene
 from wavecomb.gui.viewport.saving import save_frame
 from wavecomb.gui.viewport.scene_lookup import (
@@ -46,20 +45,13 @@ if TYPE_CHECKING:
 __all__ = ["Frame", "Live", "Pose", "Session", "Setup"]
 
 
-class Session(QObject):
-    """A stage and its live render.
+class Session(Live):
+    """A stage, its live render, and further live renders of it with other settings (twins).
 
     Signals:
         opened(LoadedStage): A stage was read, or read again after a change of what is in it.
         closing(): The USD stage is about to be read again from the disk: let go of its prims.
-        frame(Frame): A picture, of the newest version only; an exact one has ``final``.
-        statistics(dict): docs/statistics.md, about twice a second while it renders.
-        setup_changed(Setup): Settings were changed.
-        edited(int): The new version, after every change.
-        state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
         busy(str): What goes on beside rendering; "": nothing.
-        failed(str): One line that says what to do.
-        warned(str): One line.
         camera_changed(Pose): The camera moved, or another was chosen.
         selected(str | None): Path of the prim that was chosen, in the picture or elsewhere.
         saved(str): A file was written.
@@ -74,25 +66,19 @@ class Session(QObject):
         material_edits: What ``edit_material`` changed, by the material's name.
         light_edits: What ``edit_light`` changed, by the light's name and its number among those of
             that name.
+        twins: Live renders of the same scene and camera with settings of their own.
     """
 
     opened = Signal(object)
     closing = Signal()
-    frame = Signal(object)
-    statistics = Signal(object)
-    setup_changed = Signal(object)
-    edited = Signal(int)
-    state_changed = Signal(str)
     busy = Signal(str)
-    failed = Signal(str)
-    warned = Signal(str)
     camera_changed = Signal(object)
     selected = Signal(object)
     saved = Signal(str)
     noted = Signal(object)
 
     def __init__(self, setup: Setup | None = None, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(setup, parent)
         self.stage: LoadedStage | None = None
         self.usd: Usd.Stage | None = None
         self.up_axis = "Y"
@@ -100,58 +86,26 @@ class Session(QObject):
         self.material_edits: dict[str, dict[str, Any]] = {}
         self.light_edits: dict[tuple[str, int], dict[str, Any]] = {}
         self.selection: str | None = None
-        self._lives = Lives(setup, self)
-        self._live = self._lives.first
-        for name in (
-            *("frame", "statistics", "setup_changed", "edited", "state_changed", "failed"),
-            "warned",
-        ):
-            getattr(self._live, name).connect(getattr(self, name))
+        self.twins: list[Live] = []
         self._loader = Worker("load", self)
-        self._loader.done.connect(self._take)
+        self._loader.done.connect(self._take_stage)
         self._loader.failed.connect(self._take_failure)
         self._tasks = Tasks(self)
         self._tasks.busy.connect(self.busy)
         self._tasks.failed.connect(self.failed)
         self._request: Request | None = None
         self._request_wanted: Request | None = None
-        self._numbers = itertools.count(1)
+        self._readings = itertools.count(1)
         self._reading = 0
         self._closed = False
 
     # ---- what there is -------------------------------------------------------------------------
 
     @property
-    def setup(self) -> Setup:
-        """Settings of the live render."""
-        return self._live.setup
-
-    @property
-    def version(self) -> int:
-        """The version of scene and setup; every change has a higher one."""
-        return self._live.version
-
-    @property
-    def oldest(self) -> int:
-        """Frames of a version below this must not come to the screen any more."""
-        return self._live.oldest
-
-    @property
-    def last_frame(self) -> Frame | None:
-        """What ``frame`` gave last."""
-        return self._live.last_frame
-
-    @property
-    def state(self) -> str:
-        """What ``state_changed`` gave last."""
-        return self._live.state
-
-    @property
     def scene(self) -> Scene | None:
         """The core's scene as edited, or None; ``Scene.material(i)`` and ``light(i)`` read it."""
-        renderer = self._live.renderer
-        if renderer is not None:
-            return renderer.scene
+        if self.renderer is not None:
+            return self.renderer.scene
         return self.stage.scene if self.stage is not None else None
 
     @property
@@ -205,11 +159,11 @@ class Session(QObject):
         if request.usd is not None and self.stage is not None:
             request = replace(request, textures=self.stage.textures)
         request = replace(request, size=(self.setup.width, self.setup.height))
-        self._request_wanted, self._reading = request, next(self._numbers)
+        self._request_wanted, self._reading = request, next(self._readings)
         self._tasks.begin("load", what)
         self._loader.submit(partial(read, request), self._reading)
 
-    def _take(self, number: int, found: Read) -> None:
+    def _take_stage(self, number: int, found: Read) -> None:
         request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
             return  # a newer one is under way
@@ -230,7 +184,9 @@ class Session(QObject):
             self.pose = there or pose_of_scene(loaded.scene.camera, loaded.camera_path)
         edit = edits_again(loaded.scene, self.material_edits, self.light_edits)
         edit.camera = self.pose.options() if self.pose is not None else None
-        self._lives.begin(partial(make_renderer, loaded.scene, self.setup.threads), loaded, edit)
+        make = partial(make_renderer, loaded.scene, self.setup.threads)
+        for live in self._lives():
+            live.begin(make, loaded, edit.copied())
         self._tasks.end("load")
         self.opened.emit(loaded)
         self.camera_changed.emit(self.pose)
@@ -255,14 +211,6 @@ class Session(QObject):
 
     # ---- settings, camera, materials, lights ----------------------------------------------------
 
-    def change(self, **values: Any) -> bool:
-        """Changes fields of the setup and restarts; a bad value ends in ``failed``, nothing else.
-
-        Returns:
-            Whether the setup was changed.
-        """
-        return self._live.change(**values)
-
     def set_camera(self, pose: Pose, *, moving: bool = False) -> None:
         """Looks from elsewhere.
 
@@ -271,12 +219,21 @@ class Session(QObject):
             moving: More follows at once: pictures are reduced until ``settle``.
         """
         self.pose = pose
-        self._lives.edit(Edit(camera=pose.options()), moving=moving)
+        self._edit_all(Edit(camera=pose.options()), moving=moving)
         self.camera_changed.emit(pose)
 
+    def _lives(self) -> tuple[Live, ...]:
+        return (self, *self.twins)
+
+    def _edit_all(self, edit: Edit, *, moving: bool) -> None:
+        for live in self._lives():
+            live.edit(edit.copied(), moving=moving)
+
     def settle(self) -> None:
-        """A movement has ended."""
-        self._lives.settle()
+        """Ends a movement, also of the twins."""
+        super().settle()
+        for live in self.twins:
+            live.settle()
 
     @property
     def source(self) -> Source | None:
@@ -309,30 +266,28 @@ class Session(QObject):
             return
         name = self.scene.materials[material][0]
         self.material_edits.setdefault(name, {}).update(values)
-        self._lives.edit(Edit(materials={material: values}), moving=moving)
+        self._edit_all(Edit(materials={material: values}), moving=moving)
 
     def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
         """Changes parameters of a light by number: keyword arguments of ``add_light``."""
         if self.scene is None:
             return
         self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
-        self._lives.edit(Edit(lights={light: values}), moving=moving)
+        self._edit_all(Edit(lights={light: values}), moving=moving)
 
     # ---- the render ------------------------------------------------------------------------------
 
     def pick(self, x: float, y: float) -> dict[str, Any] | None:
         """What is seen at (x, y) in pixels of the full-size picture; None: nothing, or no scene."""
-        renderer = self._live.renderer
-        if renderer is None:
+        if self.renderer is None:
             return None
-        return renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
+        return self.renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
 
     def learned(self, x: float, y: float) -> dict[str, Any] | None:
         """What the render has learned of the surface there, as ``Renderer.learned`` gives it."""
-        renderer = self._live.renderer
-        if renderer is None:
+        if self.renderer is None:
             return None
-        return renderer.learned(float(x), float(y), self.setup.width, self.setup.height)
+        return self.renderer.learned(float(x), float(y), self.setup.width, self.setup.height)
 
     def select(self, path: str | None) -> None:
         """Chooses a prim by its path; None: nothing."""
@@ -347,21 +302,21 @@ class Session(QObject):
         return prim_bounds(self.usd, self.stage, self.selection)
 
     def pause(self) -> None:
-        """The render and its twins stand still."""
-        self._lives.pause()
+        """Pauses the render and its twins."""
+        super().pause()
+        for live in self.twins:
+            live.pause()
 
     def resume(self) -> None:
-        """Goes on, or begins again where it was stopped; so do twins."""
-        self._lives.resume()
-
-    def stop(self) -> None:
-        """Ends the render; the picture stays."""
-        self._live.stop()
+        """Continues the render and its twins, or restarts those that were stopped."""
+        super().resume()
+        for live in self.twins:
+            live.resume()
 
     def restart(self) -> None:
         """Begins again from the first sample."""
         if self.stage is not None:
-            self._live.restart()
+            super().restart()
 
     def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
         """Writes all layers (.exr) or what is shown (.png); ``saved`` or ``failed`` follows.
@@ -380,16 +335,23 @@ class Session(QObject):
         self.run(f"writing {Path(name).name}", work, lambda: self.saved.emit(name))
 
     def twin(self, setup: Setup) -> Live:
-        """A second live render of the same scene and camera, with settings of its own.
+        """Starts a second live render of the same scene and camera, with settings of its own.
 
-        It follows all edits. Give it back with ``drop_twin``.
+        It follows all edits. ``drop_twin`` ends it.
         """
-        edit = Edit(camera=self.pose.options() if self.pose is not None else None)
-        return self._lives.add_twin(setup, self.stage, edit)
+        live = Live(setup, self)
+        self.twins.append(live)
+        if self.renderer is not None:
+            edit = Edit(camera=self.pose.options() if self.pose is not None else None)
+            live.begin(self.renderer.twin, self.stage, edit)
+        return live
 
     def drop_twin(self, live: Live) -> None:
         """Ends a twin."""
-        self._lives.drop_twin(live)
+        if live in self.twins:
+            self.twins.remove(live)
+            live.shutdown()
+            live.deleteLater()
 
     def run(
         self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
@@ -406,7 +368,10 @@ class Session(QObject):
         if self._closed:
             return
         self._closed = True
-        self._lives.shutdown()
+        for live in self.twins:
+            live.shutdown()
+        self.twins.clear()
+        super().shutdown()
         self._loader.close(0.5)
         self._tasks.close()
         self.stage = self.usd = None
