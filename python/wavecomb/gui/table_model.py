@@ -16,7 +16,7 @@ ToneRole = Qt.ItemDataRole.UserRole + 11
 
 
 class HeadedModel(QAbstractTableModel):
-    """A table under fixed headers; subclasses have ``row_count`` and ``data``.
+    """A table under fixed headers; subclasses have ``data``.
 
     Args:
         headers: Titles of the columns.
@@ -28,20 +28,23 @@ class HeadedModel(QAbstractTableModel):
     ) -> None:
         super().__init__(parent)
         self._headers, self._tips = headers, tips
+        self.rows: list[Any] = []
 
-    def row_count(self) -> int:
-        """How many rows there are."""
-        raise NotImplementedError
+    def fill(self, rows: Sequence[Any]) -> None:
+        """Replaces all rows; selections are lost."""
+        self.beginResetModel()
+        self.rows = list(rows)
+        self.endResetModel()
 
     def tell(self, first: int, last: int) -> None:
         """Some columns say something else now."""
-        if self.row_count():
-            corners = self.index(0, first), self.index(self.row_count() - 1, last)
+        if self.rows:
+            corners = self.index(0, first), self.index(len(self.rows) - 1, last)
             self.dataChanged.emit(*corners)
 
     def rowCount(self, parent: Any = None) -> int:
         """As Qt has it."""
-        return 0 if parent is not None and parent.isValid() else self.row_count()
+        return 0 if parent is not None and parent.isValid() else len(self.rows)
 
     def columnCount(self, parent: Any = None) -> int:
         """As Qt has it."""
@@ -70,7 +73,6 @@ class Table(HeadedModel):
     ) -> None:
         super().__init__(list(header), parent, list(header.values()))
         self._left = left
-        self._rows: list[Sequence[Cell]] = []
         self._bold: Collection[int] = ()
         self._colours: Mapping[tuple[int, int], QColor] = {}
 
@@ -81,33 +83,27 @@ class Table(HeadedModel):
         colours: Mapping[tuple[int, int], QColor] | None = None,
     ) -> None:
         """Takes new rows; selection and scrolling stay where rows do."""
-        more = len(rows) - len(self._rows)
+        more = len(rows) - len(self.rows)
         if more > 0:
-            self.beginInsertRows(QModelIndex(), len(self._rows), len(rows) - 1)
+            self.beginInsertRows(QModelIndex(), len(self.rows), len(rows) - 1)
         elif more < 0:
-            self.beginRemoveRows(QModelIndex(), len(rows), len(self._rows) - 1)
-        self._rows, self._bold, self._colours = list(rows), bold, colours or {}
+            self.beginRemoveRows(QModelIndex(), len(rows), len(self.rows) - 1)
+        self.rows, self._bold, self._colours = list(rows), bold, colours or {}
         if more > 0:
             self.endInsertRows()
         elif more < 0:
             self.endRemoveRows()
-        if rows:
-            last = self.index(len(rows) - 1, self.columnCount() - 1)
-            self.dataChanged.emit(self.index(0, 0), last)
-
-    def row_count(self) -> int:
-        """How many rows there are."""
-        return len(self._rows)
+        self.tell(0, self.columnCount() - 1)
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """What one cell shows."""
         row, column = index.row(), index.column()
         if role == Qt.ItemDataRole.DisplayRole:
-            return self._rows[row][column][0]
+            return self.rows[row][column][0]
         if role == Qt.ItemDataRole.UserRole:
-            return self._rows[row][column][1]
+            return self.rows[row][column][1]
         if role == Qt.ItemDataRole.ToolTipRole:
-            return str(self._rows[row][column][1]) if column in self._left else None
+            return str(self.rows[row][column][1]) if column in self._left else None
         if role == Qt.ItemDataRole.TextAlignmentRole:
             side = (
                 Qt.AlignmentFlag.AlignLeft if column in self._left else Qt.AlignmentFlag.AlignRight

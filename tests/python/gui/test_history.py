@@ -175,7 +175,7 @@ def test_the_title_marks_what_is_not_saved(scene_window, qtbot, tmp_path):
 
 @pytest.mark.slow
 def test_solo_is_undone_as_a_whole(scene_window):
-    edits, lights = scene_window.scene.edits, scene_window.scene.lights.model.paths
+    edits, lights = scene_window.scene.edits, scene_window.scene.lights.model.rows
     first, second = lights[:2]
     edits.set_visible([lights[2]], False)
 

@@ -71,7 +71,7 @@ def type_value(spin, text):
 
 
 def unfold(materials):
-    for group in materials.groups.values():
+    for group in materials.form.groups.values():
         group.head.setChecked(True)
 
 
@@ -79,7 +79,7 @@ def unfold(materials):
 def test_an_openpbr_material_shows_its_own_inputs(panel):
     materials = panel.materials
     materials.choose(f"{LOOKS}/Car")
-    shown = list(materials.groups)
+    shown = list(materials.form.groups)
     assert shown == [
         "Base", "Specular", "Transmission", "Subsurface", "Fuzz", "Coat", "Thin Film", "Emission",
         "Geometry",
@@ -93,14 +93,14 @@ def test_an_openpbr_material_shows_its_own_inputs(panel):
     assert isinstance(fields["geometry_thin_walled"], SwitchField)
     assert fields["specular_ior"].bounds.soft_low == 1.0
     assert fields["emission_luminance"].bounds.soft_high == 1000.0
-    opened = {name for name, group in materials.groups.items() if group.rows.isVisible()}
+    opened = {name for name, group in materials.form.groups.items() if group.rows.isVisible()}
     assert opened == {"Base", "Coat", "Emission"}, "what is not as by default, and the base"
-    QTest.mouseClick(materials.groups["Specular"].head, Qt.MouseButton.LeftButton)
-    assert materials.groups["Specular"].rows.isVisible()
+    QTest.mouseClick(materials.form.groups["Specular"].head, Qt.MouseButton.LeftButton)
+    assert materials.form.groups["Specular"].rows.isVisible()
     materials.choose("/World/I1/Gold")
-    assert materials.groups["Specular"].rows.isVisible(), "it stays as somebody left it"
+    assert materials.form.groups["Specular"].rows.isVisible(), "it stays as somebody left it"
     materials.choose(f"{LOOKS}/Gltf")
-    assert "emissive_strength" in materials.fields and "Iridescence" in materials.groups
+    assert "emissive_strength" in materials.fields and "Iridescence" in materials.form.groups
 
 
 def test_what_a_texture_drives_has_no_value(panel, qtbot):

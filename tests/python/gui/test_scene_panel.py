@@ -245,7 +245,7 @@ def test_edits_inside_instances_are_live_only(panel, final, qtbot, tmp_path):
 def test_lights(panel, same_as_saved, qtbot, stage_path, final):
     lights = panel.lights
     panel.tabs.setCurrentWidget(lights)
-    assert lights.model.paths == [f"/World/Lights/{name}" for name in ("Key", "Bulb", "Sky")]
+    assert lights.model.rows == [f"/World/Lights/{name}" for name in ("Key", "Bulb", "Sky")]
     before = final(panel.session).beauty
     assert lights.choose("/World/Lights/Bulb")
     type_value(lights.fields["exposure"].spin, "1.5")
@@ -299,11 +299,11 @@ def test_lights_off_and_alone(panel, same_as_saved, qtbot, stage_path):
         click(view, model.index(0, 2), box(view))
     assert panel.edits.is_hidden("/World/Lights/Key")
     off = same_as_saved(panel)
-    assert len(model.paths) == 3  # one that is off is still listed
+    assert len(model.rows) == 3  # one that is off is still listed
     for number in (1, 2):
         with qtbot.waitSignal(panel.session.opened, timeout=20000):
             click(view, model.index(number, 3), box(view))
-        alone = [not panel.edits.is_hidden(path) for path in model.paths]
+        alone = [not panel.edits.is_hidden(path) for path in model.rows]
         assert alone == [i == number for i in range(3)]
     same_as_saved(panel)
     with qtbot.waitSignal(panel.session.opened, timeout=20000):
@@ -318,7 +318,7 @@ def test_emission_in_a_stage_without_lights(open_panel, stage_path, tmp_path, sa
     dark = stage_path.with_name("dark.usda")
     stage.Flatten().Export(str(dark))
     panel = open_panel(dark)
-    assert panel.lights.model.paths == [""]
+    assert panel.lights.model.rows == [""]
     panel.lights.view.selectRow(0)
     type_value(panel.lights.fields["exposure"].spin, "-1")
     assert "soft_dome" in panel.edits.lines()[0]
@@ -327,7 +327,7 @@ def test_emission_in_a_stage_without_lights(open_panel, stage_path, tmp_path, sa
     with qtbot.waitSignal(panel.session.opened, timeout=20000):
         panel.materials.fields["emission"].spins[0].setValue(5.0)
     same_as_saved(panel)
-    assert panel.lights.model.paths == []
+    assert panel.lights.model.rows == []
 
 
 def test_notes(panel, qtbot):
@@ -353,7 +353,7 @@ def test_a_pick_selects_everywhere(panel):
     session = panel.session
     hit = session.pick(9, 20)
     assert hit["object"] == "/World/Things/Ball"
-    panel.show_pick(hit)
+    session.select(hit["object"])
     assert panel.tree.view.chosen() == ["/World/Things/Ball"]
     assert panel.materials.chosen.path == "/World/Looks/Red"
     session.select("/World/Lights/Sky")

@@ -79,8 +79,8 @@ def use(window, stage, folder):
             spin.selectAll()
             QTest.keyClicks(spin, "0.25")
             QTest.keyClick(spin, Qt.Key.Key_Return)
-    scene.edits.set_light(scene.lights.model.paths[0], "exposure", 1.0)
-    path = scene.lights.model.paths[0]
+    scene.edits.set_light(scene.lights.model.rows[0], "exposure", 1.0)
+    path = scene.lights.model.rows[0]
     scene.edits.set_visible([path], False)
     settled(window)
     scene.edits.undo()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,13 +109,15 @@ class FormModel(QObject):
         rows: Fields, in order.
         title: What it is of, "" for nothing.
         note: Said in place of fields, or below them.
+        set_typing: Starts or ends a value that is being typed, which is one step of undo.
     """
 
     remade = Signal()
     changed = Signal()
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, set_typing: Callable[[bool], None], parent: QObject | None = None) -> None:
         super().__init__(parent)
+        self.set_typing = set_typing
         self.rows: list[FieldRow] = []
         self.title = self.note = ""
         self._folds: dict[str, bool] = {}
@@ -129,10 +132,6 @@ class FormModel(QObject):
 
     def set_value(self, name: str, value: Any) -> None:
         """Edits a field; None: back to what the stage has."""
-        raise NotImplementedError
-
-    def set_typing(self, typing: bool) -> None:
-        """Whether a value is being typed, which is one step however slow it is."""
         raise NotImplementedError
 
     def groups(self) -> list[str]:

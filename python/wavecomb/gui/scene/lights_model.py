@@ -21,37 +21,29 @@ SOFT_DOME = "soft dome"
 
 
 class LightsModel(HeadedModel):
-    """The list: lights that are switched off are in it, too."""
+    """The list of lights by their paths, with those that are switched off."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)
         self._edits = edits
-        self.paths: list[str] = []
-        edits.scene_changed.connect(self.fill)
+        edits.scene_changed.connect(self.read)
         edits.changed.connect(self.refresh)
-        self.fill()
+        self.read()
 
-    def fill(self) -> None:
+    def read(self) -> None:
         """Reads which lights there are."""
         stage = self._edits.stage
-        self.beginResetModel()
-        self.paths = []
-        if stage is not None and self._edits.edits is not None:
-            self.paths = list(dict.fromkeys((*stage.lights, *stage.light_paths)))
-        self.endResetModel()
+        is_open = stage is not None and self._edits.edits is not None
+        self.fill(dict.fromkeys((*stage.lights, *stage.light_paths)) if is_open else ())
 
     def refresh(self) -> None:
         """What rows say may have changed."""
         self.tell(0, len(HEADERS) - 1)
 
-    def row_count(self) -> int:
-        """Lights."""
-        return len(self.paths)
-
     def flags(self, index: Any) -> Qt.ItemFlag:
         """As Qt has it: what can be switched has a box."""
         flags = super().flags(index)
-        if index.column() in (ON, SOLO) and self._switch(self.paths[index.row()]):
+        if index.column() in (ON, SOLO) and self._switch(self.rows[index.row()]):
             flags |= Qt.ItemFlag.ItemIsUserCheckable
         return flags
 
@@ -60,7 +52,7 @@ class LightsModel(HeadedModel):
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """As Qt has it, and ``ColourRole`` and ``ToneRole``."""
-        path, column = self.paths[index.row()], index.column()
+        path, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             if column == NAME:
                 return path.rpartition("/")[2] or SOFT_DOME
@@ -91,12 +83,12 @@ class LightsModel(HeadedModel):
         """As Qt has it: boxes switch lights."""
         if role != Qt.ItemDataRole.CheckStateRole:
             return False
-        path = self.paths[index.row()]
+        path = self.rows[index.row()]
         on = Qt.CheckState(value) == Qt.CheckState.Checked
         if index.column() == ON:
             self._edits.set_visible([path], on)
         else:
-            self._edits.solo_light(path if on else None, [one for one in self.paths if one])
+            self._edits.solo_light(path if on else None, [one for one in self.rows if one])
         return True
 
 
@@ -108,7 +100,7 @@ class LightForm(FormModel):
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(edits.set_typing, parent)
         self._edits = edits
         self.path: str | None = None
         edits.changed.connect(self.changed)
@@ -153,7 +145,3 @@ class LightForm(FormModel):
         """Edits a field; None: back to what the stage has."""
         if self.path is not None:
             self._edits.set_light(self.path, name, value)
-
-    def set_typing(self, typing: bool) -> None:
-        """Whether a value is being typed."""
-        self._edits.set_typing(typing)

@@ -1,49 +1,63 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A list above, the fields of what is chosen in it below."""
+"""Panels of lights and of materials: a list, and below it the values of the chosen row."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QModelIndex, Qt, Signal
+from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtWidgets import QSplitter, QTableView, QVBoxLayout, QWidget
 
 from wavecomb.gui import theme
 from wavecomb.gui.list_view import lay_out_rows
 from wavecomb.gui.scene.form_model import FormModel
 from wavecomb.gui.scene.form_view import FormView
+from wavecomb.gui.scene.lights_model import KIND, ON, SOLO, LightForm, LightsModel
+from wavecomb.gui.scene.materials_model import (
+    COST,
+    PROGRAM,
+    RECORDS,
+    MaterialForm,
+    MaterialsModel,
+    Row,
+)
 from wavecomb.gui.scene.value_fields import Field
 from wavecomb.gui.table_model import HeadedModel
 
+if TYPE_CHECKING:
+    from wavecomb.gui.scene.scene_edits import SceneEdits
+
 
 class ListAndForm(QWidget):
-    """What the panels of lights and materials share.
+    """A list and the fields of its chosen row, which stays chosen when the list is read again.
 
     Args:
-        model: Of the list.
-        form: Of the fields.
-        name: Of objects: "light".
-        title: For people: "Light".
-        tip: Of the list.
-        widths: Of the list's columns but the first, in font heights.
-
-    Signals:
-        row_chosen(int): A row of the list, -1 for none.
+        model: Rows of the list.
+        form: Fields of one row.
+        show: Shows the fields of a row; None means of no row.
+        name: Object name in the singular: "light".
+        title: Accessible name in the singular: "Light".
+        tip: Tooltip of the list.
+        widths: Widths of columns after the first, in font heights.
     """
-
-    row_chosen = Signal(int)
 
     def __init__(
         self,
         model: HeadedModel,
         form: FormModel,
+        show: Callable[[Any], None],
         name: str,
         title: str,
         tip: str,
         widths: Mapping[int, float],
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
+        model.setParent(self)
+        form.setParent(self)
+        self.model, self._show = model, show
+        self.chosen: Any = None
+        self._before: Any = None
         self.view = QTableView()
         self.view.setModel(model)
         lay_out_rows(self.view, f"{name}s", f"{title}s", tip, stretch=0, widths=widths)
@@ -56,11 +70,63 @@ class ListAndForm(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(splitter)
         self.view.selectionModel().currentRowChanged.connect(self._on_row)
+        model.modelAboutToBeReset.connect(self._keep)
+        model.modelReset.connect(self._choose_again)
+        self._choose_again()
 
     @property
     def fields(self) -> dict[str, Field]:
         """Fields that can be edited, by name."""
         return self.form.fields
 
+    def choose_first(self, is_wanted: Callable[[Any], bool]) -> bool:
+        """Chooses the first row of a kind; returns whether there is one."""
+        for number, row in enumerate(self.model.rows):
+            if is_wanted(row):
+                self.view.selectRow(number)
+                return True
+        return False
+
     def _on_row(self, index: QModelIndex, before: QModelIndex) -> None:
-        self.row_chosen.emit(index.row() if index.isValid() else -1)
+        self.chosen = self.model.rows[index.row()] if index.isValid() else None
+        self._show(self.chosen)
+
+    def _keep(self) -> None:
+        self._before = self.chosen
+
+    def _choose_again(self) -> None:
+        rows = self.model.rows
+        if rows:
+            self.view.selectRow(rows.index(self._before) if self._before in rows else 0)
+        else:
+            self.chosen = None
+            self._show(None)
+
+
+class LightsPanel(ListAndForm):
+    """Lights of the stage by their paths, "" for the soft dome."""
+
+    def __init__(self, edits: SceneEdits) -> None:
+        form = LightForm(edits)
+        tip = "Lights of the stage, with those that are off"
+        widths = {KIND: 5, ON: 3, SOLO: 3.4}
+        super().__init__(LightsModel(edits), form, form.show_light, "light", "Light", tip, widths)
+
+    def choose(self, path: str) -> bool:
+        """Chooses a light by its prim; returns whether there is one."""
+        return self.choose_first(lambda light: light == path)
+
+
+class MaterialsPanel(ListAndForm):
+    """Materials in use."""
+
+    chosen: Row | None
+
+    def __init__(self, edits: SceneEdits) -> None:
+        model, form = MaterialsModel(edits), MaterialForm(edits)
+        tip, widths = "Materials that are in use", {PROGRAM: 5.5, RECORDS: 6, COST: 3}
+        super().__init__(model, form, form.show_material, "material", "Material", tip, widths)
+
+    def choose(self, path: str) -> bool:
+        """Chooses the material of a prim; returns whether it is in use."""
+        return self.choose_first(lambda row: row.path == path)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Qt
@@ -61,8 +61,8 @@ class Row:
 
     path: str
     name: str
-    program: str
-    ids: tuple[int, ...]
+    program: str = field(compare=False)
+    ids: tuple[int, ...] = field(compare=False)
 
 
 def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
@@ -84,27 +84,25 @@ class MaterialsModel(HeadedModel):
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent, TIPS)
         self._edits = edits
-        self.rows: list[Row] = []
         self.colours: list[Colour] = []
         self._figures: list[dict[str, Any]] = []
-        edits.scene_changed.connect(self.fill)
+        edits.scene_changed.connect(self.read)
         edits.changed.connect(self.recolour)
         edits.session.statistics.connect(self.count)
-        self.fill()
+        self.read()
 
-    def fill(self) -> None:
+    def read(self) -> None:
         """Reads which materials there are."""
         stage = self._edits.stage
-        self.beginResetModel()
-        self.rows, self._figures = [], []
+        rows: list[Row] = []
         if stage is not None and self._edits.edits is not None:
-            self.rows = rows_of(stage.scene, stage.material_paths)
-        self.colours = self._read_colours()
-        self.endResetModel()
+            rows = rows_of(stage.scene, stage.material_paths)
+        self._figures, self.colours = [], self._read_colours(rows)
+        self.fill(rows)
 
     def recolour(self) -> None:
         """Swatches after an edit."""
-        colours = self._read_colours()
+        colours = self._read_colours(self.rows)
         if colours != self.colours:
             self.colours = colours
             self.tell(NAME, NAME)
@@ -114,29 +112,16 @@ class MaterialsModel(HeadedModel):
         self._figures = statistics["materials"]
         self.tell(RECORDS, COST)
 
-    def place(self, row: Row | None) -> int | None:
-        """Where a row of before is now, else the first; None where there is none."""
-        same = (
-            number
-            for number, one in enumerate(self.rows)
-            if row is not None and (one.path, one.name) == (row.path, row.name)
-        )
-        return next(same, 0 if self.rows else None)
-
-    def _read_colours(self) -> list[Colour]:
+    def _read_colours(self, rows: list[Row]) -> list[Colour]:
         scene = self._edits.session.scene
         if scene is None:
-            return [(0.0, 0.0, 0.0)] * len(self.rows)
+            return [(0.0, 0.0, 0.0)] * len(rows)
         out = []
-        for row in self.rows:
+        for row in rows:
             values = scene.material(row.ids[0])
             r, g, b = values["emission" if row.program == "emissive" else "base_color"]
             out.append((r, g, b))
         return out
-
-    def row_count(self) -> int:
-        """Materials."""
-        return len(self.rows)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """As Qt has it, and ``ColourRole``."""
@@ -172,7 +157,7 @@ class MaterialForm(FormModel):
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(edits.set_typing, parent)
         self._edits = edits
         self.row: Row | None = None
         self._now: dict[str, Parameter] = {}
@@ -220,10 +205,6 @@ class MaterialForm(FormModel):
         """Edits a field; None: back to what the stage has."""
         if self.row is not None:
             self._edits.set_parameter(self.row.path, name, value)
-
-    def set_typing(self, typing: bool) -> None:
-        """Whether a value is being typed."""
-        self._edits.set_typing(typing)
 
     def is_open(self, group: str) -> bool:
         """The base is always open at first."""

@@ -58,17 +58,6 @@ class NotesModel(HeadedModel):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)
-        self.rows: list[Row] = []
-
-    def fill(self, rows: list[Row]) -> None:
-        """Other rows."""
-        self.beginResetModel()
-        self.rows = rows
-        self.endResetModel()
-
-    def row_count(self) -> int:
-        """Findings."""
-        return len(self.rows)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """As Qt has it, and ``ToneRole``."""

@@ -25,36 +25,29 @@ from wavecomb.usd.looks.surface_values import surface_values
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
-    from wavecomb.usd import LoadedStage
 
 
 class RenderSync:
-    """What materials and lights are on the stage with its edits, and the render made to follow.
+    """Base of ``SceneEdits``: materials and lights of the edited stage, and their render.
 
-    Args:
-        session: Whose scene follows.
-        edits: Of the stage that it has open.
+    Attributes:
+        session: The session whose scene follows the edits.
+        stage_edits: Edits of the stage that it has open.
     """
 
-    def __init__(self, session: Session, edits: StageEdits) -> None:
-        self._session = session
-        self.edits = edits
-
-    @property
-    def loaded(self) -> LoadedStage | None:
-        """What was read."""
-        return self._session.stage
+    session: Session
+    stage_edits: StageEdits
 
     @property
     def time(self) -> Usd.TimeCode:
-        """At which attributes are read."""
-        return self.edits.time
+        """Time code at which attributes are read."""
+        return self.stage_edits.time
 
     def prim(self, path: str) -> Usd.Prim:
-        """A prim by path, an invalid one where there is none."""
+        """Returns a prim by path, an invalid one if there is none."""
         if not path or not Sdf.Path.IsValidPathString(path):
             return Usd.Prim()
-        return self.edits.stage.GetPrimAtPath(path)
+        return self.stage_edits.stage.GetPrimAtPath(path)
 
     # ---- materials -----------------------------------------------------------------------------
 
@@ -65,18 +58,19 @@ class RenderSync:
 
     def parameter_value(self, path: str, parameter: Parameter) -> Any:
         """What a parameter is now."""
-        return self.edits.values.get((Sdf.Path(path), f"!{parameter.name}"), parameter.value)
+        return self.stage_edits.values.get((Sdf.Path(path), f"!{parameter.name}"), parameter.value)
 
     def is_edited(self, path: str, parameter: Parameter) -> bool:
         """Whether a parameter was changed here."""
         attribute = parameter.attribute
         if attribute is None:
-            return (Sdf.Path(path), f"!{parameter.name}") in self.edits.values
-        return self.edits.opinion((attribute.GetPrimPath(), f".{attribute.name}")) is not None
+            return (Sdf.Path(path), f"!{parameter.name}") in self.stage_edits.values
+        return self.stage_edits.opinion((attribute.GetPrimPath(), f".{attribute.name}")) is not None
 
     def material_ids(self, path: str) -> list[int]:
         """The materials that a prim gave: several where meshes bring values of their own."""
-        paths = self.loaded.material_paths if self.loaded is not None else ()
+        stage = self.session.stage
+        paths = stage.material_paths if stage is not None else ()
         return [i for i, one in enumerate(paths) if one == path]
 
     # ---- lights --------------------------------------------------------------------------------
@@ -95,7 +89,7 @@ class RenderSync:
         """
         known = light_inputs()[name]
         if self.light_reason(path):
-            return self.edits.values.get((light_prim(path), f"!{name}"), known.default)
+            return self.stage_edits.values.get((light_prim(path), f"!{name}"), known.default)
         return known.read(self.prim(path), self.time)
 
     def light_fields(self, path: str) -> list[LightInput]:
@@ -110,29 +104,29 @@ class RenderSync:
 
     def light_is_edited(self, path: str, name: str) -> bool:
         """Whether an input of a light was changed here."""
-        return self.edits.opinion(self.light_key(path, name)) is not None
+        return self.stage_edits.opinion(self.light_key(path, name)) is not None
 
     # ---- into the render -----------------------------------------------------------------------
 
-    def perform(self, step: Step) -> None:
-        """Makes a step on the stage, and the picture follow."""
+    def make_step(self, step: Step) -> None:
+        """Makes a step on the stage and updates the render."""
         before = {} if step.structural else self.structures(step.prims)
-        self.edits.apply(step)
+        self.stage_edits.apply(step)
         if step.structural or self.structures(step.prims) != before:
-            self._session.rebuild(step.label)
+            self.session.rebuild(step.label)
         else:
-            self.show(step)
+            self.show_step(step)
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
         """Materials in use that a prim is, or is in."""
-        path, stage = str(prim), self.loaded
+        path, stage = str(prim), self.session.stage
         known = {one for one in stage.material_paths if one} if stage is not None else set()
         return {one for one in known if path == one or path.startswith(one + "/")}
 
     def live_values(self, path: str) -> dict[str, Any]:
         """What was changed of a material and no attribute holds."""
         own = Sdf.Path(path)
-        known = self.edits.values.items()
+        known = self.stage_edits.values.items()
         return {what[1:]: value for (prim, what), value in known if prim == own}
 
     def can_show(self, path: str, name: str, value: Any) -> bool:
@@ -151,15 +145,15 @@ class RenderSync:
                 out[path] = found.structure
         return out
 
-    def show(self, step: Step) -> None:
+    def show_step(self, step: Step) -> None:
         """Brings a step into the scene that is rendered."""
-        stage = self.loaded
+        stage = self.session.stage
         if stage is None:
             return
         emission = any("emissi" in what for _, what in step.after)
         if emission and not stage.lights:
             # Whether a stage without lights gets the soft dome goes by what its materials emit.
-            self._session.rebuild(step.label)
+            self.session.rebuild(step.label)
         for prim in step.prims:
             for light in {one for one in stage.light_paths if light_prim(one) == prim}:
                 self._sync_light(light)
@@ -168,7 +162,7 @@ class RenderSync:
 
     def _sync_material(self, path: str) -> None:
         """Gives the materials of a prim the values that the stage has now."""
-        scene = self._session.scene
+        scene = self.session.scene
         if scene is None:
             return
         surface = surface_values(self.prim(path), self.time, self.live_values(path))
@@ -192,17 +186,17 @@ class RenderSync:
                 if name not in have.get("driven", ()) and as_stored(have[name]) != value
             }
             if values:
-                self._session.edit_material(number, **values)
+                self.session.edit_material(number, **values)
             # The stage holds the edit: it comes with the next reading.
-            self._session.material_edits.pop(have["name"], None)
+            self.session.material_edits.pop(have["name"], None)
 
     def _sync_light(self, path: str) -> None:
-        scene, stage = self._session.scene, self.loaded
+        scene, stage = self.session.scene, self.session.stage
         if scene is None or stage is None:
             return
         on_stage = None
         if not self.light_reason(path):
-            up = str(UsdGeom.GetStageUpAxis(self.edits.stage))
+            up = str(UsdGeom.GetStageUpAxis(self.stage_edits.stage))
             on_stage = light_values(self.prim(path), self.time, up)
         for number, one in enumerate(stage.light_paths):
             if one != path or number >= scene.light_count:
@@ -222,8 +216,8 @@ class RenderSync:
                 if as_stored(have[name]) != as_stored(value)
             }
             if values:
-                self._session.edit_light(number, **values)
-        self._session.light_edits.clear()
+                self.session.edit_light(number, **values)
+        self.session.light_edits.clear()
 
 
 def light_prim(path: str) -> Sdf.Path:

@@ -13,11 +13,11 @@ from PySide6.QtCore import QObject, Signal
 from wavecomb.errors import WavecombError
 from wavecomb.gui.scene.edit_layer import save_edits
 from wavecomb.gui.scene.history import History
-from wavecomb.gui.scene.light_inputs import LightInput, light_inputs
+from wavecomb.gui.scene.light_inputs import light_inputs
 from wavecomb.gui.scene.render_sync import RenderSync
 from wavecomb.gui.scene.stage_edits import Key, Opinion, Solo, StageEdits, Step
 from wavecomb.gui.scene.visibility import HIDDEN, HIDDEN_ABOVE, show, state, uneditable
-from wavecomb.usd.looks.parameters import Parameter, as_stored
+from wavecomb.usd.looks.parameters import as_stored
 from wavecomb.usd.stage.times import code_of
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 
-class SceneEdits(QObject):
+class SceneEdits(QObject, RenderSync):
     """Edits of the stage that a session has open. Every one is a step of ``history``.
 
     What is visible and which variants are chosen decides what is in the scene: the stage is read
@@ -52,12 +52,13 @@ class SceneEdits(QObject):
         super().__init__(parent)
         self.session = session
         self.history = History(self)
-        self._sync: RenderSync | None = None
+        self.stage_edits = _no_edits()
+        self._is_open = False
         self._solo = Solo()
         self._touched: set[Sdf.Path] = set()
         self.history.step.connect(self._perform)
         session.opened.connect(self._on_opened)
-        session.closing.connect(self._on_closing)
+        session.closing.connect(self._forget)
         if session.stage is not None and session.usd is not None:
             self._on_opened(session.stage)
 
@@ -65,13 +66,13 @@ class SceneEdits(QObject):
 
     @property
     def edits(self) -> StageEdits | None:
-        """The edits of the stage that is open."""
-        return self._sync.edits if self._sync is not None else None
+        """Edits of the stage that is open, or None."""
+        return self.stage_edits if self._is_open else None
 
     @property
     def usd(self) -> Usd.Stage | None:
-        """The stage; None while there is none to edit."""
-        return self.edits.stage if self.edits is not None else None
+        """The USD stage that is open, or None."""
+        return self.stage_edits.stage if self._is_open else None
 
     @property
     def stage(self) -> LoadedStage | None:
@@ -79,18 +80,9 @@ class SceneEdits(QObject):
         return self.session.stage
 
     @property
-    def time(self) -> Usd.TimeCode:
-        """At which attributes are read."""
-        return self.edits.time if self.edits is not None else Usd.TimeCode.Default()
-
-    @property
     def solo(self) -> str | None:
         """The light that is shown alone."""
         return self._solo.path
-
-    def prim(self, path: str) -> Usd.Prim:
-        """A prim by path, an invalid one where there is none."""
-        return self._sync.prim(path) if self._sync is not None else Usd.Prim()
 
     def is_hidden(self, path: str) -> bool:
         """Whether a prim is hidden, by itself or from above."""
@@ -106,7 +98,7 @@ class SceneEdits(QObject):
 
     def lines(self) -> list[str]:
         """All edits, one line each."""
-        return self.edits.lines() if self.edits is not None else []
+        return self.stage_edits.lines()
 
     # ---- visibility and variants ---------------------------------------------------------------
 
@@ -159,31 +151,15 @@ class SceneEdits(QObject):
 
     # ---- materials -----------------------------------------------------------------------------
 
-    def parameters(self, path: str) -> dict[str, Parameter]:
-        """Parameters of a material by name; empty of one that no prim is there for."""
-        return self._sync.parameters(path) if self._sync is not None else {}
-
-    def material_ids(self, path: str) -> list[int]:
-        """The materials that a prim gave: several where meshes bring values of their own."""
-        return self._sync.material_ids(path) if self._sync is not None else []
-
-    def parameter_value(self, path: str, parameter: Parameter) -> Any:
-        """What a parameter is now."""
-        return self._sync.parameter_value(path, parameter) if self._sync else parameter.value
-
-    def is_edited(self, path: str, parameter: Parameter) -> bool:
-        """Whether a parameter was changed here."""
-        return self._sync is not None and self._sync.is_edited(path, parameter)
-
     def set_parameter(self, path: str, name: str, value: Any) -> None:
         """Changes a parameter of a material; None: as the stage has it."""
         parameter = self.parameters(path).get(name)
         label = f"{name} of {path}"
-        if parameter is None or parameter.driven_by or self._sync is None:
+        if parameter is None or parameter.driven_by:
             return
         opinion: Opinion | None = None
         if parameter.attribute is None:
-            if value is not None and not self._sync.can_show(path, name, value):
+            if value is not None and not self.can_show(path, name, value):
                 self.session.warned.emit(f"{label}: not changed: {parameter.reason}")
                 self.changed.emit()
                 return
@@ -198,27 +174,8 @@ class SceneEdits(QObject):
 
     # ---- lights --------------------------------------------------------------------------------
 
-    def light_reason(self, path: str) -> str:
-        """Why edits of a light cannot be saved; "" where they can."""
-        return self._sync.light_reason(path) if self._sync is not None else ""
-
-    def light_value(self, path: str, name: str) -> Any:
-        """One of ``light_inputs()`` as it is now: ``RenderSync.light_value``."""
-        known = light_inputs()[name]
-        return self._sync.light_value(path, name) if self._sync else known.default
-
-    def light_fields(self, path: str) -> list[LightInput]:
-        """What of a light can be edited, in the order of a form."""
-        return self._sync.light_fields(path) if self._sync is not None else []
-
-    def light_is_edited(self, path: str, name: str) -> bool:
-        """Whether an input of a light was changed here."""
-        return self._sync is not None and self._sync.light_is_edited(path, name)
-
     def set_light(self, path: str, name: str, value: Any) -> None:
         """Changes an input of a light; None: as the stage has it."""
-        if self._sync is None:
-            return
         opinion: Opinion | None = None
         if value is not None and self.light_reason(path):
             opinion = Opinion(as_stored(value))
@@ -226,7 +183,7 @@ class SceneEdits(QObject):
             known = light_inputs()[name]
             opinion = Opinion(known.stored(value), known.type_name)
         label = f"{name} of {path or 'soft dome'}"
-        self._change(label, self._sync.light_key(path, name), opinion)
+        self._change(label, self.light_key(path, name), opinion)
 
     # ---- history -------------------------------------------------------------------------------
 
@@ -274,10 +231,10 @@ class SceneEdits(QObject):
 
     def _perform(self, step: Step) -> None:
         """Makes a step, new, again or back, and brings it into the picture."""
-        if self._sync is None:
+        if not self._is_open:
             return
         self._touched |= set(step.prims)
-        self._sync.perform(step)
+        self.make_step(step)
         if step.solo is not None:
             self._solo = step.solo[1]
         if step.structural:
@@ -290,26 +247,29 @@ class SceneEdits(QObject):
         usd = self.session.usd
         if usd is None or loaded is None:
             return
-        if self._sync is None or self._sync.edits.stage != usd:
-            self._forget(RenderSync(self.session, StageEdits(usd, code_of(loaded.frame))))
+        if self.usd != usd:
+            self._forget(StageEdits(usd, code_of(loaded.frame)))
             self.changed.emit()
             return
         self.scene_changed.emit()
         # What was edited, or taken back, while the stage was read is not in the scene yet.
-        for prim in {path for path, _ in self._sync.edits.edited()} | self._touched:
-            self._sync.show(Step("", {}, {(prim, ""): None}))
+        for prim in {path for path, _ in self.stage_edits.edited()} | self._touched:
+            self.show_step(Step("", {}, {(prim, ""): None}))
         self._touched = set()
         self.changed.emit()
 
-    def _on_closing(self) -> None:
-        self._forget(None)
-
-    def _forget(self, sync: RenderSync | None) -> None:
-        """Another stage, or none."""
-        self._sync, self._solo, self._touched = sync, Solo(), set()
+    def _forget(self, edits: StageEdits | None = None) -> None:
+        """Drops all steps: another stage is open, or none."""
+        self.stage_edits, self._is_open = edits or _no_edits(), edits is not None
+        self._solo, self._touched = Solo(), set()
         self.history.clear()
         self.reset.emit()
         self.scene_changed.emit()
+
+
+def _no_edits() -> StageEdits:
+    """Edits of an empty stage, for when none is open."""
+    return StageEdits(Usd.Stage.CreateInMemory(), Usd.TimeCode.Default())
 
 
 def _word(word: str) -> Opinion:

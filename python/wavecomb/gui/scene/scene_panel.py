@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pxr import Sdf, UsdShade
 from PySide6.QtCore import Qt, Signal
@@ -19,8 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from wavecomb.gui.scene.lights_panel import LightsPanel
-from wavecomb.gui.scene.materials_panel import MaterialsPanel
+from wavecomb.gui.scene.list_and_form import LightsPanel, MaterialsPanel
 from wavecomb.gui.scene.notes_panel import NotesPanel
 from wavecomb.gui.scene.scene_edits import SceneEdits
 from wavecomb.gui.scene.scene_tree import SceneTree
@@ -139,14 +138,6 @@ class ScenePanel(QWidget):
         self.state.setToolTip("\n".join(shown))
 
     # ---- what is selected ----------------------------------------------------------------------
-
-    def show_pick(self, hit: dict[str, Any] | None) -> None:
-        """Shows what ``Session.pick`` gave: its prim, its material, its light."""
-        self.session.select(hit.get("object") if hit else None)
-        if not hit:
-            return
-        if hit.get("material") is not None:
-            self.materials.choose_id(hit["material"])
 
     def _on_selected(self, path: str | None) -> None:
         plain = (path or "").partition("[")[0].rstrip("/")
