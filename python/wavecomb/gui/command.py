@@ -20,7 +20,7 @@ class Command(QObject):
     """One process at a time.
 
     Signals:
-        event(dict): A line of JSON with a key "event" that it wrote to stdout.
+        event(dict): A JSON object that it wrote to stdout as a line.
         said(str): Another line, of stdout or stderr.
         finished(code, text, error): How it ended; all of stdout; the last line of stderr that is
             an error, or "". A process that was stopped has the code 130.
@@ -43,8 +43,14 @@ class Command(QObject):
         """Whether there is a process."""
         return self._process is not None
 
-    def start(self, arguments: Sequence[str]) -> None:
-        """Runs ``wavecomb`` with these arguments."""
+    def start(self, arguments: Sequence[str], *, module: str = "wavecomb", text: str = "") -> None:
+        """Runs a module of Wavecomb as a program.
+
+        Args:
+            arguments: Of the command line.
+            module: The module; the default is the command line.
+            text: Standard input.
+        """
         assert self._process is None, "one at a time"
         process = QProcess(self)
         process.readyReadStandardOutput.connect(self._read_out)
@@ -56,8 +62,9 @@ class Command(QObject):
         self._stopping = False
         # Qt starts it from this thread, which is the main one and stays.
         flags = ["-u", "-X", "utf8"]
-        words = processes.command("wavecomb", *arguments, parent=os.getpid(), flags=flags)
+        words = processes.command(module, *arguments, parent=os.getpid(), flags=flags)
         process.start(words[0], words[1:])
+        process.write(text.encode())
         process.closeWriteChannel()
 
     def stop(self) -> None:
@@ -105,7 +112,7 @@ class Command(QObject):
         if line.startswith("{"):
             with contextlib.suppress(ValueError):
                 event = json.loads(line)
-                if isinstance(event, dict) and "event" in event:
+                if isinstance(event, dict):
                     self.event.emit(event)
                     return
         self.said.emit(line)

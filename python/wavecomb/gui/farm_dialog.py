@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import html
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QProcess, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QDialog,
@@ -24,8 +23,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from wavecomb import processes
 from wavecomb.errors import WavecombError
+from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
@@ -52,8 +51,10 @@ class FarmDialog(QDialog):
         self.setWindowTitle("Send to a farm")
         self.folder: Path | None = None
         self._describe = describe
-        self._process: QProcess | None = None
-        self._wanted: dict[str, Any] = {}
+        self._command = Command(self)
+        self._command.event.connect(self._take)
+        self._command.finished.connect(self._end)
+        self._is_resuming = False
         self.output = self._line(
             "farm.output", "Picture", output, "A file; for frames a name with ####"
         )
@@ -98,88 +99,35 @@ class FarmDialog(QDialog):
     # ---- what it does ----------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Has the job written, by a process of its own, since reading a stage takes its time."""
+        """Writes the job in a process, since reading a stage takes time, and then works on it."""
         try:
-            self._wanted = self._describe(self.output.text())
+            wanted = self._describe(self.output.text())
         except WavecombError as error:
             self.say(str(error))
             return
-        options = self._wanted["options"]
+        options = wanted["options"]
         options["tiles"] = self.tiles.text() or "auto"
         if self.frames.text().strip():
             options["frames"] = self.frames.text().strip()
             options.pop("frame", None)
         self.folder = None
         self.say("reading the stage \u2026")
-        process = self._start(["wavecomb.farm.from_json"], self._written)
-        process.write(json.dumps(self._wanted).encode())
-        process.closeWriteChannel()
+        self._start([], module="wavecomb.farm.from_json", text=json.dumps(wanted))
 
-    def _start(self, words: list[str], ended: Callable[[], None]) -> QProcess:
-        process = QProcess(self)
-        process.finished.connect(lambda code, how: ended())
-        started = processes.command(*words, parent=os.getpid())
-        process.start(started[0], started[1:])
-        self._process = process
+    def _start(self, words: list[str], **how: str) -> None:
+        self._is_resuming = bool(words)
+        self._command.start(words, **how)
         self.send.setEnabled(False)
         self.stop.setEnabled(True)
-        return process
 
-    def _written(self) -> None:
-        assert self._process is not None
-        said = bytes(self._process.readAllStandardOutput().data())
-        self._let_go()
-        try:
-            told = json.loads(said)
-        except ValueError:
-            told = {"error": "the job was not written"}
-        if "error" in told:
-            self.say(told["error"])
-            return
-        self.folder = Path(told["job"])
-        engine = self.engine.text() or "local"
-        if engine == "none":
-            self.say(f"{self.folder}: written; `wavecomb farm resume` renders it")
-            return
-        words = ["wavecomb", "farm", "resume", told["job"], "--on", engine, "--json"]
-        process = self._start(words, self._ended)
-        process.readyReadStandardOutput.connect(self.look)
-
-    def _ended(self) -> None:
-        assert self._process is not None
-        self.look()
-        code = self._process.exitCode()
-        said = bytes(self._process.readAllStandardError().data()).decode(errors="replace")
-        self._let_go()
-        lines = said.strip().splitlines()
-        if code and lines:
-            self.say(lines[-1].removeprefix("error: "))
-
-    def _let_go(self) -> None:
-        assert self._process is not None
-        self._process.deleteLater()
-        self._process = None
-        self.send.setEnabled(True)
-        self.stop.setEnabled(False)
-
-    def end(self) -> None:
-        """Stops the job; `wavecomb farm resume` continues it."""
-        if self._process is not None:
-            self._process.terminate()
-
-    def look(self) -> None:
-        """Shows the last line of progress that the command wrote."""
-        if self._process is None:
-            return
-        found = None
-        while self._process.canReadLine():
-            line = bytes(self._process.readLine().data())
-            try:
-                told = json.loads(line)
-                found = told.get("progress", told)
-            except ValueError:
-                continue
-        if found is not None:
+    def _take(self, found: dict[str, Any]) -> None:
+        """Handles a JSON line: the job that was written, why it was not, or its progress."""
+        if "error" in found:
+            self.say(found["error"])
+        elif "job" in found and not self._is_resuming:
+            self.folder = Path(found["job"])
+        else:
+            found = found.get("progress", found)
             tasks, images = found["tasks"], found["images"]
             self.bar.setMaximum(tasks["all"])
             self.bar.setValue(tasks["done"])
@@ -187,17 +135,34 @@ class FarmDialog(QDialog):
             words += f"{tasks['done']} of {tasks['all']} tiles"
             self.say(f"{self.folder}: {found['state']}: {words}")
 
+    def _end(self, code: int, text: str, error: str) -> None:
+        self.send.setEnabled(True)
+        self.stop.setEnabled(False)
+        engine = self.engine.text() or "local"
+        if error:
+            self.say(error)
+        elif self._is_resuming or self.folder is None or code:
+            return
+        elif engine == "none":
+            self.say(f"{self.folder}: written; `wavecomb farm resume` renders it")
+        else:
+            self._start(["farm", "resume", str(self.folder), "--on", engine, "--json"])
+
+    def end(self) -> None:
+        """Stops the job; `wavecomb farm resume` continues it."""
+        self._command.stop()
+
     def say(self, line: str) -> None:
-        """A line in place of the state."""
+        """Shows a line in place of the state."""
         self.state.setText(html.escape(line))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """A job that runs is stopped, out of sight; finished tiles are kept."""
-        if self._process is None:
+        """Stops a running job and hides until it has ended; finished tiles are kept."""
+        if not self._command.running:
             super().closeEvent(event)
             return
-        self._process.finished.disconnect()
-        self._process.finished.connect(lambda code, how: self.deleteLater())
-        self._process.terminate()
+        self._command.finished.disconnect()
+        self._command.finished.connect(lambda *_: self.deleteLater())
+        self._command.stop()
         event.ignore()
         self.hide()
