@@ -36,8 +36,7 @@ def below_surface(
     """
     net = Network(writer.stage, f"/World/Looks/{name}")
     longest = max(radius)
-    net.surface(
-        "ND_open_pbr_surface_surfaceshader",
+    net.openpbr(
         base_color=("color3", colour),
         subsurface_weight=("float", 1.0),
         subsurface_color=("color3", colour),
@@ -59,16 +58,16 @@ def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radi
         (0.0, height - 2.8 * rim),
     ])  # fmt: skip
     wax = placed(turned(profile, columns, 6), at)
-    writer.bind(writer.mesh(f"/World/Objects/{name}_Wax", wax).GetPrim(), "Wax")
+    writer.mesh(f"/World/Objects/{name}_Wax", wax, "Wax")
     bottom = height - 3.2 * rim
     wick = np.array([(0.0, bottom), (0.12, bottom), (0.1, height + 0.45), (0.0, height + 0.5)])
     made = placed(turned(wick, 12, 2), at)
-    writer.bind(writer.mesh(f"/World/Objects/{name}_Wick", made).GetPrim(), "Wick")
+    writer.mesh(f"/World/Objects/{name}_Wick", made, "Wick")
     t = np.linspace(0.0, 1.0, 17)
     flame = np.stack([0.42 * np.sin(np.pi * t) * (1.0 - 0.55 * t), height + 0.35 + 2.6 * t], axis=1)
     flame[[0, -1], 0] = 0.0
     made = placed(turned(flame, 24, 1), at)
-    writer.bind(writer.mesh(f"/World/Objects/{name}_Flame", made).GetPrim(), "Flame")
+    writer.mesh(f"/World/Objects/{name}_Flame", made, "Flame")
 
 
 def build_candles(writer: StageWriter, options: SceneOptions) -> None:
@@ -79,14 +78,12 @@ def build_candles(writer: StageWriter, options: SceneOptions) -> None:
     wax, marble = {"specular_roughness": 0.35, "specular_ior": 1.44}, {"specular_roughness": 0.12}
     below_surface(writer, "Wax", (0.93, 0.83, 0.66), (0.9, 0.45, 0.22), **wax)
     below_surface(writer, "Marble", (0.78, 0.8, 0.74), (0.5, 0.62, 0.44), **marble)
-    half = 40.0
-    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
-    writer.polygons("/World/Set/Table", corners, [[0, 1, 2, 3]], "Table")
+    writer.floor("Table", 40.0, "Table")
     columns = 8 * options.teapot_level
     for name, at, radius, height in _CANDLES:
         _candle(writer, name, at, radius, height, columns)
     made = placed(ball(2.1, options.teapot_level), (-1.6, 2.1, 3.4))
-    writer.bind(writer.mesh("/World/Objects/Ball", made).GetPrim(), "Marble")
+    writer.mesh("/World/Objects/Ball", made, "Marble")
     writer.rect_light("Window", (-6.0, 24.0, 22.0), 14.0, 14.0, (1.6, 2.0, 2.8), -45.0)
     writer.dome_light("Sky", 30.0, 0.05)
     writer.camera((0.0, 13.0, 37.0), (-0.4, 8.2, 0.0), 38.0, options.aspect or 4.0 / 3.0)

@@ -49,10 +49,9 @@ def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Floor", looks.diffuse((0.62, 0.60, 0.57)))
     writer.material("Wall", looks.diffuse((0.35, 0.42, 0.50)))
     h = _HALF
-    floor = np.array([[-h, 0, h], [h, 0, h], [h, 0, -h], [-h, 0, -h]])
-    wall = np.array([[-h, 0, -3.0], [h, 0, -3.0], [h, h, -3.0], [-h, h, -3.0]])
-    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Floor")
-    writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Wall")
+    wall = [[-h, 0, -3.0], [h, 0, -3.0], [h, h, -3.0], [-h, h, -3.0]]
+    writer.floor("Floor", h, "Floor")
+    writer.quad("/World/Set/Wall", wall, "Wall")
     writer.material("Glass", looks.CLEAR_GLASS)
     writer.material("Gold", looks.metal((1.00, 0.71, 0.29), 0.1, (1.0, 0.94, 0.78)))
     level = 2 * options.teapot_level
@@ -60,7 +59,7 @@ def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
         ("Ball", placed(ball(0.8, level), (-1.1, 0.81, 0.0)), "Glass"),
         ("Ring", placed(ring(0.9, 0.16, 0.5, level), (1.2, 0.002, 0.7)), "Gold"),
     ):
-        writer.bind(writer.mesh(f"/World/Objects/{name}", mesh).GetPrim(), material)
+        writer.mesh(f"/World/Objects/{name}", mesh, material)
     writer.sphere_light("Lamp", (2.5, 4.1, -1.1), _LAMP_RADIUS, _LAMP_RADIANCE)
     writer.camera((0.0, 4.2, 6.4), (0.0, 0.35, 0.1), 40.0, options.aspect or 1.0)
 
@@ -111,9 +110,10 @@ def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Soil", looks.diffuse((0.45, 0.40, 0.33)))
     writer.material("Glass", looks.CLEAR_GLASS)
     level = options.teapot_level
-    writer.bind(writer.mesh("/World/Set/Land", land(16 * level)).GetPrim(), "Soil")
-    glass = writer.mesh("/World/Objects/Ring", placed(ring(0.5, 0.12, 0.3, level), (0.0, 0.002, 0)))
-    writer.bind(glass.GetPrim(), "Glass")
+    writer.mesh("/World/Set/Land", land(16 * level), "Soil")
+    writer.mesh(
+        "/World/Objects/Ring", placed(ring(0.5, 0.12, 0.3, level), (0.0, 0.002, 0)), "Glass"
+    )
     writer.sun("Sun", (0.55, -0.62, -0.35), _SUN_ANGLE, (3.0, 2.8, 2.5))
     writer.dome_light("Sky", 90.0, 0.1)
     writer.camera((0.4, 1.7, 2.6), (0.2, 0.1, -0.15), 42.0, options.aspect or 1.0)
@@ -166,8 +166,7 @@ def build_pool(writer: StageWriter, options: SceneOptions) -> None:
     points, faces = _basin()
     writer.polygons("/World/Set/Basin", points[:8], faces[:5], "Tiles")
     writer.polygons("/World/Set/Rim", points, faces[5:], "Stone")
-    surface = writer.mesh("/World/Objects/Water", water(2 * options.teapot_level))
-    writer.bind(surface.GetPrim(), "Water")
+    writer.mesh("/World/Objects/Water", water(2 * options.teapot_level), "Water")
     writer.sun("Sun", (0.45, -1.0, -0.25), _SUN_ANGLE, (2.6, 2.4, 2.1))
     writer.dome_light("Sky", 90.0, 0.15)
     writer.camera((-2.7, -0.4, 1.6), (0.3, -1.05, -0.4), 80.0, options.aspect or 1.0)
@@ -202,16 +201,12 @@ def build_lens(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Dark", looks.diffuse((0.04, 0.04, 0.04)))
     writer.material("Glass", looks.CLEAR_GLASS)
     far, h, up = 2.0 * LENS_FOCUS, 6.0, 1.4
-    floor = np.array([[-9, 0, h], [far, 0, h], [far, 0, -h], [-9, 0, -h]], float)
-    wall = np.array([[far, 0, h], [far, 2 * h, h], [far, 2 * h, -h], [far, 0, -h]], float)
-    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Matt")
-    writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Matt")
-    glass = writer.mesh("/World/Objects/Lens", placed(lens(options.teapot_level), (0.0, up, 0.0)))
-    writer.bind(glass.GetPrim(), "Glass")
-    writer.bind(
-        writer.mesh("/World/Objects/Foot", placed(ball(0.18, 8), (0.0, up - 1.08, 0.0))).GetPrim(),
-        "Dark",
-    )
+    floor = [[-9, 0, h], [far, 0, h], [far, 0, -h], [-9, 0, -h]]
+    wall = [[far, 0, h], [far, 2 * h, h], [far, 2 * h, -h], [far, 0, -h]]
+    writer.quad("/World/Set/Floor", floor, "Matt")
+    writer.quad("/World/Set/Wall", wall, "Matt")
+    writer.mesh("/World/Objects/Lens", placed(lens(options.teapot_level), (0.0, up, 0.0)), "Glass")
+    writer.mesh("/World/Objects/Foot", placed(ball(0.18, 8), (0.0, up - 1.08, 0.0)), "Dark")
     writer.sphere_light("Lamp", (-far, up, 0.0), _LAMP_RADIUS, (2700.0, 2580.0, 2340.0))
     writer.camera((-2.6, 3.4, 6.2), (1.6, 1.1, 0.0), 52.0, options.aspect or 1.0)
 
@@ -221,10 +216,10 @@ def build_prism(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Matt", looks.diffuse((0.6, 0.58, 0.55)))
     writer.material("Glass", looks.CLEAR_GLASS)
     h = 6.0
-    floor = np.array([[-h, 0, h], [h, 0, h], [h, 0, -2.5], [-h, 0, -2.5]])
-    wall = np.array([[-h, 0, -2.5], [h, 0, -2.5], [h, h, -2.5], [-h, h, -2.5]])
-    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Matt")
-    writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Matt")
+    floor = [[-h, 0, h], [h, 0, h], [h, 0, -2.5], [-h, 0, -2.5]]
+    wall = [[-h, 0, -2.5], [h, 0, -2.5], [h, h, -2.5], [-h, h, -2.5]]
+    writer.quad("/World/Set/Floor", floor, "Matt")
+    writer.quad("/World/Set/Wall", wall, "Matt")
     side = np.array([[math.cos(a), 0.0, math.sin(a)] for a in np.radians((90.0, 210.0, 330.0))])
     side = 0.8 * side @ turn_about(1, 20.0).T
     up = np.array([0.0, 1.0, 0.0])

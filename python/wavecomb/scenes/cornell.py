@@ -46,7 +46,7 @@ def _box(writer: StageWriter, aspect: float) -> None:
     writer.material("Red", _RED)
     writer.material("Green", _GREEN)
     for name, (colour, corners) in _QUADS.items():
-        writer.polygons(f"/World/Set/{name}", np.array(corners), [[0, 1, 2, 3]], colour)
+        writer.quad(f"/World/Set/{name}", corners, colour)
     writer.rect_light("Ceiling", (278.0, 548.8 - _LIGHT_GAP, 279.5), 130.0, 105.0, _RADIANCE)
     fov = math.degrees(2.0 * math.atan(0.5 * 25.0 / 35.0))
     writer.camera((278.0, 273.0, -800.0), (278.0, 273.0, 0.0), fov, aspect)

@@ -26,8 +26,7 @@ _DRINKS: tuple[tuple[str, tuple[float, float, float], float, Colour, Colour, flo
 
 def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, object]) -> None:
     net = Network(writer.stage, f"/World/Looks/{name}")
-    net.surface(
-        "ND_open_pbr_surface_surfaceshader",
+    net.openpbr(
         specular_roughness=("float", 0.0),
         specular_ior=("float", ior),
         transmission_weight=("float", 1.0),
@@ -59,7 +58,7 @@ def _turn(
     at: tuple[float, float, float], columns: int, material: str,
 ) -> None:  # fmt: skip
     made = placed(turned(_rounded(corners, radius), columns, 1), at)
-    writer.bind(writer.mesh(f"/World/Objects/{name}", made).GetPrim(), material)
+    writer.mesh(f"/World/Objects/{name}", made, material)
 
 
 def _serve(
@@ -80,11 +79,9 @@ def build_drinks(writer: StageWriter, options: SceneOptions) -> None:
     writer.material("Table", looks.plastic((0.32, 0.26, 0.2), 0.35))
     writer.material("Wall", looks.diffuse((0.5, 0.52, 0.55)))
     _glassy(writer, "Glass", 1.52, dielectric_priority=("integer", 1))
-    half = 60.0
-    floor = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
-    wall = np.array([[-half, 0, -22], [half, 0, -22], [half, 60, -22], [-half, 60, -22]])
-    writer.polygons("/World/Set/Table", floor, [[0, 1, 2, 3]], "Table")
-    writer.polygons("/World/Set/Wall", wall, [[0, 1, 2, 3]], "Wall")
+    writer.floor("Table", 60.0, "Table")
+    wall = [[-60, 0, -22], [60, 0, -22], [60, 60, -22], [-60, 60, -22]]
+    writer.quad("/World/Set/Wall", wall, "Wall")
     columns = 16 * options.teapot_level
     for name, at, level, scattering, absorption, anisotropy in _DRINKS:
         extinction = np.array(scattering) + np.array(absorption)

@@ -58,5 +58,4 @@ def _fill(writer: StageWriter, path: str, parts: Sequence[Part]) -> None:
     for mesh, material in parts:
         meshes.setdefault(material, []).append(mesh)
     for material, some in meshes.items():
-        prim = writer.mesh(f"{path}/{material}", merge(some))
-        writer.bind(prim.GetPrim(), material)
+        writer.mesh(f"{path}/{material}", merge(some), material)

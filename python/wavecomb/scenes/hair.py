@@ -7,6 +7,7 @@ All strands of a body grow at once, step by step, in numbers; 100,000 take about
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -149,9 +150,7 @@ def _lamps(writer: StageWriter, strength: float) -> None:
 
 def _floor(writer: StageWriter, height: float) -> None:
     writer.material("Floor", looks.diffuse((0.16, 0.17, 0.19)))
-    h = 12.0
-    floor = np.array([[-h, height, h], [h, height, h], [h, height, -h], [-h, height, -h]])
-    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Floor")
+    writer.floor("Floor", 12.0, "Floor", height)
 
 
 def _egg(d: FloatArray) -> FloatArray:
@@ -186,7 +185,7 @@ def build_fur(writer: StageWriter, options: SceneOptions) -> None:
     profile = _egg(ring)[:, :2]
     profile[[0, -1], 0] = 0.0
     body = turned(profile, 96, 1)
-    writer.bind(writer.mesh("/World/Objects/Body", body).GetPrim(), "Skin")
+    writer.mesh("/World/Objects/Body", body, "Skin")
     strands, d = fur_strands(rng, options.strands)
     stripe = np.sin(11.0 * d[:, 1] + 1.6 * _waves(d, 3.0, 0.4)[:, 0])
     light = 1.0 / (1.0 + np.exp(-7.0 * (stripe + 0.15)))
@@ -271,15 +270,13 @@ def build_head(writer: StageWriter, options: SceneOptions) -> None:
     skin = {"specular_roughness": 0.48, "specular_ior": 1.4, "coat_weight": 0.25,
             "coat_roughness": 0.3, "coat_ior": 1.45}  # fmt: skip
     below_surface(writer, "Head", (0.76, 0.5, 0.38), (0.037, 0.014, 0.007), **skin)
-    writer.bind(writer.mesh("/World/Objects/Head", head_mesh(HEAD_LEVEL)).GetPrim(), "Head")
+    writer.mesh("/World/Objects/Head", head_mesh(HEAD_LEVEL), "Head")
     neck = turned(
         [(0.0, -2.5), (1.0, -2.5), (0.9, -2.2), (0.5, -1.7), (0.45, -1.0), (0.42, -0.5),
          (0.0, -0.45)], 64,
     )  # fmt: skip
-    neck = type(neck)(
-        neck.points + np.array([0.0, 0.0, -0.16], np.float32), neck.faces, neck.normals, neck.uv
-    )
-    writer.bind(writer.mesh("/World/Objects/Neck", neck).GetPrim(), "Head")
+    back = np.array([0.0, 0.0, -0.16], np.float32)
+    writer.mesh("/World/Objects/Neck", replace(neck, points=neck.points + back), "Head")
     melanin = np.clip(rng.normal(0.52, 0.07, options.strands), 0.1, 0.95)
     add_strands(
         writer,

@@ -29,7 +29,6 @@ LAYERS = 8
 """Layers of the heaviest material."""
 _BYTES_PER_TEXEL = (4.0 + 4.0 + 1.0) * 4.0 / 3.0
 """Memory for a texel of a material: two colour maps and one of roughness, 8 bits, mip levels."""
-_SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 Inputs = dict[str, Any]
 
@@ -126,7 +125,7 @@ def _material(
     colour = _layered(net, writer, maps, layers(options, index), rng)
     rough = net.node("image", "float", file=("filename", writer.texture_file(maps["r"])))
     inputs = {"base_color": colour, "specular_roughness": rough, **kind(rng)}
-    net.surface(_SURFACE, **inputs)
+    net.openpbr(**inputs)
     return writer.own_material(name, net.material)
 
 

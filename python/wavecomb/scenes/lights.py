@@ -21,14 +21,13 @@ from pxr import Gf, UsdGeom, UsdLux
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.options import SceneOptions
-from wavecomb.scenes.stage import StageWriter
+from wavecomb.scenes.stage import BOX, BOX_CORNERS, StageWriter
 
 MAX_LIGHTS = 200_000
 _LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0
 _POWER = 3000.0  # of all lights together, W
 _SIGN_COLOURS = 16
 _KINDS = ("Window", "Lamp", "Bulb", "Sign", "Strip")
-_BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 
 
 def build_lights(writer: StageWriter, options: SceneOptions) -> None:
@@ -119,22 +118,21 @@ def _mesh(
     material = f"Glow_{hue:02d}_{step + 100:03d}"
     emission = tuple(float(v) for v in tint * 2.0 ** (step / 2.0))
     writer.material(material, looks.emissive((emission[0], emission[1], emission[2])))
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    points = np.array(place) + corners * half
-    polygons = _BOX
-    if kind == "Strip":
-        points, polygons = points[[0, 1, 5, 4]], [[0, 1, 2, 3]]
-    writer.polygons(f"/World/Objects/{name}", points, polygons, material)
+    path = f"/World/Objects/{name}"
+    if kind == "Sign":
+        writer.box(path, place, half, material)
+    else:
+        writer.quad(path, (np.array(place) + BOX_CORNERS * half)[[0, 1, 5, 4]], material)
 
 
 def _street(writer: StageWriter, rng: np.random.Generator) -> None:
     """Ground, facades with bays, and the end of the street."""
     writer.material("Asphalt", looks.diffuse((0.22, 0.22, 0.24)))
     far = _LENGTH + 2.0
-    ground = np.array([[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]])
-    writer.polygons("/World/Set/Ground", ground, [[0, 1, 2, 3]], "Asphalt")
-    end = np.array([[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]])
-    writer.polygons("/World/Set/End", end, [[0, 1, 2, 3]], "Asphalt")
+    ground = [[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]]
+    writer.quad("/World/Set/Ground", ground, "Asphalt")
+    end = [[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]]
+    writer.quad("/World/Set/End", end, "Asphalt")
     for side in (-1, 1):
         z, house = 8.0, 0
         while z > -far:
@@ -146,6 +144,6 @@ def _street(writer: StageWriter, rng: np.random.Generator) -> None:
             top = _HEIGHT + float(rng.uniform(0.0, 4.0))
             corners = [[x, y, w] for x in (x0, x1) for y in (0.0, top) for w in (z - width, z)]
             path = f"/World/Set/House_{'L' if side < 0 else 'R'}{house:02d}"
-            writer.polygons(path, np.array(corners), _BOX, name)
+            writer.polygons(path, np.array(corners), BOX, name)
             z -= width
             house += 1

@@ -66,23 +66,16 @@ def _set(writer: StageWriter, options: SceneOptions) -> None:
     """Ground, mirror, lights and camera."""
     writer.material("Floor", looks.FLOOR)
     half = _GROUND_HALF
-    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
-    uv = corners[:, [0, 2]] * np.array([1.0, -1.0]) / _TILE_REPEAT_LENGTH
-    writer.polygons("/World/Set/Ground", corners, [[0, 1, 2, 3]], "Floor", uv)
+    uv = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
+    writer.floor("Ground", half, "Floor", uv=uv / _TILE_REPEAT_LENGTH)
 
     writer.material("Mirror", looks.MIRROR)
     writer.material("Frame", looks.BRONZE)
     back = -(len(_ROW_SIZES) - 1) * _PITCH_Z - 3.0
     width, low, high, lean = 15.5, 0.35, 6.6, 0.15
-    mirror = np.array(
-        [
-            [-width, low, back],
-            [width, low, back],
-            [width, high, back + lean],
-            [-width, high, back + lean],
-        ]
-    )
-    writer.polygons("/World/Set/Mirror", mirror, [[0, 1, 2, 3]], "Mirror")
+    bottom, top = [[x, low, back] for x in (-width, width)], back + lean
+    mirror = np.array([*bottom, [width, high, top], [-width, high, top]])
+    writer.quad("/World/Set/Mirror", mirror, "Mirror")
     _frame(writer, mirror)
 
     if options.lamps:

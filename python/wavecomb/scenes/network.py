@@ -18,6 +18,7 @@ _TYPES = {
     "vector3": Sdf.ValueTypeNames.Float3,
 }
 """USD's types by MaterialX's names."""
+_TOKEN = Sdf.ValueTypeNames.Token
 
 
 class Network:
@@ -39,16 +40,21 @@ class Network:
             **inputs: Outputs to connect, or (type, value) pairs; "in" is spelt ``in_``.
         """
         self._count += 1
-        shader = UsdShade.Shader.Define(self._stage, f"{self._path}/{kind}_{self._count:02d}")
-        self._fill(shader, f"ND_{kind}_{output}", inputs)
+        shader = self._shader(f"{kind}_{self._count:02d}", f"ND_{kind}_{output}", inputs)
         return shader.CreateOutput("out", _TYPES[output.removesuffix("FA")])
+
+    def closure(self, name: str, definition: str, **inputs: Any) -> UsdShade.Output:
+        """Adds a shader that outputs a closure, such as a surface, a BSDF or a volume."""
+        return self._shader(name, definition, inputs).CreateOutput("out", _TOKEN)
 
     def surface(self, definition: str, **inputs: Any) -> None:
         """Ends the network in a surface shader, such as ``ND_open_pbr_surface_surfaceshader``."""
-        shader = UsdShade.Shader.Define(self._stage, f"{self._path}/Surface")
-        self._fill(shader, definition, inputs)
-        out = shader.CreateOutput("out", Sdf.ValueTypeNames.Token)
+        out = self.closure("Surface", definition, **inputs)
         self.material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
+
+    def openpbr(self, **inputs: Any) -> None:
+        """Ends the network in an OpenPBR surface."""
+        self.surface("ND_open_pbr_surface_surfaceshader", **inputs)
 
     def hair(self, absorption: str, roughness: dict[str, Any], **inputs: Any) -> None:
         """Ends the network in hair.
@@ -57,35 +63,28 @@ class Network:
             absorption: The node that gives it, without types: ``chiang_hair_absorption_from_color``
                 or ``deon_hair_absorption_from_melanin``.
             roughness: Inputs of ``chiang_hair_roughness``, as ``node`` takes them.
-            **inputs: Those of the absorption's node.
+            **inputs: Inputs of the absorption node.
         """
-        nodes = {}
-        for name, kind, given in (
-            ("Absorption", absorption, inputs),
-            ("Roughness", "chiang_hair_roughness", roughness),
-            ("Hair", "chiang_hair_bsdf", {}),
-            ("Surface", "surface", {}),
-        ):
-            nodes[name] = UsdShade.Shader.Define(self._stage, f"{self._path}/{name}")
-            self._fill(nodes[name], f"ND_{kind}", given)
-        colour = nodes["Absorption"].CreateOutput("absorption", _TYPES["vector3"])
-        hair = nodes["Hair"]
-        hair.CreateInput("absorption_coefficient", _TYPES["vector3"]).ConnectToSource(colour)
-        for lobe in ("R", "TT", "TRT"):
-            width = nodes["Roughness"].CreateOutput(f"roughness_{lobe}", _TYPES["vector2"])
-            hair.CreateInput(f"roughness_{lobe}", _TYPES["vector2"]).ConnectToSource(width)
-        bsdf = hair.CreateOutput("out", Sdf.ValueTypeNames.Token)
-        nodes["Surface"].CreateInput("bsdf", Sdf.ValueTypeNames.Token).ConnectToSource(bsdf)
-        out = nodes["Surface"].CreateOutput("out", Sdf.ValueTypeNames.Token)
-        self.material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
+        colour = self._shader("Absorption", f"ND_{absorption}", inputs)
+        rough = self._shader("Roughness", "ND_chiang_hair_roughness", roughness)
+        lobes = [f"roughness_{lobe}" for lobe in ("R", "TT", "TRT")]
+        bsdf = self.closure(
+            "Hair",
+            "ND_chiang_hair_bsdf",
+            absorption_coefficient=colour.CreateOutput("absorption", _TYPES["vector3"]),
+            **{lobe: rough.CreateOutput(lobe, _TYPES["vector2"]) for lobe in lobes},
+        )
+        self.surface("ND_surface", bsdf=bsdf)
 
-    def _fill(self, shader: UsdShade.Shader, definition: str, inputs: dict[str, Any]) -> None:
+    def _shader(self, name: str, definition: str, inputs: dict[str, Any]) -> UsdShade.Shader:
+        shader = UsdShade.Shader.Define(self._stage, f"{self._path}/{name}")
         shader.CreateIdAttr(definition)
-        for name, value in inputs.items():
+        for key, value in inputs.items():
             if isinstance(value, UsdShade.Output):
-                made = shader.CreateInput(name.rstrip("_"), value.GetTypeName())
+                made = shader.CreateInput(key.rstrip("_"), value.GetTypeName())
                 made.ConnectToSource(value)
                 continue
             kind, plain = value
-            made = shader.CreateInput(name.rstrip("_"), _TYPES[kind])
+            made = shader.CreateInput(key.rstrip("_"), _TYPES[kind])
             made.Set(Gf.Vec3f(*plain) if kind in ("color3", "vector3") else plain)
+        return shader

@@ -222,11 +222,9 @@ def build_splats(writer: StageWriter, options: SceneOptions) -> None:
     rng = np.random.default_rng([options.seed, 77])
     writer.material("Floor", looks.diffuse((0.42, 0.41, 0.39)))
     writer.material("Mirror", looks.MIRROR)
-    h = 14.0
-    floor = np.array([[-h, 0, h], [h, 0, h], [h, 0, -h], [-h, 0, -h]])
-    mirror = np.array([[-2.2, 0.05, -1.9], [2.6, 0.05, -1.6], [2.6, 2.6, -1.7], [-2.2, 2.6, -2.0]])
-    writer.polygons("/World/Set/Floor", floor, [[0, 1, 2, 3]], "Floor")
-    writer.polygons("/World/Set/Mirror", mirror, [[0, 1, 2, 3]], "Mirror")
+    writer.floor("Floor", 14.0, "Floor")
+    mirror = [[-2.2, 0.05, -1.9], [2.6, 0.05, -1.6], [2.6, 2.6, -1.7], [-2.2, 2.6, -2.0]]
+    writer.quad("/World/Set/Mirror", mirror, "Mirror")
     mesh = options.dragon_mesh()
     count = options.splats
     points, normals = places(mesh, count, rng)

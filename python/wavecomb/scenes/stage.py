@@ -19,6 +19,9 @@ from wavecomb.scenes.mesh import FloatArray, Mesh
 from wavecomb.scenes.textures import TEXTURES, TextureInfo, sky, write_image
 
 SUFFIXES = (".usda", ".usdc", ".usd")
+BOX_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+"""Corners of a cube about the origin, (8, 3), and its faces, outwards."""
 _INPUT_TYPES = {
     "diffuseColor": Sdf.ValueTypeNames.Color3f,
     "specularColor": Sdf.ValueTypeNames.Color3f,
@@ -97,7 +100,7 @@ class StageWriter:
             with contextlib.suppress(FileNotFoundError):
                 part.unlink()
 
-    def mesh(self, path: str, mesh: Mesh) -> UsdGeom.Mesh:
+    def mesh(self, path: str, mesh: Mesh, material: str | None = None) -> UsdGeom.Mesh:
         """Adds a triangle mesh with vertex normals and ``st``."""
         prim = UsdGeom.Mesh.Define(self.stage, path)
         low, high = mesh.bounds
@@ -114,6 +117,8 @@ class StageWriter:
             "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
         )
         st.Set(Vt.Vec2fArray.FromNumpy(mesh.uv))
+        if material is not None:
+            self.bind(prim.GetPrim(), material)
         return prim
 
     def polygons(
@@ -139,6 +144,34 @@ class StageWriter:
         if material is not None:
             self.bind(prim.GetPrim(), material)
         return prim
+
+    def quad(
+        self,
+        path: str,
+        corners: Sequence[Sequence[float]] | FloatArray,
+        material: str,
+        uv: FloatArray | None = None,
+    ) -> None:
+        """Adds a flat quadrilateral with corners (4, 3)."""
+        self.polygons(path, np.asarray(corners), [[0, 1, 2, 3]], material, uv)
+
+    def floor(
+        self, name: str, half: float, material: str, y: float = 0.0, uv: FloatArray | None = None
+    ) -> None:
+        """Adds a horizontal square about the y axis, ``half`` wide to each side."""
+        h = half
+        corners = [[-h, y, h], [h, y, h], [h, y, -h], [-h, y, -h]]
+        self.quad(f"/World/Set/{name}", corners, material, uv)
+
+    def box(
+        self,
+        path: str,
+        middle: Sequence[float] | FloatArray,
+        half: Sequence[float] | FloatArray,
+        material: str,
+    ) -> None:
+        """Adds a box of flat polygons: its middle and half its edges, each (3,)."""
+        self.polygons(path, np.asarray(middle) + BOX_CORNERS * np.asarray(half), BOX, material)
 
     def prototype(self, name: str, mesh: Mesh) -> str:
         """Adds a class prim with one unbound mesh; returns its path for ``instance``."""

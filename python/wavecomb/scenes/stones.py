@@ -155,9 +155,7 @@ def _add(
 def _set(writer: StageWriter, width: float, aspect: float) -> None:
     """Ground, lights and camera for a field of stones so wide."""
     writer.material("Ground", looks.CHALK)
-    half = 30.0 * width
-    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
-    writer.polygons("/World/Set/Ground", corners, [[0, 1, 2, 3]], "Ground")
+    writer.floor("Ground", 30.0 * width, "Ground")
     writer.rect_light("Lamp", (0.0, 0.8 * width, 0.2 * width), 0.5 * width, 0.3 * width, (3, 3, 3))
     writer.dome_light("Sky", 0.0)
     writer.camera((0.0, 0.75 * width, 0.95 * width), (0.0, 0.0, 0.06 * width), 46.0, aspect)

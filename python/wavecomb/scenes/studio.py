@@ -33,9 +33,7 @@ def build_studio(writer: StageWriter, options: SceneOptions) -> None:
     """90 objects in rows on a matt floor, two lamps and a dome without a picture."""
     rng = np.random.default_rng([options.seed, 3])
     writer.material("Floor", looks.diffuse((0.35, 0.34, 0.33)))
-    half = _GROUND_HALF
-    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
-    writer.polygons("/World/Set/Floor", corners, [[0, 1, 2, 3]], "Floor")
+    writer.floor("Floor", _GROUND_HALF, "Floor")
     for name, info in _LOOKS.items():
         writer.material(name, info)
     dragon = writer.prototype("Dragon", options.dragon_mesh())

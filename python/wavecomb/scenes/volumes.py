@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, UsdLux, UsdShade, UsdVol
+from pxr import Gf, UsdLux, UsdVol
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.materials import Colour
+from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
 
@@ -67,8 +68,6 @@ class Noise:
 
 
 Density = Callable[[Points], NDArray[np.float32]]
-
-_BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 
 
 def sampled(
@@ -133,51 +132,30 @@ class _Volumes:
         glow: str = "",
     ) -> str:
         """A MaterialX volume: coefficients per metre, times fields where these are named."""
-        path = f"/World/Looks/{name}"
-        material = UsdShade.Material.Define(self._stage, path)
-        shader = self._node(f"{path}/Volume", "ND_volume")
-        medium = self._node(f"{path}/Medium", "ND_anisotropic_vdf")
-        for key, value in (("absorption", absorption), ("scattering", scattering)):
-            self._coefficient(medium, key, Sdf.ValueTypeNames.Vector3f, value, density)
-        medium.CreateInput("anisotropy", Sdf.ValueTypeNames.Float).Set(anisotropy)
-        vdf = shader.CreateInput("vdf", Sdf.ValueTypeNames.Token)
-        vdf.ConnectToSource(medium.CreateOutput("out", Sdf.ValueTypeNames.Token))
+        net = Network(self._stage, f"/World/Looks/{name}")
+
+        def coefficient(kind: str, value: Colour, field: str) -> Any:
+            """Returns an input: a value, times a field if one is named."""
+            if not field:
+                return kind, value
+            reader = net.node("geompropvalue", "float", geomprop=("string", field))
+            return net.node("multiply", f"{kind}FA", in1=(kind, value), in2=reader)
+
+        inputs = {
+            "vdf": net.closure(
+                "Medium",
+                "ND_anisotropic_vdf",
+                absorption=coefficient("vector3", absorption, density),
+                scattering=coefficient("vector3", scattering, density),
+                anisotropy=("float", anisotropy),
+            )
+        }
         if emission is not None:
-            glowing = self._node(f"{path}/Glow", "ND_uniform_edf")
-            self._coefficient(glowing, "color", Sdf.ValueTypeNames.Color3f, emission, glow)
-            edf = shader.CreateInput("edf", Sdf.ValueTypeNames.Token)
-            edf.ConnectToSource(glowing.CreateOutput("out", Sdf.ValueTypeNames.Token))
-        terminal = material.CreateVolumeOutput("mtlx")
-        terminal.ConnectToSource(shader.CreateOutput("out", Sdf.ValueTypeNames.Token))
-        return self._writer.own_material(name, material)
-
-    def _node(self, path: str, identifier: str) -> UsdShade.Shader:
-        node = UsdShade.Shader.Define(self._stage, path)
-        node.CreateIdAttr(identifier)
-        return node
-
-    def _coefficient(
-        self,
-        node: UsdShade.Shader,
-        name: str,
-        kind: Sdf.ValueTypeName,
-        value: Colour,
-        field: str,
-    ) -> None:
-        """Sets an input, or feeds it with a value times a field."""
-        target = node.CreateInput(name, kind)
-        if not field:
-            target.Set(Gf.Vec3f(*value))
-            return
-        path = f"{node.GetPath()}_{name}"
-        reader = self._node(f"{path}_field", "ND_geompropvalue_float")
-        reader.CreateInput("geomprop", Sdf.ValueTypeNames.String).Set(field)
-        word = "color3" if kind == Sdf.ValueTypeNames.Color3f else "vector3"
-        times = self._node(f"{path}_times", f"ND_multiply_{word}FA")
-        times.CreateInput("in1", kind).Set(Gf.Vec3f(*value))
-        scale = times.CreateInput("in2", Sdf.ValueTypeNames.Float)
-        scale.ConnectToSource(reader.CreateOutput("out", Sdf.ValueTypeNames.Float))
-        target.ConnectToSource(times.CreateOutput("out", kind))
+            radiance = coefficient("color3", emission, glow)
+            inputs["edf"] = net.closure("Emission", "ND_uniform_edf", color=radiance)
+        terminal = net.material.CreateVolumeOutput("mtlx")
+        terminal.ConnectToSource(net.closure("Volume", "ND_volume", **inputs))
+        return self._writer.own_material(name, net.material)
 
     def volume(
         self,
@@ -209,18 +187,9 @@ class _Volumes:
             prim.CreateFieldRelationship(field, grid.GetPath())
 
 
-def _box(
-    writer: StageWriter, name: str, middle: Sequence[float], half: Sequence[float], look: str
-) -> None:
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    points = np.array(middle) + corners * np.array(half)
-    writer.polygons(f"/World/Objects/{name}", points, _BOX, look)
-
-
 def _ground(writer: StageWriter, half: float, colour: Colour) -> None:
     writer.material("Ground", looks.diffuse(colour))
-    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
-    writer.polygons("/World/Set/Ground", corners, [[0, 1, 2, 3]], "Ground")
+    writer.floor("Ground", half, "Ground")
 
 
 def smoke_density(seed: int) -> Density:
@@ -263,7 +232,7 @@ def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
     volumes = _Volumes(writer)
     _ground(writer, 8.0, (0.3, 0.3, 0.3))
     writer.material("Brick", looks.diffuse((0.32, 0.16, 0.12)))
-    _box(writer, "Hearth", (0.0, 0.06, 0.0), (0.35, 0.06, 0.35), "Brick")
+    writer.box("/World/Objects/Hearth", (0.0, 0.06, 0.0), (0.35, 0.06, 0.35), "Brick")
     density = smoke_density(options.seed)
     low, high = (-1.6, 0.0, -1.6), (1.6, 4.0, 1.6)
     grids = {
@@ -341,8 +310,8 @@ def build_fog(writer: StageWriter, options: SceneOptions) -> None:
     for index in range(9):
         x, z = -6.0 + 1.5 * index, -1.5 - 2.0 * float(rng.random())
         tall = float(rng.uniform(0.9, 1.3))
-        _box(writer, f"Post_{index}", (x, tall, z), (0.09, tall, 0.09), "Post")
-    _box(writer, "House", (5.5, 2.5, -7.0), (2.0, 2.5, 0.3), "House")
+        writer.box(f"/World/Objects/Post_{index}", (x, tall, z), (0.09, tall, 0.09), "Post")
+    writer.box("/World/Objects/House", (5.5, 2.5, -7.0), (2.0, 2.5, 0.3), "House")
     fog = volumes.material("Fog", (0.0, 0.0, 0.0), (0.09, 0.09, 0.09), 0.7)
     volumes.volume("Fog", fog, ((-13.0, 0.001, -13.0), (13.0, 8.0, 13.0)))
     lamp = UsdLux.SphereLight.Define(writer.stage, "/World/Lights/Lamp")
