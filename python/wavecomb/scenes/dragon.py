@@ -23,50 +23,38 @@ from wavecomb.scenes.sweep import Tube, spline, tube_extent, tube_mesh
 MIN_TRIANGLES = 10_000
 MAX_TRIANGLES = 20_000_000
 
-# Centre line of the body from the tail's tip to the nape: x, y, z, half width, half height.
+# The body from the tail's tip to the nape: x, y, z, half width, half height, direction of the back.
 _BODY = np.array(
     [
-        [-0.80, 0.86, -0.10, 0.004, 0.004],
-        [-0.98, 0.84, -0.20, 0.020, 0.020],
-        [-1.12, 0.66, -0.18, 0.036, 0.038],
-        [-1.14, 0.42, -0.02, 0.052, 0.055],
-        [-1.04, 0.20, 0.15, 0.068, 0.072],
-        [-0.82, 0.15, 0.25, 0.088, 0.092],
-        [-0.60, 0.27, 0.20, 0.118, 0.125],
-        [-0.40, 0.45, 0.04, 0.142, 0.150],
-        [-0.18, 0.58, -0.14, 0.140, 0.152],
-        [0.04, 0.54, -0.24, 0.142, 0.152],
-        [0.24, 0.39, -0.18, 0.148, 0.158],
-        [0.42, 0.33, -0.02, 0.148, 0.158],
-        [0.57, 0.42, 0.12, 0.134, 0.142],
-        [0.60, 0.62, 0.16, 0.110, 0.116],
-        [0.54, 0.83, 0.10, 0.094, 0.100],
-        [0.58, 1.00, 0.02, 0.088, 0.092],
-        [0.74, 1.06, 0.00, 0.080, 0.084],
+        [-0.80, 0.86, -0.10, 0.004, 0.004, 0.2, 1.0, 0.2],
+        [-0.98, 0.84, -0.20, 0.020, 0.020, 0.4, 0.9, 0.0],
+        [-1.12, 0.66, -0.18, 0.036, 0.038, 0.9, 0.5, 0.0],
+        [-1.14, 0.42, -0.02, 0.052, 0.055, 1.0, 0.3, 0.0],
+        [-1.04, 0.20, 0.15, 0.068, 0.072, 0.7, 0.9, 0.0],
+        [-0.82, 0.15, 0.25, 0.088, 0.092, 0.0, 1.0, 0.0],
+        [-0.60, 0.27, 0.20, 0.118, 0.125, -0.3, 1.0, 0.0],
+        [-0.40, 0.45, 0.04, 0.142, 0.150, -0.3, 1.0, 0.0],
+        [-0.18, 0.58, -0.14, 0.140, 0.152, 0.0, 1.0, 0.0],
+        [0.04, 0.54, -0.24, 0.142, 0.152, 0.3, 1.0, 0.0],
+        [0.24, 0.39, -0.18, 0.148, 0.158, 0.2, 1.0, 0.0],
+        [0.42, 0.33, -0.02, 0.148, 0.158, -0.2, 1.0, 0.0],
+        [0.57, 0.42, 0.12, 0.134, 0.142, -0.8, 0.7, 0.0],
+        [0.60, 0.62, 0.16, 0.110, 0.116, -1.0, 0.3, 0.0],
+        [0.54, 0.83, 0.10, 0.094, 0.100, -1.0, 0.2, 0.0],
+        [0.58, 1.00, 0.02, 0.088, 0.092, -0.8, 0.9, 0.0],
+        [0.74, 1.06, 0.00, 0.080, 0.084, -0.1, 1.0, 0.0],
     ]
 )
-# Direction of the back at each of those points.
-_BODY_UP = np.array(
-    [
-        [0.2, 1.0, 0.2],
-        [0.4, 0.9, 0.0],
-        [0.9, 0.5, 0.0],
-        [1.0, 0.3, 0.0],
-        [0.7, 0.9, 0.0],
-        [0.0, 1.0, 0.0],
-        [-0.3, 1.0, 0.0],
-        [-0.3, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.3, 1.0, 0.0],
-        [0.2, 1.0, 0.0],
-        [-0.2, 1.0, 0.0],
-        [-0.8, 0.7, 0.0],
-        [-1.0, 0.3, 0.0],
-        [-1.0, 0.2, 0.0],
-        [-0.8, 0.9, 0.0],
-        [-0.1, 1.0, 0.0],
-    ]
-)
+# Fore legs, then hind legs: hip, knee, ankle, foot, direction of the toes, radius of the thigh.
+_LEGS = (
+    ((0.44, 0.34, 0.08), (0.30, 0.25, 0.25), (0.47, 0.13, 0.31), (0.51, 0.055, 0.32), -0.25, 0.088),
+    ((0.40, 0.34, -0.10), (0.44, 0.27, -0.33), (0.60, 0.14, -0.33), (0.65, 0.055, -0.33),
+     0.2, 0.088),
+    ((-0.54, 0.32, 0.24), (-0.40, 0.26, 0.42), (-0.58, 0.12, 0.44), (-0.54, 0.055, 0.45),
+     -0.2, 0.100),
+    ((-0.56, 0.32, 0.06), (-0.42, 0.28, -0.17), (-0.62, 0.13, -0.20), (-0.58, 0.055, -0.21),
+     0.25, 0.100),
+)  # fmt: skip
 _HEAD_ORIGIN = np.array([0.74, 1.06, 0.0])
 _HEAD_SIZE = 0.46
 _HEAD_PITCH = np.radians(-14.0)
@@ -108,115 +96,53 @@ def _leg(
         angle = yaw + np.radians(spread)
         ray = np.array([np.cos(angle), 0.0, -np.sin(angle)])
         base = np.array([foot[0], 0.05, foot[2]])
-        toe = np.array(
-            [
-                base,
-                base + ray * reach * 0.45 + up * 0.015,
-                base + ray * reach * 0.8 - up * 0.008,
-                base + ray * reach - up * 0.022,
-            ]
-        )
+        toe = base + ray * reach * np.array([0.0, 0.45, 0.8, 1.0])[:, None]
+        toe += np.array([0.0, 0.015, -0.008, -0.022])[:, None] * up
         width = np.array([0.036, 0.033, 0.028, 0.024])
         parts.append(Tube(toe, width, width, up, scaly(12, 0.10, 0.0), 1.0, 1.2))
         claw = base + ray * (reach + 0.002) - up * 0.018
-        parts.append(
-            spike(
-                claw,
-                claw + ray * 0.035 + up * 0.012,
-                claw + ray * 0.075 - up * 0.008,
-                claw + ray * 0.088 - up * 0.031,
-                radius=0.021,
-                flat=0.75,
-            )
-        )
+        bends = (0.035, 0.012), (0.075, -0.008), (0.088, -0.031)
+        curve = [claw + ray * out + up * rise for out, rise in bends]
+        parts.append(spike(claw, *curve, radius=0.021, flat=0.75))
     # Tufts behind the elbow.
     back = normalized(knee - 0.5 * (hip + ankle))
     for k, lift in enumerate((0.03, 0.0, -0.03)):
         tip = knee + back * (0.20 - 0.03 * k) + up * (0.10 + 2.2 * lift) - forward * 0.05
+        middle = knee + back * 0.09 + up * (0.02 + 1.3 * lift)
+        root, fold = knee + up * lift, fluted(6, 0.08)
         parts.append(
-            spike(
-                knee + up * lift,
-                knee + back * 0.09 + up * (0.02 + 1.3 * lift),
-                tip,
-                radius=0.036,
-                flat=0.4,
-                up=up,
-                relief=fluted(6, 0.08),
-                bulge=1.2,
-            )
+            spike(root, middle, tip, radius=0.036, flat=0.4, up=up, relief=fold, bulge=1.2)
         )
     return parts
 
 
 def _legs() -> list[Tube]:
     """The four legs; feet on the ground under the body's arches."""
-
-    def v(*xyz: float) -> FloatArray:
-        return np.array(xyz)
-
-    return [
-        # Fore legs, at the shoulder.
-        *_leg(
-            v(0.44, 0.34, 0.08),
-            v(0.30, 0.25, 0.25),
-            v(0.47, 0.13, 0.31),
-            v(0.51, 0.055, 0.32),
-            -0.25,
-            0.088,
-        ),
-        *_leg(
-            v(0.40, 0.34, -0.10),
-            v(0.44, 0.27, -0.33),
-            v(0.60, 0.14, -0.33),
-            v(0.65, 0.055, -0.33),
-            0.2,
-            0.088,
-        ),
-        # Hind legs, at the hips.
-        *_leg(
-            v(-0.54, 0.32, 0.24),
-            v(-0.40, 0.26, 0.42),
-            v(-0.58, 0.12, 0.44),
-            v(-0.54, 0.055, 0.45),
-            -0.2,
-            0.100,
-        ),
-        *_leg(
-            v(-0.56, 0.32, 0.06),
-            v(-0.42, 0.28, -0.17),
-            v(-0.62, 0.13, -0.20),
-            v(-0.58, 0.055, -0.21),
-            0.25,
-            0.100,
-        ),
-    ]
+    parts = []
+    for *joints, yaw, thigh in _LEGS:
+        hip, knee, ankle, foot = np.array(joints)
+        parts += _leg(hip, knee, ankle, foot, yaw, thigh)
+    return parts
 
 
 def _fins() -> list[Tube]:
     """Fins along the back, lower to both ends, and the flame at the tail's tip."""
     parts = []
     t = np.linspace(0.06, 0.955, 58)
-    place = spline(_BODY, t)
+    place = spline(_BODY[:, :5], t)
     ahead = spline(_BODY[:, :3], np.minimum(t + 1e-3, 1.0)) - place[:, :3]
     tangent = normalized(ahead)
-    up = spline(_BODY_UP, t)
+    up = spline(_BODY[:, 5:], t)
     up = normalized(up - np.einsum("ij,ij->i", up, tangent)[:, None] * tangent)
     for k in range(len(t)):
         radius = place[k, 4]
         size = 0.055 + 0.55 * radius * (1.0 if k % 2 else 0.82)
         root = place[k, :3] + up[k] * radius * 0.86
+        bends = (0.45, 0.05), (0.95, -0.25), (1.20, -0.85)
+        path = [root + up[k] * rise * size + tangent[k] * along * size for rise, along in bends]
+        wide, fold = 0.36 * size + 0.008, fluted(6, 0.07)
         parts.append(
-            spike(
-                root,
-                root + up[k] * 0.45 * size + tangent[k] * 0.05 * size,
-                root + up[k] * 0.95 * size - tangent[k] * 0.25 * size,
-                root + up[k] * 1.20 * size - tangent[k] * 0.85 * size,
-                radius=0.36 * size + 0.008,
-                flat=0.30,
-                up=tangent[k],
-                relief=fluted(6, 0.07),
-                bulge=1.15,
-            )
+            spike(root, *path, radius=wide, flat=0.30, up=tangent[k], relief=fold, bulge=1.15)
         )
     tip = _BODY[0, :3]
     outward = normalized(_BODY[0, :3] - _BODY[1, :3])
@@ -230,33 +156,21 @@ def _fins() -> list[Tube]:
         (-0.9, 0.2, 0.18),
     ):
         aim = normalized(outward + lift * rise + swing * side)
-        parts.append(
-            spike(
-                tip - outward * 0.05,
-                tip + aim * 0.4 * long,
-                tip + aim * 0.75 * long - lift * 0.06 * rise + 0.02 * rise,
-                tip + outward * 0.25 * long + aim * 0.8 * long + 0.05 * rise,
-                radius=0.05,
-                flat=0.4,
-                up=normalized(np.cross(aim, side)),
-                relief=fluted(7, 0.09),
-                bulge=1.3,
-            )
-        )
+        path = [
+            tip - outward * 0.05,
+            tip + aim * 0.4 * long,
+            tip + aim * 0.75 * long - lift * 0.06 * rise + 0.02 * rise,
+            tip + outward * 0.25 * long + aim * 0.8 * long + 0.05 * rise,
+        ]
+        broad, fold = normalized(np.cross(aim, side)), fluted(7, 0.09)
+        parts.append(spike(*path, radius=0.05, flat=0.4, up=broad, relief=fold, bulge=1.3))
     return parts
 
 
 def dragon_tubes() -> list[Tube]:
     """All parts of the dragon; the body comes first."""
-    body = Tube(
-        _BODY[:, :3],
-        _BODY[:, 3],
-        _BODY[:, 4],
-        _BODY_UP,
-        scaly(_SCALES_AROUND, 0.13, 0.13),
-        0.94,
-        1.0,
-    )
+    points, width, height, up = _BODY[:, :3], _BODY[:, 3], _BODY[:, 4], _BODY[:, 5:]
+    body = Tube(points, width, height, up, scaly(_SCALES_AROUND, 0.13, 0.13), 0.94)
     c, s = np.cos(_HEAD_PITCH), np.sin(_HEAD_PITCH)
     pitch = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     head = [_placed(tube, _HEAD_SIZE, pitch, _HEAD_ORIGIN) for tube in head_tubes()]

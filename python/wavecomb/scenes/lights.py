@@ -129,9 +129,9 @@ def _street(writer: StageWriter, rng: np.random.Generator) -> None:
     """Ground, facades with bays, and the end of the street."""
     writer.material("Asphalt", looks.diffuse((0.22, 0.22, 0.24)))
     far = _LENGTH + 2.0
-    ground = [[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]]
+    ground: list[list[float]] = [[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]]
     writer.quad("/World/Set/Ground", ground, "Asphalt")
-    end = [[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]]
+    end: list[list[float]] = [[-30, 0, -far], [30, 0, -far], [30, 16, -far], [-30, 16, -far]]
     writer.quad("/World/Set/End", end, "Asphalt")
     for side in (-1, 1):
         z, house = 8.0, 0

@@ -33,8 +33,10 @@ class LightsModel(HeadedModel):
     def read(self) -> None:
         """Reads which lights there are."""
         stage = self._edits.stage
-        is_open = stage is not None and self._edits.edits is not None
-        self.fill(dict.fromkeys((*stage.lights, *stage.light_paths)) if is_open else ())
+        paths: dict[str, None] = {}
+        if stage is not None and self._edits.edits is not None:
+            paths = dict.fromkeys((*stage.lights, *stage.light_paths))
+        self.fill(list(paths))
 
     def refresh(self) -> None:
         """What rows say may have changed."""
