@@ -11,7 +11,6 @@ from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QWidget
 
-SEPARATOR = "-"
 TITLE = "title"
 """Property: the text of an action as it was made, where it says more meanwhile."""
 

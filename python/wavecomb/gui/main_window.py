@@ -9,25 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTimer
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QFileDialog,
     QMainWindow,
-    QMenu,
-    QMessageBox,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.actions import HistoryActions, UnsavedMark, make_action
-from wavecomb.gui.menus import CHECKED, MENUS, entries
+from wavecomb.gui.actions import HistoryActions, UnsavedMark
+from wavecomb.gui.menus import CHECKED, make_menus
 from wavecomb.gui.messages import MessageBar, log_folder
 from wavecomb.gui.panels import make_panels
-from wavecomb.gui.recent_stages import RecentStages
-from wavecomb.gui.scene.autosave import Autosave
+from wavecomb.gui.scene.autosave import Autosave, make_question
 from wavecomb.gui.scene.scene_panel import ScenePanel
 from wavecomb.gui.shortcuts import ShortcutsDialog, make_about
 from wavecomb.gui.status import StatusLine
@@ -68,8 +64,9 @@ class MainWindow(QMainWindow):
         self._bottom_sized = False
         self._dialog: QWidget | None = None
         self._lay_out()
-        self.actions_by_name: dict[str, QAction] = {}
-        self._make_menus()
+        self.actions_by_name, self._recent = make_menus(self)
+        for name in ("pause", "stop", "restart", "region", "clear_region"):
+            self.render_bar.addAction(self.actions_by_name[name])
         self._connect()
         self._restore()
         self._retitle()
@@ -143,42 +140,6 @@ class MainWindow(QMainWindow):
                 0, self, lambda: self.resizeDocks(shown, [high], Qt.Orientation.Vertical)
             )
 
-    def _make_menus(self) -> None:
-        by_name = {entry.name: entry for entry in entries(self)}
-        for title, names in MENUS:
-            menu = self.menuBar().addMenu(title)
-            menu.setObjectName("menu." + title.replace("&", "").lower())
-            menu.setToolTipsVisible(True)
-            for name in names:
-                if name == "-":
-                    menu.addSeparator()
-                elif name == "recent":
-                    inner = menu.addMenu("Open &recent")
-                    self._recent = RecentStages(self.settings, inner)
-                    self._recent.chosen.connect(self.open)
-                elif name == "theme":
-                    self._add_theme_menu(menu)
-                elif name == "panels":
-                    for dock in self.docks.values():
-                        menu.addAction(dock.toggleViewAction())
-                elif name in by_name:
-                    action = make_action(by_name[name], self, self.viewport)
-                    self.actions_by_name[name] = action
-                    menu.addAction(action)
-        for name in ("pause", "stop", "restart", "region", "clear_region"):
-            self.render_bar.addAction(self.actions_by_name[name])
-
-    def _add_theme_menu(self, menu: QMenu) -> None:
-        inner = menu.addMenu("&Colours")
-        group = QActionGroup(self)
-        for choice in theme.CHOICES:
-            action = inner.addAction(choice.capitalize())
-            action.setObjectName(f"theme.{choice}")
-            action.setCheckable(True)
-            action.setChecked(theme.choice() == choice)
-            action.triggered.connect(lambda checked=False, choice=choice: self.set_theme(choice))
-            group.addAction(action)
-
     @property
     def scene(self) -> ScenePanel:
         """The scene panel."""
@@ -208,7 +169,7 @@ class MainWindow(QMainWindow):
         HistoryActions(self.views.stack, actions["view_back"], actions["view_forth"], self)
         UnsavedMark(edits, self)
         self.autosave = Autosave(self.scene.edits, log_folder() / "autosave", self)
-        self.autosave.found.connect(self._offer_edits)
+        self.autosave.found.connect(lambda: self._show(make_question(self.autosave, self)))
         self._state_changed(session.state)
         self._setup_changed(session.setup)
 
@@ -248,26 +209,6 @@ class MainWindow(QMainWindow):
         if path is not None:
             self._recent.add(path)
         self._retitle()
-
-    def _offer_edits(self) -> None:
-        """Asks what to do with edits that a window which crashed did not save."""
-        box = QMessageBox(self)
-        box.setObjectName("autosave")
-        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        box.setIcon(QMessageBox.Icon.Question)
-        box.setWindowTitle("Unsaved edits")
-        box.setText("The window ended before edits of this stage were saved.")
-        box.setInformativeText("Restore them?")
-        for text, role, act in (
-            ("Restore", QMessageBox.ButtonRole.AcceptRole, self.autosave.restore),
-            ("Discard", QMessageBox.ButtonRole.DestructiveRole, self.autosave.discard),
-        ):
-            button = QPushButton(text, box)
-            button.setObjectName(f"autosave.{text.lower()}")
-            button.clicked.connect(act)
-            box.addButton(button, role)
-        box.setModal(False)
-        box.show()
 
     def _retitle(self) -> None:
         path = self.session.path
@@ -390,8 +331,11 @@ class MainWindow(QMainWindow):
         if self._dialog is not None:
             self._dialog.close()
         self._dialog = dialog
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.destroyed.connect(self._dialog_gone)
+        self._show(dialog)
+
+    def _show(self, dialog: QWidget) -> None:
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.show()
 
     def _dialog_gone(self) -> None:

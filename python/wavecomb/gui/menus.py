@@ -5,7 +5,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from wavecomb.gui.actions import Entry, keypad
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu
+
+from wavecomb.gui import theme
+from wavecomb.gui.actions import Entry, keypad, make_action
+from wavecomb.gui.recent_stages import RecentStages
 
 Window = Any
 """A ``main_window.MainWindow``, which has its menus from here."""
@@ -161,3 +166,46 @@ def entries(window: Window) -> list[Entry]:
         Entry("shortcuts", "&Keyboard shortcuts", window.show_shortcuts, ["F1"]),
         Entry("about", "&About Wavecomb", window.show_about),
     ]  # fmt: skip
+
+
+def make_menus(window: Window) -> tuple[dict[str, QAction], RecentStages]:
+    """Fills the menu bar of a window.
+
+    Returns:
+        The actions by name, and the menu of stages that were opened before.
+    """
+    actions: dict[str, QAction] = {}
+    by_name = {entry.name: entry for entry in entries(window)}
+    recent = RecentStages(window.settings, window)
+    recent.chosen.connect(window.open)
+    for title, names in MENUS:
+        menu = window.menuBar().addMenu(title)
+        menu.setObjectName("menu." + title.replace("&", "").lower())
+        menu.setToolTipsVisible(True)
+        for name in names:
+            if name == "-":
+                menu.addSeparator()
+            elif name == "recent":
+                menu.addMenu(recent)
+            elif name == "theme":
+                menu.addMenu(_theme_menu(window))
+            elif name == "panels":
+                menu.addActions([dock.toggleViewAction() for dock in window.docks.values()])
+            else:
+                actions[name] = make_action(by_name[name], window, window.viewport)
+                menu.addAction(actions[name])
+    return actions, recent
+
+
+def _theme_menu(window: Window) -> QMenu:
+    menu = QMenu("&Colours", window)
+    group = QActionGroup(window)
+    for choice in theme.CHOICES:
+        action = QAction(choice.capitalize(), menu)
+        action.setObjectName(f"theme.{choice}")
+        action.setCheckable(True)
+        action.setChecked(theme.choice() == choice)
+        action.triggered.connect(lambda checked=False, choice=choice: window.set_theme(choice))
+        group.addAction(action)
+    menu.addActions(group.actions())
+    return menu

@@ -6,48 +6,48 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, QSettings, Signal
+from PySide6.QtCore import QSettings, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMenu, QWidget
 
 MOST = 10
 
 
-class RecentStages(QObject):
-    """The files, the last first.
+class RecentStages(QMenu):
+    """The menu of the files, the last first.
 
     Args:
-        settings: Where they are kept.
-        menu: That lists them.
+        settings: Where the files are kept.
+        parent: The window.
 
     Signals:
-        chosen(str): A file of the menu.
+        chosen(str): The user chose a file.
     """
 
     chosen = Signal(str)
 
-    def __init__(self, settings: QSettings, menu: QMenu) -> None:
-        super().__init__(menu)
-        self._settings, self._menu = settings, menu
+    def __init__(self, settings: QSettings, parent: QWidget | None = None) -> None:
+        super().__init__("Open &recent", parent)
+        self._settings = settings
         self._fill()
 
     def names(self) -> list[str]:
-        """All of them."""
+        """All files."""
         value: Any = self._settings.value("recent", [])
         return [value] if isinstance(value, str) else [str(path) for path in value or []]
 
     def add(self, path: Path) -> None:
-        """Another, or one that comes first again."""
+        """Puts a file first."""
         name = str(path.resolve())
         others = [other for other in self.names() if other != name]
         self._settings.setValue("recent", [name, *others][:MOST])
         self._fill()
 
     def _fill(self) -> None:
-        self._menu.clear()
+        self.clear()
         names = self.names()
-        self._menu.setEnabled(bool(names))
+        self.setEnabled(bool(names))
         for name in names:
-            action = QAction(name.replace("&", "&&"), self._menu)
-            self._menu.addAction(action)
+            action = QAction(name.replace("&", "&&"), self)
+            self.addAction(action)
             action.triggered.connect(lambda checked=False, name=name: self.chosen.emit(name))

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QToolButton, QWidget
 
 W = TypeVar("W", bound=QWidget)
 
@@ -19,6 +19,13 @@ def named(widget: W, name: str, title: str, tip: str) -> W:
     widget.setAccessibleName(title)
     widget.setToolTip(tip)
     return widget
+
+
+def tool(name: str, text: str, tip: str, parent: QWidget) -> QToolButton:
+    """A small button."""
+    button = named(QToolButton(parent), name, tip, tip)
+    button.setText(text)
+    return button
 
 
 def real(

@@ -23,7 +23,7 @@ from wavecomb.gui import theme
 from wavecomb.gui.compare.live_pair import LiveSettings
 from wavecomb.gui.compare.picture_sides import SUFFIXES
 from wavecomb.gui.compare.source import LIVE, SideSource
-from wavecomb.gui.widgets import set_text_colour
+from wavecomb.gui.widgets import set_text_colour, tool
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
@@ -45,11 +45,9 @@ class SidePicker(QWidget):
         name = source.name
         self.setObjectName(f"side{name}")
         self.setAcceptDrops(True)
-        self._button = QToolButton(self)
-        self._button.setObjectName(f"choose{name}")
-        self._button.setText(f"{name}  ")
-        self._button.setAccessibleName(f"Choose {name}")
-        self._button.setToolTip(f"Where picture {name} is from")
+        self._button = tool(
+            f"choose{name}", f"{name}  ", f"Choose where picture {name} is from", self
+        )
         self._button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self._button.setMenu(self._menu())
         self._title = QLabel(self)

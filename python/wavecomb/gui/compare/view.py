@@ -174,26 +174,23 @@ class CompareView(QWidget):
             painter.drawRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5))
 
     def _paint_pane(self, painter: QPainter, which: str, pane: QRectF) -> None:
-        self._paint_image(painter, self._images[which], pane)
+        self._paint_image(painter, which, pane, pane)
         if which == D and self.message:
             paint_label(painter, pane, self.message, middle=True)
         elif self._images[which] is None:
-            paint_label(
-                painter,
-                pane,
-                f"{which}: drop a picture here" if which != D else "no difference yet",
-                middle=True,
-            )
+            empty = "no difference yet" if which == D else f"{which}: drop a picture here"
+            paint_label(painter, pane, empty, middle=True)
         if self.mode != WIPE:
             paint_label(painter, pane, self.names[which])
         if self._cursor is not None and len(self._panes()) > 1:
             self._paint_cursor(painter, pane)
 
-    def _paint_image(self, painter: QPainter, image: QImage | None, pane: QRectF) -> None:
+    def _paint_image(self, painter: QPainter, which: str, pane: QRectF, clip: QRectF) -> None:
+        image = self._images[which]
         if image is None:
             return
         painter.save()
-        painter.setClipRect(pane)
+        painter.setClipRect(clip)
         smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
         painter.drawImage(self._arranged().target(pane, QSizeF(image.size())), image)
@@ -217,15 +214,8 @@ class CompareView(QWidget):
         pane = self._panes()[0][1]
         x = self._line_x()
         right = QRectF(x, pane.top(), pane.width() - x, pane.height())
-        painter.save()
-        painter.setClipRect(right)
         painter.fillRect(right, theme.surround())
-        image = self._images[B]
-        if image is not None:
-            smooth = self.points_per_pixel() * self.devicePixelRatioF() < 1.0
-            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-            painter.drawImage(self._arranged().target(pane, QSizeF(image.size())), image)
-        painter.restore()
+        self._paint_image(painter, B, pane, right)
         for width, colour in ((3.0, Qt.GlobalColor.black), (1.0, Qt.GlobalColor.white)):
             painter.setPen(QPen(colour, width))
             painter.drawLine(QPointF(x, pane.top()), QPointF(x, pane.bottom()))

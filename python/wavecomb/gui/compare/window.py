@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDockWidget,
-    QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
     QSplitter,
@@ -32,7 +31,7 @@ from wavecomb.gui.compare.source import SideSource
 from wavecomb.gui.compare.view import CompareView
 from wavecomb.gui.viewport import display
 from wavecomb.gui.viewport.display import Look
-from wavecomb.gui.widgets import set_text_colour
+from wavecomb.gui.widgets import named, real, set_text_colour, tool
 from wavecomb.picture.heatmap import Scale
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ class CompareWindow(QWidget):
 
     def _lay_out(self) -> None:
         sides = QHBoxLayout()
-        swap = self._tool("swap", "⇄", "Exchange A and B")
+        swap = tool("swap", "⇄", "Exchange A and B", self)
         swap.clicked.connect(lambda: self.a.exchange(self.b))
         sides.addWidget(self._pickers["A"], 1)
         sides.addWidget(swap, 0, Qt.AlignmentFlag.AlignTop)
@@ -108,7 +107,7 @@ class CompareWindow(QWidget):
         bar = QHBoxLayout()
         self._modes: dict[str, QToolButton] = {}
         for mode, title in MODES.items():
-            button = self._tool(f"mode-{mode}", title, f"{title} (Alt+{_KEYS[mode]})")
+            button = tool(f"mode-{mode}", title, f"{title} (Alt+{_KEYS[mode]})", self)
             button.setCheckable(True)
             button.setAutoExclusive(True)
             button.setShortcut(f"Alt+{_KEYS[mode]}")
@@ -122,7 +121,7 @@ class CompareWindow(QWidget):
             ("fit", "Fit", "The whole picture (0)", self.view.fit),
             ("one", "1:1", "Pixel by pixel (1)", self._one_to_one),
         ):
-            button = self._tool(name, text, tip)
+            button = tool(name, text, tip, self)
             button.clicked.connect(lambda checked=False, call=call: call())
             bar.addWidget(button)
         return bar
@@ -144,14 +143,12 @@ class CompareWindow(QWidget):
             self._map.addItem(title, kind)
         self._layer = self._combo("layer", "Layer", "Layer that both have")
         self._layer.addItem("beauty")
-        self._exposure = QDoubleSpinBox(self)
-        self._exposure.setObjectName("compareExposure")
-        self._exposure.setAccessibleName("Exposure of both")
-        self._exposure.setToolTip("Stops; of both pictures, and of PSNR and FLIP")
-        self._exposure.setRange(-20.0, 20.0)
-        self._exposure.setSingleStep(0.5)
+        self._exposure = real(
+            "compareExposure", "Exposure of both",
+            "Exposure of both pictures in stops; PSNR and FLIP are computed with it",
+            -20.0, 20.0, 0.5, 0.0, lambda value: self.refresh(),
+        )  # fmt: skip
         self._exposure.setSuffix(" stops")
-        self._exposure.valueChanged.connect(self.refresh)
         self._tone = self._combo("tone", "Tone mapping of both", "Tone mapping of both pictures")
         self._tone.addItems(display.views())
         for combo in (self._map, self._layer, self._tone):
@@ -161,19 +158,8 @@ class CompareWindow(QWidget):
         bar.addStretch(1)
         return bar
 
-    def _tool(self, name: str, text: str, tip: str) -> QToolButton:
-        button = QToolButton(self)
-        button.setObjectName(name)
-        button.setText(text)
-        button.setToolTip(tip)
-        button.setAccessibleName(tip)
-        return button
-
     def _combo(self, name: str, accessible: str, tip: str) -> QComboBox:
-        combo = QComboBox(self)
-        combo.setObjectName(f"compare-{name}")
-        combo.setAccessibleName(accessible)
-        combo.setToolTip(tip)
+        combo = named(QComboBox(self), f"compare-{name}", accessible, tip)
         combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         combo.setMinimumContentsLength(12)
         return combo

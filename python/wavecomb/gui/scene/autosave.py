@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Sdf
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtWidgets import QMessageBox, QPushButton, QWidget
 
 from wavecomb.errors import WavecombError
 from wavecomb.gui.scene.edit_layer import save_edits
@@ -140,3 +141,23 @@ class Autosave(QObject):
     def _on_clean(self, clean: bool) -> None:
         if clean and not self._waits:
             self._timer.start(0)  # a stage that is being closed stops the timer: its edits stay
+
+
+def make_question(autosave: Autosave, parent: QWidget) -> QMessageBox:
+    """A dialog, not shown yet, that asks what to do with edits which were found."""
+    box = QMessageBox(parent)
+    box.setObjectName("autosave")
+    box.setIcon(QMessageBox.Icon.Question)
+    box.setWindowTitle("Unsaved edits")
+    box.setText("Wavecomb ended before the edits of this stage were saved.")
+    box.setInformativeText("Restore the edits?")
+    for text, role, act in (
+        ("Restore", QMessageBox.ButtonRole.AcceptRole, autosave.restore),
+        ("Discard", QMessageBox.ButtonRole.DestructiveRole, autosave.discard),
+    ):
+        button = QPushButton(text, box)
+        box.addButton(button, role)
+        button.setObjectName(f"autosave.{text.lower()}")
+        button.clicked.connect(act)
+    box.setModal(False)
+    return box

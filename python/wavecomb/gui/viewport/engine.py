@@ -219,10 +219,8 @@ class Engine:
             return None
         self._learn(time.perf_counter() - start, int(result.samples.sum()))
         done = {"samples_done": int(result.samples.sum()), "passes": 1, "preview": True}
-        frame = Frame(
-            result.beauty, layers_of_result(result), None, done, task.version, scale, False,
-            task.setup,
-        )  # fmt: skip
+        layers = layers_of_result(result)
+        frame = Frame(result.beauty, layers, None, done, task.version, scale, False, task.setup)
         self._listener.on_frame(frame)
         return frame
 
@@ -279,9 +277,7 @@ class Engine:
         }
         beauty = filled(result.beauty, result.samples, preview)
         layers = layers_of_result(result)
-        return Frame(
-            beauty, layers, None, status, task.version, 1, True, task.setup, picture
-        )  # fmt: skip
+        return Frame(beauty, layers, None, status, task.version, 1, True, task.setup, picture)
 
 
 def _apply(renderer: Renderer, edit: Edit) -> None:

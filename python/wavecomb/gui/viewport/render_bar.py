@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from PySide6.QtCore import QSize, Signal
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -31,13 +31,7 @@ _NAMES = {"max_depth": "depth"}
 
 
 class RenderBar(QToolBar):
-    """The controls of a render that are used most.
-
-    Signals:
-        fit_wanted(): The size of the viewport is wanted as the picture's.
-    """
-
-    fit_wanted = Signal()
+    """The controls of a render that are used most."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__("Render", parent)
