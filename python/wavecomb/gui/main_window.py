@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QByteArray, QSettings, QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtCore import QByteArray, QPointF, QSettings, QSize, Qt, QTimer
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QFileDialog,
@@ -34,12 +34,13 @@ from wavecomb.gui.viewport.render_bar import RenderBar
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.view_history import ViewHistory
 from wavecomb.gui.viewport.viewport import Viewport
+from wavecomb.gui.widgets import TakesFiles, ask_file
 
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 _STATE_VERSION = 1
 
 
-class MainWindow(QMainWindow):
+class MainWindow(TakesFiles, QMainWindow):
     """The window of `wavecomb view`.
 
     Args:
@@ -191,9 +192,7 @@ class MainWindow(QMainWindow):
         """Lets the user choose a file."""
         folder = str(self.session.path.parent) if self.session.path is not None else ""
         kinds = " ".join(f"*{ending}" for ending in ENDINGS)
-        path, _ = QFileDialog.getOpenFileName(self, "Open a stage", folder, f"USD ({kinds})")
-        if path:
-            self.open(path)
+        ask_file(self, "Open a stage", f"USD ({kinds})", self.open, start=folder)
 
     def reload(self) -> None:
         """Reads the stage from the disk again."""
@@ -220,21 +219,13 @@ class MainWindow(QMainWindow):
             if not what:
                 self.viewport.set_message()
 
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Takes files that are stages."""
-        if self._dropped(event):
-            event.acceptProposedAction()
+    def takes(self, path: str) -> bool:
+        """Whether a file is a stage."""
+        return path.lower().endswith(ENDINGS)
 
-    def dropEvent(self, event: QDropEvent) -> None:
-        """Opens the first of them."""
-        paths = self._dropped(event)
-        if paths:
-            event.acceptProposedAction()
-            self.open(paths[0])
-
-    def _dropped(self, event: QDropEvent) -> list[str]:
-        paths = [url.toLocalFile() for url in event.mimeData().urls()]
-        return [path for path in paths if path.lower().endswith(ENDINGS)]
+    def take_files(self, paths: list[str], at: QPointF) -> None:
+        """Opens the first of the stages that were dropped."""
+        self.open(paths[0])
 
     # ---- the picture -----------------------------------------------------------------------------
 

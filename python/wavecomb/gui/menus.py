@@ -119,11 +119,11 @@ def entries(window: Window) -> list[Entry]:
         view("right", 3),
         view("top", 7),
         Entry(
-            "view_back", "&Back from", window.views.back, ["Ctrl+Alt+Z"],
+            "view_back", "&Back from", window.views.stack.undo, ["Ctrl+Alt+Z"],
             "Where the camera was before; edits stay",
         ),
         Entry(
-            "view_forth", "For&ward to", window.views.forth, ["Ctrl+Alt+Shift+Z"],
+            "view_forth", "For&ward to", window.views.stack.redo, ["Ctrl+Alt+Shift+Z"],
             "Where the camera was before it went back",
         ),
         Entry("opposite", "From the other side", viewport.view_opposite, keypad(9), local=True),

@@ -6,9 +6,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QToolButton, QWidget
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QLabel,
+    QSlider,
+    QSpinBox,
+    QToolButton,
+    QWidget,
+)
 
 W = TypeVar("W", bound=QWidget)
 
@@ -21,7 +30,7 @@ def named(widget: W, name: str, title: str, tip: str) -> W:
     return widget
 
 
-def tool(name: str, text: str, tip: str, parent: QWidget) -> QToolButton:
+def tool(name: str, text: str, tip: str, parent: QWidget | None = None) -> QToolButton:
     """A small button."""
     button = named(QToolButton(parent), name, tip, tip)
     button.setText(text)
@@ -69,7 +78,66 @@ def caption(text: str, buddy: QWidget) -> QLabel:
     return label
 
 
-def set_quietly(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
+def ask_file(
+    parent: QWidget,
+    title: str,
+    kinds: str,
+    take: Callable[[str], object],
+    *,
+    start: str = "",
+    mode: QFileDialog.FileMode = QFileDialog.FileMode.ExistingFile,
+    ending: str = "",
+) -> None:
+    """Shows a dialog for the name of a file, and returns at once.
+
+    Args:
+        parent: The dialog belongs to it.
+        title: Of the dialog.
+        kinds: Filter, such as "USD (*.usda *.usdc)".
+        take: Called with the name that the user chose.
+        start: Folder or file to begin with.
+        mode: An existing file, or a folder.
+        ending: Of a file to be written, without the dot; "": the file is to be read.
+    """
+    dialog = QFileDialog(parent, title, start, kinds)
+    if ending:
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix(ending)
+    else:
+        dialog.setFileMode(mode)
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.fileSelected.connect(take)
+    dialog.open()
+
+
+class TakesFiles:
+    """Base of widgets that files can be dropped on."""
+
+    def takes(self, path: str) -> bool:
+        """Whether a file that is dragged is of a kind that is taken."""
+        return True
+
+    def take_files(self, paths: list[str], at: QPointF) -> None:
+        """Files were dropped at a point of the widget."""
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Accepts the drag of files that are taken."""
+        if self._taken(event):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Takes the files."""
+        paths = self._taken(event)
+        if paths:
+            event.acceptProposedAction()
+            self.take_files(paths, event.position())
+
+    def _taken(self, event: QDropEvent) -> list[str]:
+        paths = [url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile()]
+        return [path for path in paths if self.takes(path)]
+
+
+def set_quietly(box: QSpinBox | QDoubleSpinBox | QSlider, value: float) -> None:
     """Sets a value without telling anybody."""
     box.blockSignals(True)
     box.setValue(value)  # type: ignore[arg-type]

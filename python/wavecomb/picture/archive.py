@@ -9,10 +9,15 @@ import struct
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from wavecomb.errors import WavecombError
+from wavecomb.picture.files import check_regular, replacing
+from wavecomb.version import version
 
 MAX_HEADER = 1 << 24
 """Bytes of the text of an archive."""
@@ -50,6 +55,60 @@ def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
             tokenize.TokenError,
         ) as error:  # fmt: skip
             raise ArchiveError(f"{type(error).__name__}: {error}") from error
+
+
+def write_archive(
+    path: str | os.PathLike[str],
+    header: Mapping[str, Any],
+    arrays: Mapping[str, Any],
+    *,
+    durable: bool = False,
+) -> None:
+    """Writes what ``read_archive`` reads; the file is whole when it has its name.
+
+    Args:
+        path: The file.
+        header: Becomes JSON.
+        arrays: Numbers by name.
+        durable: The file is on the disk, not only in the system's memory, when it has its name.
+    """
+    parts = {name: np.asarray(value) for name, value in arrays.items()}
+    parts["header"] = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
+    with replacing(path, durable=durable) as part, part.open("wb") as file:
+        np.savez(file, **parts)  # type: ignore[arg-type]
+
+
+def read_kind(
+    path: str | os.PathLike[str], kind: str, of_format: int, option: str, advice: str
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Reads an archive of Wavecomb's own whose header gives its kind, format and version.
+
+    Args:
+        path: The file.
+        kind: Expected.
+        of_format: Expected.
+        option: Of `wavecomb render`, that writes such a file.
+        advice: What to do with a file of another format.
+
+    Raises:
+        ArchiveError: The file is damaged, or of another kind.
+        OSError: It cannot be opened.
+        WavecombError: It is of another format.
+    """
+    name = os.fspath(path)
+    if not Path(name).exists():
+        raise FileNotFoundError(f"{name}: no such file; a render with {option} makes one")
+    check_regular(name)
+    header, arrays = read_archive(name)
+    if not isinstance(header, dict) or header.get("kind") != kind:
+        raise ArchiveError("it is of another kind")
+    if header.get("format") != of_format:
+        raise WavecombError(
+            f"{name}: has format {header.get('format')} and was written by Wavecomb "
+            f"{header.get('version')}; this is Wavecomb {version()}, which reads format "
+            f"{of_format}: {advice}"
+        )
+    return header, arrays
 
 
 def _check_sizes(file: Any) -> None:

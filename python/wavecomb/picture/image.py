@@ -171,20 +171,8 @@ def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     Raises:
         OSError: The file cannot be read; one line that names it.
     """
-    import OpenImageIO as oiio
-
-    name = os.fspath(path)
-    source = _open(name)
-    try:
-        spec = source.spec()
-        _check_size(name, spec)
-        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.UINT8)
-        if pixels is None:
-            raise OSError(f"{name}: is damaged: {one_line(problem_of(source), name)}")
-        alpha = spec.alpha_channel
-    finally:
-        source.close()
-    codes = np.asarray(pixels, np.uint8).reshape(spec.height, spec.width, spec.nchannels)
+    codes, spec = _pixels(path, "uint8")
+    alpha = spec.alpha_channel
     colours = codes[:, :, :3] if codes.shape[2] >= 3 else np.repeat(codes[:, :, :1], 3, axis=2)
     if alpha < 0:
         return np.ascontiguousarray(colours)
@@ -254,24 +242,26 @@ def _check_size(name: str, spec: Any) -> None:
         )
 
 
-def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
-    import OpenImageIO as oiio
-
+def _pixels(path: str | os.PathLike[str], kind: str) -> tuple[NDArray[Any], Any]:
+    """Numbers of a NumPy type, (height, width, channels), and OpenImageIO's specification."""
     name = os.fspath(path)
     source = _open(name)
     try:
         spec = source.spec()
         _check_size(name, spec)
-        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+        pixels = source.read_image(0, 0, 0, spec.nchannels, "uint8" if kind == "uint8" else "float")
         if pixels is None:
             raise OSError(f"{name}: is damaged: {one_line(problem_of(source), name)}")
-        names = list(spec.channelnames)
-        encoded = spec.format.basetype not in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-        alpha = spec.alpha_channel
     finally:
         source.close()
-    image = np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, spec.nchannels)
-    if encoded:
-        colour = [k for k in range(spec.nchannels) if k != alpha]
+    return np.asarray(pixels, kind).reshape(spec.height, spec.width, spec.nchannels), spec
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[Array, list[str]]:
+    import OpenImageIO as oiio
+
+    image, spec = _pixels(path, "float32")
+    if spec.format.basetype not in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE):
+        colour = [k for k in range(spec.nchannels) if k != spec.alpha_channel]
         image[:, :, colour] = linear_from_srgb(image[:, :, colour])
-    return image, names
+    return image, list(spec.channelnames)

@@ -8,7 +8,6 @@ whatever happens there is a whole one; the archive's checksums find damage.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -20,8 +19,7 @@ import numpy as np
 
 from wavecomb.errors import WavecombError
 from wavecomb.options import settings as known_settings
-from wavecomb.picture.archive import ArchiveError, read_archive
-from wavecomb.picture.files import check_regular, replacing
+from wavecomb.picture.archive import ArchiveError, read_kind, write_archive
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.stats import plain
 from wavecomb.version import version
@@ -121,10 +119,7 @@ def save_checkpoint(
     path: str | os.PathLike[str], header: Mapping[str, Any], state: Mapping[str, Any]
 ) -> None:
     """Writes a file: on the disk and whole when it has its name."""
-    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in state.items()}
-    arrays["header"] = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
-    with replacing(path, durable=True) as part, part.open("wb") as file:
-        np.savez(file, **arrays)
+    write_archive(path, header, state, durable=True)
 
 
 def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
@@ -135,19 +130,9 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
         WavecombError: It is no checkpoint, damaged, or of another format.
     """
     name = os.fspath(path)
-    if not Path(name).exists():
-        raise FileNotFoundError(f"{name}: no such file; a render with --checkpoint makes one")
-    check_regular(name)
     try:
-        header, state = read_archive(name)
-        if not isinstance(header, dict) or header.get("kind") != _KIND:
-            raise ArchiveError("it is of another kind")
-        if header.get("format") != FORMAT:
-            raise WavecombError(
-                f"{name}: is a checkpoint of format {header.get('format')}, by Wavecomb "
-                f"{header.get('version')}; this is {version()}, which reads format {FORMAT}: "
-                "resume with that version, or start anew"
-            )
+        advice = "resume with that version, or start anew"
+        header, state = read_kind(name, _KIND, FORMAT, "--checkpoint", advice)
         _check_header(header)
         state["pass.target"] = _check_state(state)
     except ArchiveError as error:

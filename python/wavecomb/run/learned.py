@@ -7,14 +7,11 @@ materials; of one that is moved or lit otherwise it is a worse guess, and no pic
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from wavecomb.errors import WavecombError
-from wavecomb.picture.files import check_regular, replacing
 from wavecomb.version import version
 
 if TYPE_CHECKING:
@@ -74,13 +71,10 @@ def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
         )
     import numpy as np
 
-    header = json.dumps({"kind": _KIND, "format": _FORMAT, "version": version()})
-    arrays: dict[str, Any] = {
-        "header": np.frombuffer(header.encode("utf-8"), np.uint8),
-        "field": np.frombuffer(learned, np.uint8),
-    }
-    with replacing(path) as part, part.open("wb") as file:
-        np.savez(file, **arrays)
+    from wavecomb.picture.archive import write_archive
+
+    header = {"kind": _KIND, "format": _FORMAT, "version": version()}
+    write_archive(path, header, {"field": np.frombuffer(learned, np.uint8)})
 
 
 def load_learned(path: str | os.PathLike[str]) -> bytes:
@@ -92,22 +86,12 @@ def load_learned(path: str | os.PathLike[str]) -> bytes:
     """
     import numpy as np
 
-    from wavecomb.picture.archive import ArchiveError, read_archive
+    from wavecomb.picture.archive import ArchiveError, read_kind
 
     name = os.fspath(path)
-    if not Path(name).exists():
-        raise FileNotFoundError(f"{name}: no such file; a render with --learn-to makes one")
-    check_regular(name)
     try:
-        header, arrays = read_archive(name)
-        if not isinstance(header, dict) or header.get("kind") != _KIND:
-            raise ArchiveError("it is of another kind")
-        if header.get("format") != _FORMAT:
-            raise WavecombError(
-                f"{name}: is of format {header.get('format')}, by Wavecomb "
-                f"{header.get('version')}; this is {version()}, which reads format {_FORMAT}: "
-                "learn anew, by --learn-to"
-            )
+        advice = "learn anew, by --learn-to"
+        _, arrays = read_kind(name, _KIND, _FORMAT, "--learn-to", advice)
         field = arrays.get("field")
         if field is None or field.dtype != np.uint8 or field.ndim != 1:
             raise ArchiveError("it has no field")

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from wavecomb.scenes import materials as looks
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces, smooth_normals
+from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, merge, normalized
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.shapes import placed, turn_about, turned
 from wavecomb.scenes.stage import StageWriter
@@ -38,10 +38,8 @@ def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
     far = radius + 0.5 * thickness * np.cos(a)[:, None]
     up = np.broadcast_to(0.5 * height * (1.0 + np.sin(a))[:, None], (across + 1, around + 1))
     places = np.stack([far * np.cos(b), up, far * np.sin(b)], axis=2)
-    points = places.reshape(-1, 3).astype(np.float32)
-    faces = grid_faces(across + 1, around + 1)
     uv = np.stack(np.meshgrid(np.linspace(0, 1, around + 1), np.linspace(0, 1, across + 1)), axis=2)
-    return Mesh(points, faces, smooth_normals(points, faces), uv.reshape(-1, 2).astype(np.float32))
+    return grid_mesh(places, uv)
 
 
 def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
@@ -96,10 +94,8 @@ def land(cells: int) -> Mesh:
     far = np.clip(np.hypot(x, z) / (0.3 * _LAND) - 0.3, 0.0, 1.0)
     waves = 1.0 + np.sin(0.11 * x + 0.7) * np.cos(0.083 * z - 0.4)
     points = np.stack([x, 0.5 * _HILL * far * far * waves, z], axis=2)
-    points = points.reshape(-1, 3).astype(np.float32)
-    faces = grid_faces(cells + 1, cells + 1)
-    uv = (points[:, [0, 2]] / (2.0 * _LAND) + 0.5).astype(np.float32)
-    return Mesh(points, faces, smooth_normals(points, faces), uv)
+    points = points.astype(np.float32)
+    return grid_mesh(points, points[..., [0, 2]] / (2.0 * _LAND) + 0.5)
 
 
 def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
@@ -132,11 +128,8 @@ def water(level: int) -> Mesh:
         height += amplitude * np.sin(angle)
         slope_x += amplitude * kx * np.cos(angle)
         slope_z += amplitude * kz * np.cos(angle)
-    normals = np.stack([-slope_x, np.ones_like(x), -slope_z], axis=2).reshape(-1, 3)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    points = np.stack([x, height, z], axis=2).reshape(-1, 3).astype(np.float32)
-    uv = np.stack([x, z], axis=2).reshape(-1, 2).astype(np.float32)
-    return Mesh(points, grid_faces(rows, columns), normals.astype(np.float32), uv)
+    normals = normalized(np.stack([-slope_x, np.ones_like(x), -slope_z], axis=2))
+    return grid_mesh(np.stack([x, height, z], axis=2), np.stack([x, z], axis=2), normals)
 
 
 def _basin() -> tuple[FloatArray, list[list[int]]]:
@@ -185,14 +178,15 @@ def lens(level: int) -> Mesh:
     turn[-1] = 0.0
     radial = np.sin(angle)[:, None]
     axial = np.broadcast_to(np.cos(angle)[:, None], (rings + 1, columns + 1))
-    outward = np.stack([axial, radial * np.cos(turn), radial * np.sin(turn)], axis=2).reshape(-1, 3)
-    faces = grid_faces(rings + 1, columns + 1)
+    outward = np.stack([axial, radial * np.cos(turn), radial * np.sin(turn)], axis=2)
     cap = r * outward - np.array([centre, 0.0, 0.0])
     mirrored = np.array([-1.0, 1.0, 1.0])
-    corners = np.concatenate([cap, cap * mirrored]).astype(np.float32)
-    normals = np.concatenate([outward, outward * mirrored]).astype(np.float32)
-    both = np.concatenate([faces, faces[:, ::-1] + len(outward)])
-    return Mesh(corners, both, normals, corners[:, 1:].copy())
+    return merge(
+        [
+            grid_mesh(cap, cap[..., 1:], outward),
+            grid_mesh(cap * mirrored, cap[..., 1:], outward * mirrored, reverse=True),
+        ]
+    )
 
 
 def build_lens(writer: StageWriter, options: SceneOptions) -> None:

@@ -16,9 +16,10 @@ from pxr import Gf, Sdf, UsdGeom, Vt
 
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.candles import below_surface
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces, smooth_normals, without_flat_faces
+from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, normalized, without_flat_faces
 from wavecomb.scenes.network import Network
 from wavecomb.scenes.options import SceneOptions
+from wavecomb.scenes.relief import ramp
 from wavecomb.scenes.shapes import turned
 from wavecomb.scenes.stage import StageWriter
 
@@ -38,14 +39,9 @@ _BUMPS = (
 """Direction, width and height of what stands out or in."""
 
 
-def _smoothstep(low: float, high: float, x: FloatArray) -> FloatArray:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
-
-
 def head_radius(d: FloatArray) -> FloatArray:
     """(n,) From the middle to the surface in unit directions (n, 3)."""
-    jaw = _smoothstep(0.1, 1.0, -d[:, 1])
+    jaw = ramp(-d[:, 1], 0.1, 1.0)
     x, y, z = d[:, 0] / (_AXES[0] - 0.20 * jaw), d[:, 1] / _AXES[1], d[:, 2] / _AXES[2]
     radius = 1.0 / np.sqrt(x * x + y * y + z * z)
     for toward, width, height in _BUMPS:
@@ -56,8 +52,8 @@ def head_radius(d: FloatArray) -> FloatArray:
 
 def is_scalp(d: FloatArray, chance: FloatArray) -> NDArray[np.bool_]:
     """Where hair grows: above a line from the brow round to the neck, sparser along it."""
-    line = -0.50 + 1.08 * _smoothstep(-0.5, 0.75, d[:, 2])
-    return chance < _smoothstep(0.0, 0.12, d[:, 1] - line)
+    line = -0.50 + 1.08 * ramp(d[:, 2], -0.5, 0.75)
+    return chance < ramp(d[:, 1] - line, 0.0, 0.12)
 
 
 def head_mesh(level: int) -> Mesh:
@@ -72,24 +68,18 @@ def head_mesh(level: int) -> Mesh:
     d = np.stack(
         [across[:, None] * np.cos(turn), np.broadcast_to(np.sin(up)[:, None], shape),
          across[:, None] * np.sin(turn)], axis=2,
-    ).reshape(-1, 3)  # fmt: skip
-    points = (d * head_radius(d)[:, None]).astype(np.float32)
-    faces = grid_faces(*shape)
+    )  # fmt: skip
+    points = d * head_radius(d.reshape(-1, 3)).reshape(*shape, 1)
     uv = np.stack(np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, level + 1)), axis=2)
-    mesh = Mesh(points, faces, smooth_normals(points, faces), uv.reshape(-1, 2).astype(np.float32))
-    return without_flat_faces(mesh, 1e-9)
+    return without_flat_faces(grid_mesh(points, uv), 1e-9)
 
 
 _HAIR_POINTS, _FUR_POINTS = 9, 5
 _HAIR_WIDTH, _FUR_WIDTH = 0.0016, 0.008
 
 
-def _unit(v: FloatArray) -> FloatArray:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
-
-
 def _sphere(rng: np.random.Generator, count: int) -> FloatArray:
-    return _unit(rng.normal(size=(count, 3)))
+    return normalized(rng.normal(size=(count, 3)))
 
 
 def _waves(p: FloatArray, frequency: float, seed: float) -> FloatArray:
@@ -171,7 +161,7 @@ def fur_strands(rng: np.random.Generator, count: int) -> tuple[FloatArray, Float
     places = [p]
     for k in range(_FUR_POINTS - 1):
         bend = (k + 0.6) / _FUR_POINTS
-        p = p + step * _unit(d + 1.5 * bend * comb + frizz * (0.4 + bend))
+        p = p + step * normalized(d + 1.5 * bend * comb + frizz * (0.4 + bend))
         places.append(p)
     return np.stack(places, axis=1), d
 
@@ -247,8 +237,8 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
     for k in range(_HAIR_POINTS - 1):
         t = (k + 1.0) / (_HAIR_POINTS - 1)
         curl = 0.30 * t * np.sin(2.2 * math.pi * t + phase) * waves
-        heading = _unit(heading) + np.array([0.0, -0.8, 0.0]) + 0.3 * comb * (1.0 - t)
-        q = p + step * _unit(heading + curl + frizz)
+        heading = normalized(heading) + np.array([0.0, -0.8, 0.0]) + 0.3 * comb * (1.0 - t)
+        q = p + step * normalized(heading + curl + frizz)
         # Outside of the head, and not far from it; below, as wide as it is.
         out = np.linalg.norm(q, axis=1, keepdims=True)
         way = q / np.maximum(out, 1e-9)
@@ -258,7 +248,7 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
         wide = np.linalg.norm(q[:, ::2], axis=1, keepdims=True)
         q[:, ::2] *= np.minimum(1.0, 0.95 * lift / np.maximum(wide, 1e-9))
         heading = q - p
-        p = p + step * _unit(heading)
+        p = p + step * normalized(heading)
         places.append(p)
     return np.stack(places, axis=1)
 

@@ -52,61 +52,36 @@ def layers(options: SceneOptions, index: int) -> int:
     return min(int((LAYERS + 1) * share), LAYERS)
 
 
-def _paint(rng: np.random.Generator) -> Inputs:
-    return {"specular_weight": ("float", 0.5)}
+_KINDS: tuple[dict[str, float | tuple[float, float]], ...] = (
+    {"specular_weight": 0.5},
+    {"base_metalness": 1.0, "specular_roughness_anisotropy": 0.5},
+    {"coat_weight": 1.0, "coat_color": (0.7, 1.0), "coat_roughness": 0.05},
+    {"base_diffuse_roughness": 0.8, "fuzz_weight": 0.8, "fuzz_roughness": 0.4},
+    {"base_metalness": 1.0, "thin_film_weight": 1.0, "thin_film_thickness": (0.25, 0.7)},
+    {"transmission_weight": 0.7, "specular_ior": 1.45},
+    {
+        "base_metalness": 0.3,
+        "transmission_weight": 0.2,
+        "thin_film_weight": 0.5,
+        "thin_film_thickness": 0.4,
+        "coat_weight": 0.6,
+        "fuzz_weight": 0.3,
+    },
+)
+"""Inputs of OpenPBR surfaces, in turn after a UsdPreviewSurface that is diffuse alone: paint,
+metal, lacquer, cloth, thin film, glass, and all lobes. A pair is a range to draw from."""
 
 
-def _metal(rng: np.random.Generator) -> Inputs:
-    return {
-        "base_metalness": ("float", 1.0),
-        "specular_roughness_anisotropy": ("float", 0.5),
-    }
-
-
-def _lacquer(rng: np.random.Generator) -> Inputs:
-    return {
-        "coat_weight": ("float", 1.0),
-        "coat_color": ("color3", tuple(float(v) for v in rng.uniform(0.7, 1.0, 3))),
-        "coat_roughness": ("float", 0.05),
-    }
-
-
-def _cloth(rng: np.random.Generator) -> Inputs:
-    return {
-        "base_diffuse_roughness": ("float", 0.8),
-        "fuzz_weight": ("float", 0.8),
-        "fuzz_roughness": ("float", 0.4),
-    }
-
-
-def _film(rng: np.random.Generator) -> Inputs:
-    return {
-        "base_metalness": ("float", 1.0),
-        "thin_film_weight": ("float", 1.0),
-        "thin_film_thickness": ("float", float(rng.uniform(0.25, 0.7))),
-    }
-
-
-def _glass(rng: np.random.Generator) -> Inputs:
-    return {
-        "transmission_weight": ("float", 0.7),
-        "specular_ior": ("float", 1.45),
-    }
-
-
-def _everything(rng: np.random.Generator) -> Inputs:
-    return {
-        "base_metalness": ("float", 0.3),
-        "transmission_weight": ("float", 0.2),
-        "thin_film_weight": ("float", 0.5),
-        "thin_film_thickness": ("float", 0.4),
-        "coat_weight": ("float", 0.6),
-        "fuzz_weight": ("float", 0.3),
-    }
-
-
-_KINDS = (_paint, _metal, _lacquer, _cloth, _film, _glass, _everything)
-"""Inputs of OpenPBR surfaces, in turn after a UsdPreviewSurface that is diffuse alone."""
+def _inputs(kind: dict[str, float | tuple[float, float]], rng: np.random.Generator) -> Inputs:
+    made: Inputs = {}
+    for name, value in kind.items():
+        if not isinstance(value, tuple):
+            made[name] = ("float", value)
+        elif name.endswith("color"):
+            made[name] = ("color3", tuple(float(v) for v in rng.uniform(*value, 3)))
+        else:
+            made[name] = ("float", float(rng.uniform(*value)))
+    return made
 
 
 def _material(
@@ -124,7 +99,7 @@ def _material(
     net = Network(writer.stage, f"/World/Looks/{name}")
     colour = _layered(net, writer, maps, layers(options, index), rng)
     rough = net.node("image", "float", file=("filename", writer.texture_file(maps["r"])))
-    inputs = {"base_color": colour, "specular_roughness": rough, **kind(rng)}
+    inputs = {"base_color": colour, "specular_roughness": rough, **_inputs(kind, rng)}
     net.openpbr(**inputs)
     return writer.own_material(name, net.material)
 

@@ -117,6 +117,32 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
     return np.stack([lower, upper], axis=1).reshape(-1, 3).astype(np.int32)
 
 
+def grid_mesh(
+    points: FloatArray,
+    uv: FloatArray,
+    normals: FloatArray | None = None,
+    *,
+    reverse: bool = False,
+) -> Mesh:
+    """The mesh of a grid of vertices.
+
+    Args:
+        points: (rows, columns, 3).
+        uv: (rows, columns, 2).
+        normals: (rows, columns, 3); None: smooth ones of the faces.
+        reverse: The face normal is along (next column) x (next row).
+    """
+    faces = grid_faces(*points.shape[:2])
+    if reverse:
+        faces = np.ascontiguousarray(faces[:, ::-1])
+    places = points.reshape(-1, 3).astype(np.float32)
+    if normals is None:
+        turned = smooth_normals(places, faces)
+    else:
+        turned = normals.reshape(-1, 3).astype(np.float32)
+    return Mesh(places, faces, turned, uv.reshape(-1, 2).astype(np.float32))
+
+
 def without_flat_faces(mesh: Mesh, tolerance: float = 1e-14) -> Mesh:
     """Drops faces whose area is at most ``tolerance`` times the squared size, and unused points."""
     low, high = mesh.bounds

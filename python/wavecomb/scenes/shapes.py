@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from wavecomb.scenes.mesh import (
     FloatArray,
     Mesh,
-    grid_faces,
+    grid_mesh,
     merge,
+    normalized,
     smooth_normals,
     without_flat_faces,
 )
@@ -44,7 +46,7 @@ def placed(mesh: Mesh, offset: Vector = (0.0, 0.0, 0.0), turn: FloatArray | None
     matrix = np.eye(3) if turn is None else turn
     points = mesh.points.astype(np.float64) @ matrix.T + np.asarray(offset, float)
     normals = mesh.normals.astype(np.float64) @ matrix.T
-    return Mesh(points.astype(np.float32), mesh.faces, normals.astype(np.float32), mesh.uv)
+    return replace(mesh, points=points.astype(np.float32), normals=normals.astype(np.float32))
 
 
 def grounded(mesh: Mesh) -> Mesh:
@@ -95,7 +97,6 @@ def rounded_box(
     lean = np.concatenate([-rounding[::-1], np.zeros(cells - 1), rounding])
     end = np.ones(arc + 1)
     place = np.concatenate([-end, np.linspace(-1.0, 1.0, cells + 1)[1:-1], end])
-    faces = grid_faces(len(lean), len(lean))
     sides = []
     for axis in range(3):
         b, c = (axis + 1) % 3, (axis + 2) % 3
@@ -103,19 +104,12 @@ def rounded_box(
         for sign in (-1.0, 1.0):
             normals = np.empty((len(lean), len(lean), 3))
             normals[..., axis], normals[..., b], normals[..., c] = sign, lean[:, None], lean
-            normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+            normals = normalized(normals)
             points = np.empty_like(normals)
             points[..., axis], points[..., b], points[..., c] = sign, place[:, None], place
             points = points * (half - radius) + radius * normals
             uv = (points + 0.5 * (low + high))[..., [across, along]] + np.asarray(uv_offset, float)
-            sides.append(
-                Mesh(
-                    points.reshape(-1, 3).astype(np.float32),
-                    faces if sign > 0.0 else np.ascontiguousarray(faces[:, ::-1]),
-                    normals.reshape(-1, 3).astype(np.float32),
-                    uv.reshape(-1, 2).astype(np.float32),
-                )
-            )
+            sides.append(grid_mesh(points, uv, normals, reverse=sign < 0.0))
     box = merge(sides)
     points = box.points.astype(np.float64)
     if swell.any():
@@ -151,13 +145,10 @@ def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4)
     points = np.stack(
         [radius[:, None] * cosine, np.broadcast_to(height[:, None], shape), radius[:, None] * sine],
         axis=2,
-    ).reshape(-1, 3)
-    points = points.astype(np.float32)
+    )
     arc = _lengths(curve)[:, None]
-    uv = np.stack(np.broadcast_arrays(turn * radius.max(), arc), axis=2).reshape(-1, 2)
-    faces = grid_faces(*shape)
-    mesh = Mesh(points, faces, smooth_normals(points, faces), uv.astype(np.float32))
-    return without_flat_faces(mesh, 1e-9)
+    uv = np.stack(np.broadcast_arrays(turn * radius.max(), arc), axis=2)
+    return without_flat_faces(grid_mesh(points, uv), 1e-9)
 
 
 def disc(radius: float, height: float, columns: int) -> Mesh:
@@ -206,15 +197,11 @@ def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mes
     # The cloth is as long as the pillow's middle is: it is not stretched where it bends.
     middle = np.stack([flat[0][cells // 2], swell[cells // 2]], axis=1)
     upright = np.stack([flat[1][:, cells // 2], swell[:, cells // 2]], axis=1)
-    uv = np.stack(np.meshgrid(_lengths(middle), _lengths(upright)), axis=2).reshape(-1, 2)
+    uv = np.stack(np.meshgrid(_lengths(middle), _lengths(upright)), axis=2)
     sides = []
     for sign in (1.0, -1.0):
-        points = np.round(np.stack([*flat, sign * swell], 2), _WELD_DIGITS).reshape(-1, 3)
-        faces = grid_faces(cells + 1, cells + 1)
+        points = np.round(np.stack([*flat, sign * swell], 2), _WELD_DIGITS)
         # Rows run up and columns right: their product points away from +z.
-        faces = np.ascontiguousarray(faces[:, ::-1]) if sign > 0.0 else faces
-        flat_normals = np.zeros(points.shape, np.float32)
-        sides.append(Mesh(points.astype(np.float32), faces, flat_normals, uv.astype(np.float32)))
+        sides.append(grid_mesh(points, uv, np.zeros(points.shape), reverse=sign > 0.0))
     both = merge(sides)
-    normals = smooth_normals(both.points, both.faces)
-    return Mesh(both.points, both.faces, normals, both.uv)
+    return replace(both, normals=smooth_normals(both.points, both.faces))

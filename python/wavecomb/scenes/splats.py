@@ -17,7 +17,7 @@ from pxr import Gf, Vt
 
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.mesh import FloatArray, Mesh, face_areas
+from wavecomb.scenes.mesh import FloatArray, Mesh, face_areas, normalized
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.ply import ply_vertices
 from wavecomb.scenes.stage import StageWriter
@@ -161,10 +161,6 @@ _Y0, _Y1 = 0.5 / math.sqrt(math.pi), math.sqrt(0.75 / math.pi)
 _LAMP = np.array([-3.2, 6.0, 4.5])
 
 
-def _unit(v: FloatArray) -> FloatArray:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
-
-
 def places(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Points (n, 3) of a mesh, by area alike, and normals there."""
     areas = np.asarray(face_areas(mesh.points, mesh.faces), np.float64)
@@ -175,7 +171,7 @@ def places(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[FloatArray
     weights = np.stack([1.0 - a, a * (1.0 - b), a * b], axis=1)[:, :, None]
     corners = mesh.faces[face]
     points = (mesh.points[corners].astype(np.float64) * weights).sum(1)
-    return points, _unit((mesh.normals[corners].astype(np.float64) * weights).sum(1))
+    return points, normalized((mesh.normals[corners].astype(np.float64) * weights).sum(1))
 
 
 def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
@@ -185,7 +181,7 @@ def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
     )
     down = normals[:, 2] < -0.999999
     half[down] = (0.0, 1.0, 0.0, 0.0)
-    w, x, y, z = _unit(half).T
+    w, x, y, z = (half / np.linalg.norm(half, axis=1, keepdims=True)).T
     c, s = np.cos(0.5 * spin), np.sin(0.5 * spin)
     return np.stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s], axis=1)
 
@@ -197,11 +193,11 @@ def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -
     low, high = np.array([0.06, 0.30, 0.26]), np.array([0.85, 0.55, 0.16])
     paint = low + (high - low) * (bands * height**0.5)[:, None]
     paint *= rng.uniform(0.85, 1.15, (len(points), 1))
-    lit = np.maximum((normals * _unit(_LAMP - points)).sum(1), 0.0)
+    lit = np.maximum((normals * normalized(_LAMP - points)).sum(1), 0.0)
     sky = 0.22 + 0.16 * normals[:, 1]
     shine = paint * (0.62 * lit + 0.8 * sky)[:, None]
     # Brighter where it is looked at from above and the lamp's side: a linear function of direction.
-    half = _unit(_unit(_LAMP - points) + normals)
+    half = normalized(normalized(_LAMP - points) + normals)
     sheen = -0.18 * half * lit[:, None]
     out = np.empty((len(points), 4, 3))
     out[:, 0] = (shine - 0.5) / _Y0

@@ -12,7 +12,7 @@ from pxr import UsdGeom, Vt
 
 from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.mesh import Mesh, grid_faces, smooth_normals, without_flat_faces
+from wavecomb.scenes.mesh import Mesh, grid_mesh, without_flat_faces
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.patterns import Image
 from wavecomb.scenes.stage import StageWriter
@@ -118,13 +118,9 @@ def _stone(cells: tuple[int, int], rng: np.random.Generator) -> Mesh:
         waves = rng.normal(0.0, 1.7 * 1.8**octave, (3, 3))
         phase = rng.uniform(0.0, 2.0 * np.pi, 3)
         radius += 0.10 / 1.8**octave * np.sin(unit @ waves.T + phase).mean(axis=2)
-    points = (unit * radius[:, :, None] * [1.0, 0.8, 1.0]).reshape(-1, 3)
-    points[:, 1] -= points[:, 1].min()
-    positions = points.astype(np.float32)
-    faces = np.ascontiguousarray(grid_faces(rows + 1, columns + 1)[:, ::-1])
-    normals = smooth_normals(positions, faces)
-    uv = np.zeros((len(positions), 2), np.float32)
-    return without_flat_faces(Mesh(positions, faces, normals, uv))
+    points = unit * radius[:, :, None] * [1.0, 0.8, 1.0]
+    points[..., 1] -= points[..., 1].min()
+    return without_flat_faces(grid_mesh(points, np.zeros((*radius.shape, 2)), reverse=True))
 
 
 def _atlas(triangles: int, edge: int, rng: np.random.Generator) -> NDArray[np.float32]:

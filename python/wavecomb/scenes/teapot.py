@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from wavecomb.scenes.errors import SceneError
-from wavecomb.scenes.mesh import FloatArray, Mesh, grid_faces, merge, normalized, without_flat_faces
+from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, merge, normalized, without_flat_faces
 
 _CIRCLE = 0.56
 """Newell's rounded Bezier constant of a quarter circle (exact would be 0.5523)."""
@@ -153,7 +153,6 @@ def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> 
     steps = patches[::turns, :, 0]
     column = np.concatenate([steps[0], *[s[1:] for s in steps[1:]]])
     lengths = _arc_lengths(column) / _TEXTURE_LENGTH
-    faces = grid_faces(level + 1, level + 1)
     meshes = []
     for index, patch in enumerate(patches):
         row, turn = divmod(index, turns)
@@ -165,14 +164,7 @@ def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> 
         u = (turn + t) / turns * repeats
         v = lengths[row] + t * (lengths[row + 1] - lengths[row])
         uv = np.stack(np.meshgrid(u, -v, indexing="xy"), axis=2)
-        meshes.append(
-            Mesh(
-                points.reshape(-1, 3).astype(np.float32),
-                faces,
-                normalized(normals).reshape(-1, 3).astype(np.float32),
-                uv.reshape(-1, 2).astype(np.float32),
-            )
-        )
+        meshes.append(grid_mesh(points, uv, normalized(normals)))
     return merge(meshes)
 
 

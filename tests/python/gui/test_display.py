@@ -8,7 +8,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.swatch import to_qimage
 from wavecomb.gui.viewport import display, ocio
 from wavecomb.gui.viewport.display import Look
-from wavecomb.picture import image
+from wavecomb.picture import image, layer_view
 
 
 @pytest.fixture
@@ -64,18 +64,18 @@ def test_ocio_of_the_environment(monkeypatch, tmp_path):
 def test_heat_runs_from_dark_to_light_and_marks_what_is_not_finite():
     values = np.arange(12.0).reshape(3, 4)
     values[2, 3] = np.inf
-    shown = display.heat(values, "samples")
+    shown = layer_view.heat(values, "samples")
     lightness = shown.pixels.reshape(-1, 3).astype(int).sum(axis=1)[:11]
     assert (np.diff(lightness) > 0).all()
-    assert tuple(shown.pixels[2, 3]) == display.NOT_FINITE
+    assert tuple(shown.pixels[2, 3]) == layer_view.NOT_FINITE
     assert (shown.legend.low, shown.legend.high) == (0.0, 10.0)
     assert [label for _, label in shown.legend.ticks(3)] == ["0", "5", "10"]
 
 
 def test_logarithmic_heat_has_equal_steps_for_equal_ratios():
     values = np.array([[1.0, 10.0, 100.0, 1000.0, 0.0]])
-    shown = display.heat(values, "cost", 1.0, 1000.0)
-    ramp = display.ramp(256)
+    shown = layer_view.heat(values, "cost", 1.0, 1000.0)
+    ramp = layer_view.ramp(256)
     assert tuple(shown.pixels[0, 0]) == tuple(ramp[0]) == tuple(shown.pixels[0, 4])
     assert tuple(shown.pixels[0, 3]) == tuple(ramp[255])
     assert tuple(shown.pixels[0, 1]) == tuple(ramp[85])
@@ -84,8 +84,8 @@ def test_logarithmic_heat_has_equal_steps_for_equal_ratios():
 
 
 def test_heat_of_one_value_and_of_nothing():
-    assert display.heat(np.full((2, 2), 3.0), "samples").pixels.shape == (2, 2, 3)
-    assert display.heat(np.full((2, 2), np.nan), "error").pixels[0, 0, 1] == 255
+    assert layer_view.heat(np.full((2, 2), 3.0), "samples").pixels.shape == (2, 2, 3)
+    assert layer_view.heat(np.full((2, 2), np.nan), "error").pixels[0, 0, 1] == 255
 
 
 def test_layers_that_are_no_light_ignore_exposure():

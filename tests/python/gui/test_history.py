@@ -235,7 +235,7 @@ def test_another_stage_has_another_way(session, qtbot, stage_path):
     pose = session.pose
     session.use_camera(None)
     assert views.stack.count() == 1
-    views.back()
+    views.stack.undo()
     assert session.pose is pose
     with qtbot.waitSignal(session.opened, timeout=20000):
         session.open(stage_path)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -19,13 +18,12 @@ from PySide6.QtWidgets import (
     QListWidget,
     QListWidgetItem,
     QSpinBox,
-    QToolButton,
     QWidget,
 )
 
 from wavecomb.errors import WavecombError
 from wavecomb.gui import theme
-from wavecomb.gui.widgets import named, set_quietly
+from wavecomb.gui.widgets import ask_file, named, set_quietly, tool
 from wavecomb.gui.worker import Worker
 from wavecomb.run.progress import time_text
 
@@ -183,8 +181,7 @@ class SuiteChoice(QWidget):
     def _with_button(
         field: QWidget, name: str, tip: str, call: Callable[[], object]
     ) -> QHBoxLayout:
-        button = named(QToolButton(), name, tip, tip)
-        button.setText("...")
+        button = tool(name, "...", tip)
         button.clicked.connect(call)
         row = QHBoxLayout()
         row.addWidget(field, 1)
@@ -282,28 +279,15 @@ class SuiteChoice(QWidget):
             )
         self.changed.emit()
 
-    def _ask(
-        self, mode: QFileDialog.FileMode, title: str, filters: str, take: Callable[[str], object]
-    ) -> None:
-        dialog = QFileDialog(self, title, "", filters)
-        dialog.setFileMode(mode)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(take)
-        dialog.open()
-
     def _ask_suite(self) -> None:
-        mode = QFileDialog.FileMode.ExistingFile
-        self._ask(mode, "Suite", "Suites (*.toml)", self._choose_suite)
+        ask_file(self, "Suite", "Suites (*.toml)", self._choose_suite)
 
     def _choose_suite(self, suite: str) -> None:
         if suite in self._infos:
             self.suite.setCurrentIndex(self.suite.findData(suite))
         else:
-            self._reader.submit(partial(_one_suite, suite), suite)
+            self._reader.submit(lambda: [suite_info(suite)], suite)
 
     def _ask_folder(self) -> None:
-        self._ask(QFileDialog.FileMode.Directory, "Folder for results", "", self.folder.setText)
-
-
-def _one_suite(suite: str) -> list[SuiteInfo]:
-    return [suite_info(suite)]
+        folder = QFileDialog.FileMode.Directory
+        ask_file(self, "Folder for results", "", self.folder.setText, mode=folder)

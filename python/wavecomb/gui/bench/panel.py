@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QSize, Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices, QDragEnterEvent, QDropEvent
+from PySide6.QtCore import QPointF, QSize, Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.bench.choice import SuiteChoice
 from wavecomb.gui.command import Command
-from wavecomb.gui.widgets import named, set_text_colour
+from wavecomb.gui.widgets import TakesFiles, named, set_text_colour
 from wavecomb.run.progress import time_text
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ _PREPARES = {
 }
 
 
-class BenchPanel(QWidget):
+class BenchPanel(TakesFiles, QWidget):
     """Choice of suite, buttons, progress and log.
 
     The viewport pauses while a suite runs, since its renders would disturb the measurement.
@@ -183,17 +183,9 @@ class BenchPanel(QWidget):
         self.suite.shutdown()
         self.helper.shutdown()
 
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accepts folders."""
-        if event.mimeData().hasUrls():
-            event.acceptProposedAction()
-
-    def dropEvent(self, event: QDropEvent) -> None:
-        """Opens the report of a dropped results folder."""
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        if paths:
-            event.acceptProposedAction()
-            self.open_report(paths[0])
+    def take_files(self, paths: list[str], at: QPointF) -> None:
+        """Opens the report of a results folder that was dropped."""
+        self.open_report(Path(paths[0]))
 
     # ---- messages of the processes -------------------------------------------------------------
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QMenu,
@@ -23,13 +22,13 @@ from wavecomb.gui import theme
 from wavecomb.gui.compare.live_pair import LiveSettings
 from wavecomb.gui.compare.picture_sides import SUFFIXES
 from wavecomb.gui.compare.source import LIVE, SideSource
-from wavecomb.gui.widgets import set_text_colour, tool
+from wavecomb.gui.widgets import TakesFiles, ask_file, set_text_colour, tool
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
 
 
-class SidePicker(QWidget):
+class SidePicker(TakesFiles, QWidget):
     """Name and source of A or B.
 
     Signals:
@@ -104,11 +103,10 @@ class SidePicker(QWidget):
     def ask(self) -> None:
         """A dialog for a file; it blocks nothing else."""
         patterns = " ".join(f"*{suffix}" for suffix in SUFFIXES)
-        dialog = QFileDialog(self, f"Picture {self.source.name}", "", f"Pictures ({patterns})")
-        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(lambda path: self.source.open(Path(path)))
-        dialog.open()
+        ask_file(
+            self, f"Picture {self.source.name}", f"Pictures ({patterns})",
+            lambda path: self.source.open(Path(path)),
+        )  # fmt: skip
 
     def render_other(self) -> None:
         """A render of its own, at first with the viewport's settings."""
@@ -127,14 +125,6 @@ class SidePicker(QWidget):
         self._live.setVisible(source.live is not None)
         self._live.show_setup()
 
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Files are welcome."""
-        if event.mimeData().hasUrls():
-            event.acceptProposedAction()
-
-    def dropEvent(self, event: QDropEvent) -> None:
-        """Takes them."""
-        paths = [url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile()]
-        if paths:
-            event.acceptProposedAction()
-            self.dropped.emit(paths)
+    def take_files(self, paths: list[str], at: QPointF) -> None:
+        """Files were dropped on the bar."""
+        self.dropped.emit(paths)

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from wavecomb.gui import theme
 from wavecomb.gui.compare.layout import DIFFERENCE, THREE, WIPE, A, B, D, Layout
 from wavecomb.gui.compare.paint import paint_bar, paint_label
+from wavecomb.gui.widgets import TakesFiles
 from wavecomb.picture.heatmap import Scale
 
 ZOOM_STEP = 1.25
@@ -25,7 +26,7 @@ _PAN_STEP = 0.1
 """Share of what is seen that an arrow key moves it by."""
 
 
-class CompareView(QWidget):
+class CompareView(TakesFiles, QWidget):
     """Draws; knows nothing of where pictures are from.
 
     Signals:
@@ -310,16 +311,6 @@ class CompareView(QWidget):
 
     focusOutEvent = focusInEvent
 
-    def dragEnterEvent(self, event: object) -> None:
-        """Files are welcome."""
-        if event.mimeData().hasUrls():  # type: ignore[attr-defined]
-            event.acceptProposedAction()  # type: ignore[attr-defined]
-
-    def dropEvent(self, event: object) -> None:
-        """On the left half: A."""
-        urls = event.mimeData().urls()  # type: ignore[attr-defined]
-        paths = [url.toLocalFile() for url in urls if url.isLocalFile()]
-        which = A if event.position().x() < self.width() / 2 else B  # type: ignore[attr-defined]
-        if paths:
-            event.acceptProposedAction()  # type: ignore[attr-defined]
-            self.dropped.emit(which, paths)
+    def take_files(self, paths: list[str], at: QPointF) -> None:
+        """Files that are dropped on the left half become A, others B."""
+        self.dropped.emit(A if at.x() < self.width() / 2 else B, paths)

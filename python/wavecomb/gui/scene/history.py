@@ -67,7 +67,6 @@ class History(QObject):
 
     Signals:
         step(Step): Is to be made now: a new one, one that is done again, or the inverse of one.
-        changed(): There is another step to undo or to redo.
 
     Attributes:
         stack: Qt's; it is clean where the edits are as they were saved.
@@ -75,7 +74,6 @@ class History(QObject):
     """
 
     step = Signal(object)
-    changed = Signal()
 
     def __init__(
         self, parent: QObject | None = None, now: Callable[[], float] = clock.monotonic
@@ -85,10 +83,6 @@ class History(QObject):
         self.now = now
         self._stretch = 0
         self._typing = False
-        self.stack.indexChanged.connect(self._tell)
-
-    def _tell(self, index: int) -> None:
-        self.changed.emit()
 
     def push(self, step: Step) -> None:
         """Makes a step; it is part of the one before where both are one drag."""

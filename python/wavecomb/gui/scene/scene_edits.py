@@ -92,10 +92,6 @@ class SceneEdits(QObject, RenderSync):
         """What could be undone; "": nothing."""
         return self.history.stack.undoText()
 
-    def can_redo(self) -> str:
-        """What could be done again; "": nothing."""
-        return self.history.stack.redoText()
-
     def lines(self) -> list[str]:
         """All edits, one line each."""
         return self.stage_edits.lines()

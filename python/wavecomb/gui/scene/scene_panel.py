@@ -7,10 +7,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pxr import Sdf, UsdShade
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QTabWidget,
@@ -19,11 +18,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from wavecomb.gui.actions import HistoryActions
 from wavecomb.gui.scene.list_and_form import LightsPanel, MaterialsPanel
 from wavecomb.gui.scene.notes_panel import NotesPanel
 from wavecomb.gui.scene.scene_edits import SceneEdits
 from wavecomb.gui.scene.scene_tree import SceneTree
 from wavecomb.gui.scene.variants import VariantBar
+from wavecomb.gui.widgets import ask_file
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
@@ -82,12 +83,11 @@ class ScenePanel(QWidget):
         layout.addLayout(bottom)
         self.tree.view.frame_wanted.connect(self.frame_wanted)
         self.edits.changed.connect(self._on_changed)
-        self.edits.history.changed.connect(self._on_history)
+        HistoryActions(self.edits.history.stack, self.undo_action, self.redo_action, self)
         session.selected.connect(self._on_selected)
         session.opened.connect(self._on_opened)
         session.noted.connect(lambda stage: self._count_notes())
         self._on_changed()
-        self._on_history()
         self._count_notes()
 
     def shutdown(self) -> None:
@@ -103,6 +103,7 @@ class ScenePanel(QWidget):
 
     def _action(self, name: str, call: Callable[[], None]) -> QAction:
         action = QAction(name, self)
+        action.setIconText(name)  # what the button says; the text names the edit, too
         action.setObjectName(name.rstrip("\u2026").lower().replace(" ", "-"))
         action.triggered.connect(lambda checked=False: call())
         return action
@@ -115,20 +116,8 @@ class ScenePanel(QWidget):
         start = ""
         if stage is not None:
             start = str(stage.stage_path.with_name(f"{stage.stage_path.stem}_edits.usda"))
-        dialog = QFileDialog(self, "Save edits as layer", start, "USD text (*.usda)")
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix("usda")
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self.edits.save)
-        dialog.open()
-
-    def _on_history(self) -> None:
-        for action, name, what in (
-            (self.undo_action, "Undo", self.edits.can_undo()),
-            (self.redo_action, "Redo", self.edits.can_redo()),
-        ):
-            action.setEnabled(bool(what))
-            action.setToolTip(f"{name} {what}".strip())
+        kinds, save = "USD text (*.usda)", self.edits.save
+        ask_file(self, "Save edits as layer", kinds, save, start=start, ending="usda")
 
     def _on_changed(self) -> None:
         lines = self.edits.lines()

@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
-    QFileDialog,
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
@@ -31,6 +30,7 @@ from wavecomb.gui.scheduling.setting_controls import ChoiceBox, number_box, show
 from wavecomb.gui.scheduling.work_group import WorkGroup
 from wavecomb.gui.viewport.picture_light import PictureLight
 from wavecomb.gui.viewport.session import Session, Setup
+from wavecomb.gui.widgets import ask_file
 from wavecomb.run.faults import describe
 
 _POLICY_FILTER = "Python (*.py);;All files (*)"
@@ -216,9 +216,7 @@ class SchedulingPanel(QScrollArea):
 
     def _ask_policy(self) -> None:
         start = self._policy_file or ""
-        name, _ = QFileDialog.getOpenFileName(self, "Load a policy", start, _POLICY_FILTER)
-        if name:
-            self.load_policy(name)
+        ask_file(self, "Load a policy", _POLICY_FILTER, self.load_policy, start=start)
 
     def load_policy(self, path: str) -> None:
         """Offers the policies of a Python file and chooses the first; errors become messages."""
@@ -243,9 +241,7 @@ class SchedulingPanel(QScrollArea):
             self.load_policy(self._policy_file)
 
     def _ask_profile(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Load costs", "", _PROFILE_FILTER)
-        if name:
-            self.load_profile(name)
+        ask_file(self, "Load costs", _PROFILE_FILTER, self.load_profile)
 
     def load_profile(self, path: str) -> None:
         """Starts renders from the costs in a file; errors become messages."""

@@ -7,7 +7,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QFileDialog,
     QHBoxLayout,
     QHeaderView,
     QLabel,
@@ -25,6 +24,7 @@ from wavecomb.gui.scheduling.run_rates import MIN_REPEATS, MIN_SECONDS
 from wavecomb.gui.scheduling.run_table import COLUMNS, LEFT, TIPS, Row, as_csv, as_text, rows
 from wavecomb.gui.table_model import Table
 from wavecomb.gui.viewport.session import Session
+from wavecomb.gui.widgets import ask_file
 from wavecomb.picture.files import reason, replacing
 
 NOTE = (
@@ -166,9 +166,7 @@ class RunsTab(QWidget):
         QGuiApplication.clipboard().setText(as_text(self._rows))
 
     def _ask_save(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Save runs", "runs.csv", "CSV (*.csv)")
-        if name:
-            self.save(name)
+        ask_file(self, "Save runs", "CSV (*.csv)", self.save, start="runs.csv", ending="csv")
 
     def save(self, path: str) -> None:
         """Writes the runs as CSV, whole or not at all; errors become messages."""

@@ -13,36 +13,7 @@ from numpy.typing import NDArray
 from wavecomb.gui.viewport import ocio
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.picture import image
-from wavecomb.picture.layer_view import (
-    NOT_FINITE,
-    RADIANCE,
-    SCALARS,
-    Legend,
-    Shown,
-    heat,
-    id_colours,
-    is_light,
-    ramp,
-    show_layer,
-)
-
-__all__ = [
-    "LINEAR",
-    "NEUTRAL",
-    "NOT_FINITE",
-    "RADIANCE",
-    "SCALARS",
-    "Legend",
-    "Look",
-    "Shown",
-    "develop",
-    "heat",
-    "id_colours",
-    "is_light",
-    "ramp",
-    "show",
-    "views",
-]
+from wavecomb.picture.layer_view import Shown, show_layer
 
 LINEAR, NEUTRAL = "Linear", "Neutral"
 _NAN = (255, 0, 255)

@@ -26,6 +26,7 @@ from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session, Setup
 from wavecomb.gui.viewport.viewport import Viewport
 from wavecomb.gui.widgets import caption, choice, named, real, set_quietly
+from wavecomb.picture.layer_view import SCALARS, is_light
 from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 
@@ -228,9 +229,7 @@ class DisplayBar(QToolBar):
         """In stops."""
         stops = min(max(stops, -EXPOSURE), EXPOSURE)
         set_quietly(self.exposure, stops)
-        self.slider.blockSignals(True)
-        self.slider.setValue(round(stops * 20))
-        self.slider.blockSignals(False)
+        set_quietly(self.slider, round(stops * 20))
         self._apply(exposure=stops)
 
     def set_view(self, name: str) -> None:
@@ -255,8 +254,8 @@ class DisplayBar(QToolBar):
         self._update_range()
 
     def _update_range(self) -> None:
-        light = display.is_light(self._viewport.look.layer)
-        coloured = self._viewport.look.layer in display.SCALARS
+        light = is_light(self._viewport.look.layer)
+        coloured = self._viewport.look.layer in SCALARS
         for widget in (self._stops, self.exposure, self.slider, self.view):
             self._places[widget].setVisible(light)
         self._places[self.automatic].setVisible(coloured)

@@ -7,7 +7,7 @@ from PySide6.QtCore import QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter
 
 from wavecomb.gui.swatch import to_qimage
-from wavecomb.gui.viewport.display import Legend, ramp
+from wavecomb.picture.layer_view import Legend, ramp
 
 _BEHIND = QColor(0, 0, 0, 190)
 _TEXT = QColor(240, 240, 240)

@@ -7,8 +7,8 @@ from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from wavecomb.gui import theme
@@ -22,6 +22,7 @@ from wavecomb.gui.compare.same_picture import (
 )
 from wavecomb.gui.scheduling.choices import scheduling_of
 from wavecomb.gui.viewport.session import Frame, Session
+from wavecomb.gui.widgets import set_text_colour
 from wavecomb.gui.worker import Errands
 
 WAITING = "Waits until each pixel has the samples asked for"
@@ -42,7 +43,7 @@ class PictureLight(QWidget):
         self.book = PictureBook()
         self.verdict = Verdict("none", "No picture yet")
         self._last: Any = None
-        self._dot = _Dot()
+        self._dot = QLabel()
         self._text = QLabel()
         self._text.setWordWrap(True)
         self._text.setObjectName("same_picture_text")
@@ -117,7 +118,8 @@ class PictureLight(QWidget):
             "same": QColor("#2ea36a"),
             "different": theme.error(),
         }.get(kind, theme.dim())
-        self._dot.show_colour(colour, kind in ("same", "different"))
+        set_text_colour(self._dot, colour)
+        self._dot.setText("\u25cf" if kind in ("same", "different") else "\u25cb")
         more = f" ({self.book.checked} checked)" if kind == "same" else ""
         self._text.setText(self.verdict.text + more)
         self.setAccessibleDescription(self._text.text())
@@ -125,28 +127,3 @@ class PictureLight(QWidget):
 
 def _mark(beauty: NDArray[Any], samples: NDArray[Any]) -> str:
     return fingerprint(beauty) + fingerprint(samples)
-
-
-class _Dot(QWidget):
-    def __init__(self) -> None:
-        super().__init__()
-        self._colour, self._filled = QColor(), False
-
-    def show_colour(self, colour: QColor, filled: bool) -> None:
-        self._colour, self._filled = colour, filled
-        self.update()
-
-    def sizeHint(self) -> QSize:
-        return QSize(theme.em(), theme.em())
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        pen = painter.pen()
-        pen.setColor(self._colour)
-        pen.setWidthF(theme.em() / 10)
-        painter.setPen(pen)
-        if self._filled:
-            painter.setBrush(self._colour)
-        radius = 0.33 * theme.em()
-        painter.drawEllipse(QPointF(theme.em() / 2, theme.em() / 2), radius, radius)

@@ -8,8 +8,8 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QResizeEv
 from PySide6.QtWidgets import QWidget
 
 from wavecomb.gui import theme
-from wavecomb.gui.viewport.display import Legend
 from wavecomb.gui.viewport.legend import paint_legend
+from wavecomb.picture.layer_view import Legend
 
 LEAST_ZOOM, MOST_ZOOM = 1 / 16, 64.0
 GRID_ZOOM = 10.0

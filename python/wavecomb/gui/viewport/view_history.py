@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import time as clock
 import weakref
-from collections.abc import Callable
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from wavecomb.gui.viewport.navigate import Pose
@@ -59,39 +58,20 @@ class MoveCommand(QUndoCommand):
 class ViewHistory(QObject):
     """Poses of a session's camera.
 
-    Signals:
-        changed(): There is another way back or forth.
-
     Attributes:
-        stack: Qt's.
+        stack: Its steps; undo moves the camera back.
         now: The clock, for telling drags from single movements.
     """
 
-    changed = Signal()
-
-    def __init__(
-        self,
-        session: Session,
-        parent: QObject | None = None,
-        now: Callable[[], float] = clock.monotonic,
-    ) -> None:
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.stack = QUndoStack(self)
-        self.now = now
+        self.now = clock.monotonic
         self._session = session
         self._pose = session.pose
         self._usd: object = session.usd
-        self.stack.indexChanged.connect(self._tell)
         session.opened.connect(self._on_opened)
         session.camera_changed.connect(self._on_moved)
-
-    def back(self) -> None:
-        """Where the camera was before."""
-        self.stack.undo()
-
-    def forth(self) -> None:
-        """Where it was before it went back."""
-        self.stack.redo()
 
     def go(self, pose: Pose) -> None:
         """Moves the camera without a step of its own."""
@@ -109,6 +89,3 @@ class ViewHistory(QObject):
         if pose is None or before is None or pose is before:
             return
         self.stack.push(MoveCommand(before, pose, self, self.now()))
-
-    def _tell(self, index: int) -> None:
-        self.changed.emit()
