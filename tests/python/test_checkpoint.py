@@ -258,7 +258,7 @@ def test_damaged_files_are_refused(cornell: Any, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no such file"):
         load_checkpoint(tmp_path / "none.ckpt")
     save_checkpoint(file, {**checkpoint.header, "format": 99}, checkpoint.state)
-    with pytest.raises(WavecombError, match="format 99, by Wavecomb"):
+    with pytest.raises(WavecombError, match="format 99 and was written by Wavecomb"):
         load_checkpoint(file)
 
 

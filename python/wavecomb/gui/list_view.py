@@ -46,6 +46,17 @@ class RowDelegate(QStyledItemDelegate):
             option.palette = palette
 
 
+def show_rows(view: QTableView, name: str, title: str, tip: str) -> None:
+    """A list without a grid of which whole rows are chosen."""
+    named(view, name, title, tip)
+    view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    view.setTabKeyNavigation(False)
+    view.setShowGrid(False)
+    view.setAlternatingRowColors(True)
+    view.verticalHeader().hide()
+    view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
+
+
 def lay_out_rows(
     view: QTableView,
     name: str,
@@ -65,25 +76,17 @@ def lay_out_rows(
         stretch: Column that takes what room is left.
         widths: Of the others, in font heights.
     """
-    named(view, name, title, tip)
+    show_rows(view, name, title, tip)
     view.setItemDelegate(RowDelegate(view))
-    view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-    view.setTabKeyNavigation(False)
-    view.setShowGrid(False)
-    view.setAlternatingRowColors(True)
-    view.verticalHeader().hide()
-    view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
     header = view.horizontalHeader()
     header.setSectionResizeMode(stretch, QHeaderView.ResizeMode.Stretch)
     for column, wide in widths.items():
         header.resizeSection(column, theme.em(wide))
 
 
-def compact(view: QTableView) -> None:
+def compact(view: QTableView, name: str, title: str, tip: str) -> None:
     """Rows of one line; long texts are cut in the middle, where paths say least."""
+    show_rows(view, name, title, tip)
     view.setWordWrap(False)
     view.setTextElideMode(Qt.TextElideMode.ElideMiddle)
-    view.verticalHeader().hide()
-    view.verticalHeader().setDefaultSectionSize(round(1.5 * view.fontMetrics().height()))
-    view.setShowGrid(False)

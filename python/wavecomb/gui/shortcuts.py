@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QHeaderView,
-    QLineEdit,
     QMessageBox,
     QTableWidget,
     QTableWidgetItem,
@@ -21,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from wavecomb.gui import theme
 from wavecomb.gui.actions import TITLE
-from wavecomb.gui.widgets import named
+from wavecomb.gui.widgets import named, search_field
 
 MOUSE = (
     ("Orbit about what is under the cursor", "Middle drag, Alt+Left drag"),
@@ -61,9 +60,9 @@ class ShortcutsDialog(QDialog):
         self.setObjectName("shortcuts")
         self.setWindowTitle("Keyboard shortcuts")
         self._rows = listed(window)
-        self.search = named(QLineEdit(), "shortcuts.search", "Search", "Show only rows with this")
-        self.search.setPlaceholderText("Search")
-        self.search.setClearButtonEnabled(True)
+        self.search = search_field(
+            "shortcuts.search", "Search", "Shows the rows that contain this text", "Search"
+        )
         self.search.textChanged.connect(self._filter)
         self.table = named(QTableWidget(len(self._rows), 2), "shortcuts.table", "Shortcuts", "")
         self.table.setHorizontalHeaderLabels(["What", "Keys"])

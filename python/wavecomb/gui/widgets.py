@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
     QLabel,
+    QLineEdit,
     QSlider,
     QSpinBox,
     QToolButton,
@@ -68,6 +69,14 @@ def choice(
     box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
     box.textActivated.connect(chosen)
     return box
+
+
+def search_field(name: str, title: str, tip: str, hint: str) -> QLineEdit:
+    """A line to type what is looked for; ``hint`` stands in it while it is empty."""
+    field = named(QLineEdit(), name, title, tip)
+    field.setPlaceholderText(hint)
+    field.setClearButtonEnabled(True)
+    return field
 
 
 def caption(text: str, buddy: QWidget) -> QLabel:

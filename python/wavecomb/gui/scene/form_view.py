@@ -26,6 +26,7 @@ from wavecomb.gui.scene.value_fields import (
     PlainText,
     SwitchField,
 )
+from wavecomb.gui.widgets import named
 
 LABEL_EM = 6.2
 """Width of the names, the same in all groups."""
@@ -152,10 +153,12 @@ class Group(QWidget):
     def __init__(self, title: str, rows: Rows, *, opened: bool) -> None:
         super().__init__()
         self.title = title
-        self.head = QToolButton()
-        self.head.setObjectName(f"group-{title.lower().replace(' ', '-')}")
-        self.head.setAccessibleName(f"{title}, inputs")
-        self.head.setToolTip("Fold, or open")
+        self.head = named(
+            QToolButton(),
+            f"group-{title.lower().replace(' ', '-')}",
+            f"{title}, inputs",
+            "Fold, or open",
+        )
         self.head.setText(title)
         self.head.setAutoRaise(True)
         self.head.setCheckable(True)

@@ -11,12 +11,10 @@ from typing import Any
 from PySide6.QtCore import QSortFilterProxyModel, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QComboBox,
     QHBoxLayout,
     QHeaderView,
     QLabel,
-    QLineEdit,
     QSpinBox,
     QSplitter,
     QTableView,
@@ -30,6 +28,7 @@ from wavecomb.gui.scheduling.plots import Bar, Bars, Legend
 from wavecomb.gui.scheduling.run_log import Series
 from wavecomb.gui.scheduling.run_table import amount
 from wavecomb.gui.table_model import Cell, Table
+from wavecomb.gui.widgets import named, search_field
 
 ORDERS = {
     "time": "By shading time: records x nanoseconds.",
@@ -138,31 +137,32 @@ class MaterialsTab(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.of = QComboBox()
-        self.of.setObjectName("materials_of")
-        self.of.setAccessibleName("Series whose materials are shown")
-        self.of.setToolTip("Of which series; of its longest run.")
+        self.of = named(
+            QComboBox(),
+            "materials_of",
+            "Series whose materials are shown",
+            "Of which series; of its longest run.",
+        )
         self.of.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self.of.setMinimumContentsLength(14)
-        self.order = QComboBox()
-        self.order.setObjectName("materials_order")
-        self.order.setAccessibleName("Order of materials")
+        self.order = named(
+            QComboBox(), "materials_order", "Order of materials", "\n".join(ORDERS.values())
+        )
         self.order.addItems(list(ORDERS))
-        self.order.setToolTip("\n".join(ORDERS.values()))
-        self.top = QSpinBox()
-        self.top.setObjectName("materials_top")
-        self.top.setAccessibleName("How many materials have bars")
-        self.top.setToolTip("How many materials have bars; the table has all.")
+        self.top = named(
+            QSpinBox(),
+            "materials_top",
+            "How many materials have bars",
+            "How many materials have bars; the table has all.",
+        )
         self.top.setRange(1, 40)
         self.top.setValue(10)
-        self.search = QLineEdit()
-        self.search.setObjectName("materials_search")
-        self.search.setAccessibleName("Search materials")
-        self.search.setToolTip("Shows the materials whose name or program has this in it.")
-        self.search.setPlaceholderText("Search materials")
-        self.search.setClearButtonEnabled(True)
+        self.search = search_field(
+            "materials_search", "Search materials",
+            "Shows the materials whose name or program contains this text", "Search materials",
+        )  # fmt: skip
         self.costs = Bars("material_costs", "Cost: ns per record")
         self.records = Bars("material_records", "Records", names=False)
         self.legend = Legend("material_legend")
@@ -188,15 +188,10 @@ class MaterialsTab(QWidget):
         self.proxy.setFilterRole(Qt.ItemDataRole.DisplayRole)
         self.proxy.setSortRole(Qt.ItemDataRole.UserRole)
         self.view = QTableView()
-        self.view.setObjectName("materials_table")
-        self.view.setAccessibleName("All materials")
         self.view.setModel(self.proxy)
         self.view.setSortingEnabled(True)
         self.view.sortByColumn(3, Qt.SortOrder.DescendingOrder)
-        self.view.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        compact(self.view)
-        self.view.setAlternatingRowColors(True)
+        compact(self.view, "materials_table", "All materials", "")
         header = self.view.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)

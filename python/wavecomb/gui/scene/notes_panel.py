@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QComboBox,
     QHBoxLayout,
     QHeaderView,
     QLabel,
-    QLineEdit,
     QTableView,
     QVBoxLayout,
     QWidget,
 )
 
 from wavecomb.gui import theme
-from wavecomb.gui.list_view import RowDelegate
+from wavecomb.gui.list_view import RowDelegate, show_rows
 from wavecomb.gui.scene.notes_model import KIND, KINDS, WHAT, NotesFilter, NotesModel, Row, rows_of
+from wavecomb.gui.widgets import named, search_field
 
 if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
@@ -37,19 +36,14 @@ class NotesPanel(QWidget):
         self.model = NotesModel(self)
         self._filter = NotesFilter(self)
         self._filter.setSourceModel(self.model)
-        self.kinds = QComboBox()
-        self.kinds.setObjectName("notes-kind")
-        self.kinds.setAccessibleName("Kind of finding")
-        self.kinds.setToolTip("Which findings are listed")
+        self.kinds = named(
+            QComboBox(), "notes-kind", "Kind of finding", "Which findings are listed"
+        )
         self.kinds.addItem("All", "")
         for kind in KINDS:
             self.kinds.addItem(kind.capitalize(), kind)
-        self.field = QLineEdit()
-        self.field.setObjectName("notes-filter")
-        self.field.setAccessibleName("Filter findings")
-        self.field.setPlaceholderText("Filter")
-        self.field.setToolTip("Shows findings that hold this text")
-        self.field.setClearButtonEnabled(True)
+        tip = "Shows the findings that contain this text"
+        self.field = search_field("notes-filter", "Filter findings", tip, "Filter")
         self.view = QTableView()
         self._make_view()
         self.count = QLabel()
@@ -74,18 +68,11 @@ class NotesPanel(QWidget):
         view = self.view
         view.setModel(self._filter)
         view.setItemDelegate(RowDelegate(view))
-        view.setObjectName("notes")
-        view.setAccessibleName("What loading found")
-        view.setToolTip("Double click chooses the prim; Ctrl+C copies")
-        view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        view.setTabKeyNavigation(False)
+        tip = "Double click chooses the prim; Ctrl+C copies"
+        show_rows(view, "notes", "What loading found", tip)
         view.setSortingEnabled(True)
         view.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
         view.setWordWrap(False)
-        view.setShowGrid(False)
-        view.setAlternatingRowColors(True)
-        view.verticalHeader().hide()
-        view.verticalHeader().setDefaultSectionSize(theme.em(1.6))
         header = view.horizontalHeader()
         header.setStretchLastSection(True)
         header.resizeSection(KIND, theme.em(6.5))

@@ -31,7 +31,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
     QLabel,
-    QLineEdit,
     QMenu,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -54,6 +53,7 @@ from wavecomb.gui.scene.scene_model import (
     search,
 )
 from wavecomb.gui.scene.visibility import HIDDEN, NOT_DRAWN, VISIBLE
+from wavecomb.gui.widgets import named, search_field
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
@@ -184,7 +184,11 @@ class SceneTree(QWidget):
         self._session = edits.session
         self.model = SceneModel(edits, self)
         self.view = _View(edits, self.model)
-        self.field = QLineEdit()
+        self.field = search_field(
+            "scene-search", "Search prims",
+            "Shows the prims whose name or type contains this text; text with a / in it is looked "
+            "for in paths", "Search names, types or paths",
+        )  # fmt: skip
         self.found = QLabel()
         self._search: Iterator[list[Sdf.Path]] | None = None
         self._matches: list[Sdf.Path] = []
@@ -204,19 +208,11 @@ class SceneTree(QWidget):
         self._on_reset()
 
     def _make(self) -> None:
-        self.field.setObjectName("scene-search")
-        self.field.setAccessibleName("Search prims")
-        self.field.setPlaceholderText("Search names, types or paths")
-        self.field.setToolTip(
-            "Shows prims whose name or type holds this; with a / in it, whose path does"
-        )
-        self.field.setClearButtonEnabled(True)
         self.found.setObjectName("scene-found")
         self.found.hide()
         view = self.view
-        view.setObjectName("scene-tree")
-        view.setAccessibleName("Prims of the stage")
-        view.setToolTip("Space or a click on the eye shows and hides; F frames what is selected")
+        tip = "Space or a click on the eye shows and hides; F frames what is selected"
+        named(view, "scene-tree", "Prims of the stage", tip)
         view.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         view.setUniformRowHeights(True)
         view.setAlternatingRowColors(True)

@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.scene.form_model import UNIT, Colour, Range
 from wavecomb.gui.swatch import from_display, swatch, to_display
+from wavecomb.gui.widgets import named
 
 Control = Qt.KeyboardModifier.ControlModifier
 
@@ -121,12 +122,9 @@ class Field(QWidget):
         self.lines.setSpacing(theme.em(0.1))
         self.row = QHBoxLayout()
         self.lines.addLayout(self.row)
-        self.back = QToolButton()
-        self.back.setObjectName("reset")
+        self.back = named(QToolButton(), "reset", f"Reset {name}", "Back to the value of the stage")
         self.back.setText("\N{ANTICLOCKWISE OPEN CIRCLE ARROW}")
         self.back.setAutoRaise(True)
-        self.back.setToolTip("Back to the value of the stage")
-        self.back.setAccessibleName(f"Reset {name}")
         self.back.clicked.connect(self.reset)
 
     def finish(self) -> None:
@@ -220,10 +218,12 @@ class ColourField(Field):
 
     def __init__(self, name: str, bounds: Range = UNIT) -> None:
         super().__init__(name)
-        self.button = QToolButton()
-        self.button.setObjectName("colour")
-        self.button.setToolTip("Choose a colour. The numbers are linear Rec.709")
-        self.button.setAccessibleName(f"{name}, choose")
+        self.button = named(
+            QToolButton(),
+            "colour",
+            f"{name}, choose",
+            "Choose a colour. The numbers are linear Rec.709",
+        )
         self.button.clicked.connect(self._choose)
         self.button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.row.addWidget(self.button, 1)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QComboBox, QFormLayout, QWidget
 
 from wavecomb.gui.scene.variants_model import VariantsModel
+from wavecomb.gui.widgets import named
 
 if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
@@ -36,10 +37,9 @@ class VariantBar(QWidget):
         model = self.model
         self._clear()
         for one in model.sets:
-            combo = QComboBox()
-            combo.setObjectName(f"variant-{one.name}")
-            combo.setAccessibleName(f"Variant {one.name}")
-            combo.setToolTip(model.tip(one.name))
+            combo = named(
+                QComboBox(), f"variant-{one.name}", f"Variant {one.name}", model.tip(one.name)
+            )
             combo.addItem(STAGE_CHOICE, None)
             for choice in one.choices:
                 combo.addItem(choice, choice)

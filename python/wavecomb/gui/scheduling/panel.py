@@ -9,14 +9,12 @@ from typing import Any
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
     QLabel,
     QPushButton,
     QScrollArea,
-    QSpinBox,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -26,11 +24,17 @@ from wavecomb.gui import theme
 from wavecomb.gui.scheduling import choices
 from wavecomb.gui.scheduling.policy_file import OwnPolicy, first_line, load_policies
 from wavecomb.gui.scheduling.render_rounds import Rounds
-from wavecomb.gui.scheduling.setting_controls import ChoiceBox, number_box, show_number
+from wavecomb.gui.scheduling.setting_controls import (
+    ChoiceBox,
+    Control,
+    add_row,
+    control_of,
+    show_control,
+)
 from wavecomb.gui.scheduling.work_group import WorkGroup
 from wavecomb.gui.viewport.picture_light import PictureLight
 from wavecomb.gui.viewport.session import Session, Setup
-from wavecomb.gui.widgets import ask_file
+from wavecomb.gui.widgets import ask_file, named, tool
 from wavecomb.run.faults import describe
 
 _POLICY_FILTER = "Python (*.py);;All files (*)"
@@ -46,8 +50,7 @@ class SchedulingPanel(QScrollArea):
         self._policies: list[OwnPolicy] = []
         self._policy_file: str | None = None
         self._loads: dict[str, int] = {}
-        self._boxes: dict[str, ChoiceBox] = {}
-        self._numbers: dict[str, QSpinBox | QDoubleSpinBox] = {}
+        self._controls: dict[str, Control] = {}
         self.light = PictureLight(session)
         self.rounds = Rounds(session, self)
         self._work = WorkGroup(session)
@@ -77,10 +80,7 @@ class SchedulingPanel(QScrollArea):
 
     def _presets_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
-        self._preset = QComboBox()
-        self._preset.setObjectName("preset")
-        self._preset.setAccessibleName("Preset")
-        self._preset.setToolTip("Sets the whole group below.")
+        self._preset = named(QComboBox(), "preset", "Preset", "Sets the whole group below.")
         self._preset.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
@@ -93,9 +93,8 @@ class SchedulingPanel(QScrollArea):
         self._preset.activated.connect(
             lambda index: self._session.change(**self._preset.itemData(index))
         )
-        reset = QPushButton("Reset")
-        reset.setObjectName("reset")
-        reset.setToolTip("Sets all of this panel back to what a render does by default.")
+        tip = "Sets all of this panel back to what a render does by default."
+        reset = named(QPushButton("Reset"), "reset", "Reset", tip)
         reset.clicked.connect(self._reset)
         row.addWidget(self._preset, 1)
         row.addWidget(reset)
@@ -110,59 +109,39 @@ class SchedulingPanel(QScrollArea):
         self._promise.setObjectName("promise")
         form.addRow(self._promise)
         form.addRow(self.light)
-        self._try = QPushButton("Try every policy")
-        self._try.setObjectName("try_every_policy")
-        self._try.setToolTip(
-            "Renders the picture with each policy in turn and compares the bits; then goes back. "
-            "Press again to stop."
-        )
+        self._try = named(
+            QPushButton("Try every policy"), "try_every_policy", "Try every policy",
+            "Renders the picture with each policy in turn and compares the bits; then sets the "
+            "policy back. Press the button again to stop.",
+        )  # fmt: skip
         self._try.clicked.connect(self._try_every_policy)
         form.addRow(self._try)
+        buttons: dict[str, tuple[tuple[str, str, str, Any], ...]] = {
+            "policy": (
+                ("load_policy", "Load…", "Load a policy of your own: a Python file that "
+                 "defines a subclass of wavecomb.SchedulingPolicy.", self._ask_policy),
+                ("reload_policy", "↻", "Load the file again, after an edit.",
+                 self._reload_policy),
+            ),
+            "costs": (
+                ("load_profile", "File…", "Start from the costs of an earlier render: the "
+                 "file that its --costs FILE.json wrote.", self._ask_profile),
+            ),
+        }  # fmt: skip
         for one in choices.fields_of("order", without=("progressive",)):
-            if isinstance(one, choices.Number):
-                spin = self._numbers[one.field] = number_box(one, self._choose)
-                form.addRow(self._labelled(one.label, spin), spin)
-                continue
-            box = self._boxes[one.field] = ChoiceBox(one, self._choose)
-            field: QWidget = box
-            if one.field == "policy":
-                field = self._with_buttons(
-                    box,
-                    ("load_policy", "Load…", "Load a policy of your own: a Python file that "
-                     "defines a subclass of wavecomb.SchedulingPolicy.", self._ask_policy),
-                    ("reload_policy", "↻", "Load the file again, after an edit.",
-                     self._reload_policy),
-                )  # fmt: skip
-            elif one.field == "costs":
-                field = self._with_buttons(
-                    box,
-                    ("load_profile", "File…", "Start from the costs of an earlier render: the "
-                     "file that its --costs FILE.json wrote.", self._ask_profile),
-                )  # fmt: skip
-            form.addRow(self._labelled(one.label, box), field)
+            control = self._controls[one.field] = control_of(one, self._choose)
+            field = QWidget()
+            row = QHBoxLayout(field)
+            row.setContentsMargins(0, 0, 0, 0)
+            row.addWidget(control, 1)
+            for name, text, tip, call in buttons.get(one.field, ()):
+                button = tool(name, text, tip)
+                button.setAccessibleName(tip.partition(":")[0].partition(",")[0])
+                button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+                button.clicked.connect(call)
+                row.addWidget(button)
+            add_row(form, one.label, control, field)
         return group
-
-    def _labelled(self, text: str, buddy: QWidget) -> QLabel:
-        label = QLabel(text)
-        label.setBuddy(buddy)
-        label.setToolTip(buddy.toolTip())
-        return label
-
-    def _with_buttons(self, box: ChoiceBox, *buttons: tuple[str, str, str, Any]) -> QWidget:
-        field = QWidget()
-        row = QHBoxLayout(field)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(box, 1)
-        for name, text, tip, call in buttons:
-            button = QToolButton()
-            button.setObjectName(name)
-            button.setText(text)
-            button.setToolTip(tip)
-            button.setAccessibleName(tip.partition(":")[0].partition(",")[0])
-            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-            button.clicked.connect(call)
-            row.addWidget(button)
-        return field
 
     # ---- what it does ---------------------------------------------------------------------------
 
@@ -180,17 +159,17 @@ class SchedulingPanel(QScrollArea):
             self._show(self._session.setup)
 
     def _show(self, setup: Setup) -> None:
-        for field, box in self._boxes.items():
+        for field, control in self._controls.items():
             value = getattr(setup, field)
             if field == "policy" and setup.own_policy is not None:
                 value = setup.own_policy
             if field == "costs" and setup.profile is not None:
                 value = setup.profile
-            box.show_value(value)
-        for field, spin in self._numbers.items():
-            show_number(spin, getattr(setup, field))
+            show_control(control, value)
         self._promise.setText(choices.promise(setup))
-        self._find("reload_policy").setEnabled(self._policy_file is not None)
+        reload_button = self.findChild(QToolButton, "reload_policy")
+        assert reload_button is not None
+        reload_button.setEnabled(self._policy_file is not None)
         presets = list(choices.presets().values())
         self._preset.setCurrentIndex(
             next(
@@ -203,10 +182,10 @@ class SchedulingPanel(QScrollArea):
             )
         )
 
-    def _find(self, name: str) -> QToolButton:
-        found = self.findChild(QToolButton, name)
-        assert found is not None
-        return found
+    def _box(self, name: str) -> ChoiceBox:
+        box = self._controls[name]
+        assert isinstance(box, ChoiceBox)
+        return box
 
     def _reset(self) -> None:
         names = (*choices.ORDER_FIELDS, *choices.WORK_FIELDS, "own_policy", "profile")
@@ -226,7 +205,7 @@ class SchedulingPanel(QScrollArea):
             self._session.failed.emit(describe(error))
             return
         self._policy_file = path
-        box = self._boxes["policy"]
+        box = self._box("policy")
         for policy in policies:
             count = self._loads[policy.name] = self._loads.get(policy.name, 0) + 1
             # An edited policy is another one: its runs make a series of their own.
@@ -252,7 +231,7 @@ class SchedulingPanel(QScrollArea):
         except Exception as error:
             self._session.failed.emit(describe(error))
             return
-        self._boxes["costs"].add(profile, Path(path).name, f"From {path}, then measured.")
+        self._box("costs").add(profile, Path(path).name, f"From {path}, then measured.")
         self._choose("costs", profile)
 
     # ---- every policy in turn -------------------------------------------------------------------

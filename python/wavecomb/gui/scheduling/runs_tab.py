@@ -24,7 +24,7 @@ from wavecomb.gui.scheduling.run_rates import MIN_REPEATS, MIN_SECONDS
 from wavecomb.gui.scheduling.run_table import COLUMNS, LEFT, TIPS, Row, as_csv, as_text, rows
 from wavecomb.gui.table_model import Table
 from wavecomb.gui.viewport.session import Session
-from wavecomb.gui.widgets import ask_file
+from wavecomb.gui.widgets import ask_file, named
 from wavecomb.picture.files import reason, replacing
 
 NOTE = (
@@ -52,14 +52,9 @@ class RunsTab(QWidget):
         self.rounds = Rounds(session, self)
         self.model = Table(TIPS, LEFT, self)
         self.view = QTableView()
-        self.view.setObjectName("runs_table")
-        self.view.setAccessibleName("Runs")
         self.view.setModel(self.model)
-        self.view.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.view.setAlternatingRowColors(True)
-        compact(self.view)
+        compact(self.view, "runs_table", "Runs", "")
         header = self.view.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.view.selectionModel().selectionChanged.connect(lambda *_: self._enable())
@@ -88,9 +83,7 @@ class RunsTab(QWidget):
              "each.", self._ask_save),
             ("clear", "Clear", "Forgets all runs but the one that goes on.", self.clear),
         ):  # fmt: skip
-            button = QPushButton(text)
-            button.setObjectName(f"runs_{name}")
-            button.setToolTip(tip)
+            button = named(QPushButton(text), f"runs_{name}", text, tip)
             button.clicked.connect(call)
             row.addWidget(button)
             self._made[name] = button

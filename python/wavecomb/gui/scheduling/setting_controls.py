@@ -7,7 +7,15 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QSizePolicy, QSpinBox, QWidget
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QLabel,
+    QSizePolicy,
+    QSpinBox,
+    QWidget,
+)
 
 from wavecomb.gui.scheduling.choices import Choice, Number
 
@@ -117,6 +125,21 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
 def control_of(row: Choice | Number, changed: Changed) -> Control:
     """The control of a setting, whatever it is: all bars and panels have theirs from here."""
     return ChoiceBox(row, changed) if isinstance(row, Choice) else number_box(row, changed)
+
+
+def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | None = None) -> None:
+    """Adds a control with its label, whose tooltip is that of the control.
+
+    Args:
+        form: The form.
+        label: Text.
+        control: The control.
+        field: The control with buttons beside it, where it has some.
+    """
+    text = QLabel(label)
+    text.setBuddy(control)
+    text.setToolTip(control.toolTip())
+    form.addRow(text, field or control)
 
 
 def show_control(control: Control, value: Any) -> None:

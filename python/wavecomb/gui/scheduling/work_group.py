@@ -6,17 +6,21 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtWidgets import (
-    QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
     QLabel,
-    QSpinBox,
     QWidget,
 )
 
 from wavecomb.gui.scheduling import choices
 from wavecomb.gui.scheduling.choices import Choice
-from wavecomb.gui.scheduling.setting_controls import ChoiceBox, number_box, show_number
+from wavecomb.gui.scheduling.setting_controls import (
+    ChoiceBox,
+    Control,
+    add_row,
+    control_of,
+    show_control,
+)
 from wavecomb.gui.viewport.session import Session, Setup
 
 _MODE = Choice("adaptive_mode", "Adaptive", "How samples are spread.", choices.ADAPTIVE_MODES)
@@ -37,24 +41,12 @@ class WorkGroup(QGroupBox):
         note.setWordWrap(True)
         form.addRow(note)
         self._mode = ChoiceBox(_MODE, self._choose_mode)
-        self._boxes: dict[str, ChoiceBox] = {}
-        self._numbers: dict[str, QSpinBox | QDoubleSpinBox] = {}
-
-        def add(label: str, widget: QWidget) -> None:
-            text = QLabel(label)
-            text.setBuddy(widget)
-            text.setToolTip(widget.toolTip())
-            form.addRow(text, widget)
-
+        self._controls: dict[str, Control] = {}
         for one in choices.fields_of("work"):
             if one.field == "adaptive":
-                add("Adaptive", self._mode)
-            if isinstance(one, Choice):
-                self._boxes[one.field] = ChoiceBox(one, self._choose)
-                add(one.label, self._boxes[one.field])
-            else:
-                self._numbers[one.field] = number_box(one, self._choose)
-                add(one.label, self._numbers[one.field])
+                add_row(form, "Adaptive", self._mode)
+            self._controls[one.field] = control_of(one, self._choose)
+            add_row(form, one.label, self._controls[one.field])
         session.setup_changed.connect(self._show)
         self._show(session.setup)
 
@@ -74,19 +66,17 @@ class WorkGroup(QGroupBox):
             self._show(setup)
 
     def _show(self, setup: Setup) -> None:
-        for field, box in self._boxes.items():
-            box.show_value(getattr(setup, field))
         self._mode.show_value(mode_of(setup))
         for field in _FIRST:
             if getattr(setup, field):
                 self._targets[field] = getattr(setup, field)
         is_adaptive = bool(setup.adaptive or setup.noise)
-        for field, spin in self._numbers.items():
-            show_number(spin, self._targets.get(field) or getattr(setup, field))
-        self._numbers["roulette_depth"].setEnabled(setup.roulette != "off")
-        self._numbers["adaptive"].setEnabled(bool(setup.adaptive))
-        self._numbers["noise"].setEnabled(bool(setup.noise))
-        self._numbers["min_spp"].setEnabled(is_adaptive)
+        for field, control in self._controls.items():
+            show_control(control, self._targets.get(field) or getattr(setup, field))
+        self._controls["roulette_depth"].setEnabled(setup.roulette != "off")
+        self._controls["adaptive"].setEnabled(bool(setup.adaptive))
+        self._controls["noise"].setEnabled(bool(setup.noise))
+        self._controls["min_spp"].setEnabled(is_adaptive)
 
 
 def mode_of(setup: Setup) -> str:

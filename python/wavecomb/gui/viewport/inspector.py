@@ -22,6 +22,7 @@ from wavecomb.gui import theme
 from wavecomb.gui.viewport.cursor_panel import CursorPanel
 from wavecomb.gui.viewport.frames import Frame
 from wavecomb.gui.viewport.session import Session
+from wavecomb.gui.widgets import named
 from wavecomb.picture.rendered import NOWHERE, in_world
 
 _LATER_MS = 30
@@ -96,10 +97,12 @@ class Inspector(CursorPanel):
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         self.follow.setToolTip("Off: values stay those of the pixel that was clicked last")
         self.follow.setAccessibleName("Follow the cursor")
-        self.copy = QPushButton("Copy")
-        self.copy.setObjectName("inspector.copy")
-        self.copy.setToolTip("Put these values on the clipboard as text")
-        self.copy.setAccessibleName("Copy the values")
+        self.copy = named(
+            QPushButton("Copy"),
+            "inspector.copy",
+            "Copy the values",
+            "Put these values on the clipboard as text",
+        )
         self.copy.clicked.connect(self._copy)
         layout = QVBoxLayout(self)
         margin = theme.em(0.3)
