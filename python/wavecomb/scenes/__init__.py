@@ -26,14 +26,13 @@ from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.hair import build_fur, build_head
 from wavecomb.scenes.heavy import build_heavy
 from wavecomb.scenes.kitchen import build_kitchen
-from wavecomb.scenes.lights import build_lights
+from wavecomb.scenes.lights import build_lights, build_studio
 from wavecomb.scenes.mixed import build_dragon, build_mixed
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.room import build_room
 from wavecomb.scenes.splats import build_splats
 from wavecomb.scenes.spread import build_spread
 from wavecomb.scenes.stage import StageWriter
-from wavecomb.scenes.studio import build_studio
 from wavecomb.scenes.volumes import build_clouds, build_fog, build_smoke
 
 __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from wavecomb.scenes.materials import Colour, MaterialInfo, preview
 from wavecomb.scenes.room_looks import LOOKS as ROOM_LOOKS
+from wavecomb.scenes.room_looks import coated
 
 MARBLE_METRES = 0.9
 """Edge of the surface that the image ``marble`` shows here."""
@@ -23,14 +24,7 @@ def _gloss(colour: Colour, roughness: float) -> MaterialInfo:
 
 
 def _lacquer(colour: Colour) -> MaterialInfo:
-    return preview(
-        {
-            "diffuseColor": colour,
-            "roughness": 0.4,
-            "clearcoat": 1.0,
-            "clearcoatRoughness": 0.06,
-        }
-    )
+    return coated(colour, 0.4, 1.0, 0.06)
 
 
 _OF_THE_ROOM = (

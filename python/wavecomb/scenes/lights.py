@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A street at night: as many lights as are asked for, of every kind that has a place.
+"""Stages for measuring how a light is chosen: a street at night, and a studio.
 
-For measuring how the choice of a light scales. The street stays as long and its light as strong
-whatever their number: more lights are smaller ones. They are of five kinds in turn, and of powers
-that differ a hundredfold:
+The street has as many lights as are asked for. Its length and the strength of its light do not
+depend on their number: more lights are smaller ones. The lights are of five kinds in turn, and
+their powers differ by a factor of up to a hundred:
 
 - windows: rectangles on the facades, which face the street;
 - lamps: disks that shine down;
@@ -14,6 +14,8 @@ that differ a hundredfold:
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, UsdGeom, UsdLux
@@ -22,6 +24,7 @@ from wavecomb.scenes import materials as looks
 from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import BOX, BOX_CORNERS, StageWriter
+from wavecomb.scenes.teapot import teapot
 
 MAX_LIGHTS = 200_000
 _LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0
@@ -147,3 +150,48 @@ def _street(writer: StageWriter, rng: np.random.Generator) -> None:
             writer.polygons(path, np.array(corners), BOX, name)
             z -= width
             house += 1
+
+
+_COLUMNS, _ROWS, _PITCH = 10, 9, 2.6
+_GROUND_HALF = 13.5
+_TEAPOT_SCALE = 0.36
+_LOOKS = {
+    "Clay": looks.TERRACOTTA,
+    "Chalk": looks.CHALK,
+    "BluePlastic": looks.BLUE_PLASTIC,
+    "YellowPlastic": looks.YELLOW_PLASTIC,
+    "Bronze": looks.BRONZE,
+    "Copper": looks.COPPER,
+}
+
+
+def build_studio(writer: StageWriter, options: SceneOptions) -> None:
+    """90 objects in rows on a matt floor, a key lamp, a fill lamp and a dim, even dome.
+
+    The dome emits most of the power, as it is computed over the whole stage, and little of the
+    light in the picture, which bounces find as well.
+    """
+    rng = np.random.default_rng([options.seed, 3])
+    writer.material("Floor", looks.diffuse((0.35, 0.34, 0.33)))
+    writer.floor("Floor", _GROUND_HALF, "Floor")
+    for name, info in _LOOKS.items():
+        writer.material(name, info)
+    dragon = writer.prototype("Dragon", options.dragon_mesh())
+    pot = writer.prototype("Teapot", teapot(options.teapot_level))
+    for index in range(_COLUMNS * _ROWS):
+        column, row = index % _COLUMNS, index // _COLUMNS
+        x = (column - 0.5 * (_COLUMNS - 1)) * _PITCH + rng.uniform(-0.3, 0.3)
+        z = (row - 0.5 * (_ROWS - 1)) * _PITCH + rng.uniform(-0.3, 0.3)
+        is_pot = (column + row) % 2 == 0
+        writer.instance(
+            f"/World/Objects/{'Teapot' if is_pot else 'Dragon'}_{index:02d}",
+            pot if is_pot else dragon,
+            list(_LOOKS)[int(rng.integers(len(_LOOKS)))],
+            (x, 0.0, z),
+            rng.uniform(-180.0, 180.0),
+            (_TEAPOT_SCALE if is_pot else 1.0) * math.exp(rng.uniform(-0.1, 0.1)),
+        )
+    writer.rect_light("Key", (-3.0, 11.0, 6.0), 3.0, 3.0, (13.0, 12.6, 12.0), -62.0)
+    writer.rect_light("Fill", (9.0, 10.0, 14.0), 4.0, 4.0, (2.6, 2.8, 3.2), -40.0)
+    writer.even_dome("Dome", 0.12)
+    writer.camera((0.0, 9.0, 19.0), (0.0, 0.5, -1.0), 50.0, options.aspect or 1.0)

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from wavecomb.scenes import paintings
 from wavecomb.scenes import room_textures as images
-from wavecomb.scenes.materials import MaterialInfo, preview
+from wavecomb.scenes.materials import Colour, MaterialInfo, preview
 from wavecomb.scenes.options import SceneOptions
 from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.textures import TextureInfo
@@ -27,9 +26,9 @@ ROOM_TEXTURES = {
     "leather_normal": TextureInfo(images.leather_normal, 1024, False, "rgb", True),
     "rug": TextureInfo(images.rug, 2048, True),
     "pages": TextureInfo(images.pages, 256, True),
-    "hills": TextureInfo(paintings.hills, 1024, True),
-    "fields": TextureInfo(paintings.fields, 1024, True),
-    "fern": TextureInfo(paintings.fern, 1024, True),
+    "hills": TextureInfo(images.hills, 1024, True),
+    "fields": TextureInfo(images.fields, 1024, True),
+    "fern": TextureInfo(images.fern, 1024, True),
 }
 """Images of the room's own, beside those of ``textures.TEXTURES``."""
 
@@ -37,6 +36,25 @@ _PLASTER = 1.0 / images.PLASTER_METRES
 _WEAVE = 1.0 / images.LINEN_METRES
 _LEATHER = 1.0 / images.LEATHER_METRES
 _WALNUT = 1.0 / images.WALNUT_METRES
+
+
+def coated(
+    colour: Colour,
+    roughness: float,
+    coat: float,
+    coat_roughness: float,
+    textures: dict[str, str] | None = None,
+    repeat: float = 1.0,
+) -> MaterialInfo:
+    """A coloured surface under a clear coat; ``textures`` and ``repeat`` as of ``preview``."""
+    values: dict[str, float | int | Colour] = {
+        "diffuseColor": colour,
+        "roughness": roughness,
+        "clearcoat": coat,
+        "clearcoatRoughness": coat_roughness,
+    }
+    return preview(values, textures, repeat)
+
 
 LOOKS: dict[str, MaterialInfo] = {
     "Plaster": preview(
@@ -55,27 +73,11 @@ LOOKS: dict[str, MaterialInfo] = {
     ),
     "Twill": preview({"roughness": 0.85}, {"diffuseColor": "weave"}, 1.0 / 0.12),
     "Rug": preview({"roughness": 1.0}, {"diffuseColor": "rug"}),
-    "Leather": preview(
-        {
-            "diffuseColor": (0.19, 0.072, 0.028),
-            "roughness": 0.5,
-            "clearcoat": 0.5,
-            "clearcoatRoughness": 0.22,
-        },
-        {"normal": "leather_normal"},
-        _LEATHER,
-    ),
+    "Leather": coated((0.19, 0.072, 0.028), 0.5, 0.5, 0.22, {"normal": "leather_normal"}, _LEATHER),
     "Marble": preview({"roughness": 0.14}, {"diffuseColor": "marble"}, 1.0 / MARBLE_METRES),
     "Porcelain": preview({"diffuseColor": (0.80, 0.79, 0.76), "roughness": 0.06}),
     "Glaze": preview({"roughness": 0.05}, {"diffuseColor": "glaze"}),
-    "Celadon": preview(
-        {
-            "diffuseColor": (0.17, 0.30, 0.25),
-            "roughness": 0.35,
-            "clearcoat": 1.0,
-            "clearcoatRoughness": 0.04,
-        }
-    ),
+    "Celadon": coated((0.17, 0.30, 0.25), 0.35, 1.0, 0.04),
     "Terracotta": preview({"diffuseColor": (0.47, 0.19, 0.10), "roughness": 0.8}),
     "Brass": preview({"diffuseColor": (0.89, 0.69, 0.34), "metallic": 1.0, "roughness": 0.22}),
     "Bronze": preview({"diffuseColor": (0.55, 0.36, 0.20), "metallic": 1.0, "roughness": 0.34}),
@@ -94,14 +96,7 @@ LOOKS: dict[str, MaterialInfo] = {
     "BookGreen": preview({"diffuseColor": (0.05, 0.14, 0.08), "roughness": 0.6}),
     "BookOchre": preview({"diffuseColor": (0.55, 0.33, 0.08), "roughness": 0.6}),
     "BookCream": preview({"diffuseColor": (0.66, 0.60, 0.47), "roughness": 0.5}),
-    "Apple": preview(
-        {
-            "diffuseColor": (0.46, 0.045, 0.035),
-            "roughness": 0.35,
-            "clearcoat": 0.6,
-            "clearcoatRoughness": 0.12,
-        }
-    ),
+    "Apple": coated((0.46, 0.045, 0.035), 0.35, 0.6, 0.12),
     "Orange": preview(
         {"diffuseColor": (0.78, 0.27, 0.02), "roughness": 0.38}, {"normal": "leather_normal"}, 12.0
     ),
