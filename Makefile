@@ -115,6 +115,7 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 docs: build ## The documentation as a site in out/site
 	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
 	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
+	@command -v doxygen > /dev/null || echo "docs: without the C++ reference; apt install doxygen adds it"
 	@echo "wrote out/site/index.html"
 
 # ---- tests ---------------------------------------------------------------------------------------------

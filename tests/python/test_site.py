@@ -138,6 +138,7 @@ def test_reference_pages_have_every_row(monkeypatch: pytest.MonkeyPatch) -> None
         assert re.search(rf"^\| `{name}` \|.*\w", pages["loading.md"], flags=re.M), name
     for name in wavecomb.__all__:
         assert name == "__version__" or f"## wavecomb.{name}\n" in pages["python.md"]
+    assert "| `wavecomb/scene/scene.h` |" in pages["cpp.md"]
     for command in ("render", "farm submit", "bench run", "doctor", "sheet"):
         assert f"## wavecomb {command}\n" in pages["options.md"]
     rows = [line.split(" | ") for line in pages["options.md"].splitlines() if line[:3] == "| `"]
@@ -162,6 +163,9 @@ def test_the_site_is_built_without_warnings(tmp_path: Path) -> None:
     assert (tmp_path / "search/search_index.js").is_file()
     home = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert '<script src="iframe-worker.js"' in home and "unpkg.com" not in home
+    if shutil.which("doxygen"):
+        assert (tmp_path / "cpp/classwavecomb_1_1SceneBuilder.html").is_file()
+        assert "cpp/annotated.html" in (tmp_path / "reference/cpp.html").read_text("utf-8")
     browser = shutil.which("chromium")
     if browser:  # the search works where pages are opened as files
         page = f"{(tmp_path / 'index.html').as_uri()}?q=guiding"

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MkDocs hooks that add pages of the repository root and generated reference pages to docs/."""
+"""Hooks of MkDocs: add pages of the root and reference pages to those of docs/."""
 
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,10 +18,17 @@ sys.path.insert(0, str(Path(__file__).parent))
 import reference  # noqa: E402
 
 PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
-"""Pages of the repository root, and their paths in the site."""
+"""Pages of the root -> their names in the site."""
 LINK = re.compile(r"(!?\[[^\]]*\])\(([^)\s]+)\)")
 CODE = re.compile(r"^(```.*?^```$|    .*?$)", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"`[^`\n]+`")
+DOXYGEN = {
+    "PROJECT_NAME": "Wavecomb", "PROJECT_BRIEF": '"The C++ core"', "HTML_OUTPUT": ".",
+    "GENERATE_LATEX": "NO", "EXTRACT_ALL": "YES", "HIDE_UNDOC_RELATIONS": "YES",
+    "JAVADOC_AUTOBRIEF": "YES", "QUIET": "YES", "WARNINGS": "NO", "HAVE_DOT": "NO",
+    "HTML_TIMESTAMP": "NO", "SORT_MEMBER_DOCS": "NO", "SHOW_INCLUDE_FILES": "NO",
+}  # fmt: skip
+"""Settings of Doxygen, without paths."""
 STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
@@ -30,7 +39,7 @@ STYLE = """
 
 
 def on_config(config: Any) -> Any:
-    """List all decisions in the navigation, in the order of their page."""
+    """Lists all decisions in the navigation, in the order of their page."""
     text = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
     pages = ["decisions/README.md"]
     pages += [f"decisions/{name}" for name in re.findall(r"\]\(([a-z0-9-]+\.md)\)", text)]
@@ -42,7 +51,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages that are not in docs/."""
+    """Adds files that are not in docs/."""
     made = {f"reference/{name}": text for name, text in reference.pages().items()}
     made["site.css"] = STYLE
     made["iframe-worker.js"] = Path(__file__).with_name("iframe-worker.js").read_text("utf-8")
@@ -53,8 +62,25 @@ def on_files(files: Files, config: Any) -> Files:
     return files
 
 
+def on_post_build(config: Any) -> None:
+    """Adds the C++ reference, where Doxygen is installed."""
+    if not shutil.which("doxygen"):
+        return
+    folder = Path(config["site_dir"]) / "cpp"
+    folder.mkdir(parents=True, exist_ok=True)
+    settings = DOXYGEN | {
+        "INPUT": " ".join(f'"{path}"' for path in reference.public_headers()),
+        "OUTPUT_DIRECTORY": f'"{folder}"',
+        "INCLUDE_PATH": f'"{ROOT}/src"',
+        "STRIP_FROM_PATH": f'"{ROOT}/src"',
+        "STRIP_FROM_INC_PATH": f'"{ROOT}/src"',
+    }
+    text = "".join(f"{name} = {value}\n" for name, value in settings.items())
+    subprocess.run(["doxygen", "-"], input=text, text=True, check=True, stdout=subprocess.DEVNULL)
+
+
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Adapt links from and to pages of the repository root."""
+    """Rewrites links of and to pages of the root for the site."""
     name = page.file.src_uri
     at_root = name in PAGES.values()
 
@@ -66,10 +92,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         if target.startswith("../") and file in PAGES:
             return f"{text}({'../' * name.count('/')}{PAGES[file]})"
         if not target.startswith("#") and "://" not in target and _is_elsewhere(name, target):
-            return text[1:-1]  # a file that is not a page
+            return text[1:-1]  # a file that is no page
         return match[0]
 
-    # GitHub needs table bars in code to be escaped; here the backslash would be visible.
+    # GitHub wants the bar of a table escaped in code, too; here the stroke would be seen.
     markdown = INLINE.sub(lambda match: match[0].replace("\\|", "|"), markdown)
     parts = CODE.split(markdown)
     return "".join(part if k % 2 else LINK.sub(link, part) for k, part in enumerate(parts))

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference pages, generated from the program's tables and from docstrings."""
+"""Reference pages, generated from the program's tables and docstrings."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
 import re
+import shutil
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -20,16 +22,17 @@ from wavecomb.material_table import material_parameters
 from wavecomb.options import default_text, settings
 from wavecomb.run import aovs
 
-NOTE = "This page is made of the program's own tables by `make docs`.\n"
+ROOT = Path(__file__).resolve().parents[2]
+NOTE = "`make docs` generates this page from the program's tables.\n"
 ABOUT = {
-    "picture": "What the picture is",
-    "work": "How much is done for it",
-    "order": "What computes it, and in which order; no bit of the picture depends on it",
+    "picture": "Image",
+    "work": "Amount of work",
+    "order": "Order of work, which changes no bit of the image",
 }
 
 
 def pages() -> dict[str, str]:
-    """Return page name -> Markdown."""
+    """Name -> Markdown."""
     return {
         "options.md": options_page(),
         "settings.md": settings_page(),
@@ -39,30 +42,31 @@ def pages() -> dict[str, str]:
         "materials.md": materials_page(),
         "cameras.md": cameras_page(),
         "python.md": python_page(),
+        "cpp.md": cpp_page(),
     }
 
 
 def cell(text: object) -> str:
-    """Escape text for a table cell."""
+    """Text that does not end a cell of a table, and is no markup."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return plain.replace("<", "&lt;").replace("{", "&#123;").replace("*", "\\*")
 
 
 def code(text: object) -> str:
-    """Format a name in a table cell."""
+    """A name in a cell."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return f"`{plain}`" if plain else ""
 
 
 def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
-    """Format a Markdown table."""
+    """A table of Markdown."""
     lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
     lines += [f"| {' | '.join(row)} |" for row in body]
     return "\n".join(lines) + "\n"
 
 
 def bounds(least: float | None, most: float | None) -> str:
-    """Format the minimum and the maximum, as far as they exist."""
+    """The numbers that there are."""
     ends = [f"{end:.10g}" if end is not None and abs(end) < 1e30 else "" for end in (least, most)]
     if ends[0] and ends[1]:
         return f"{ends[0]} to {ends[1]}"
@@ -70,7 +74,7 @@ def bounds(least: float | None, most: float | None) -> str:
 
 
 def options_page() -> str:
-    """Page of every command with its options."""
+    """Every command with its options."""
     parts = ["# Options of all commands\n", NOTE]
     root = click.Context(main, info_name="wavecomb")
     for path, command, context in walk(main, root):
@@ -88,10 +92,10 @@ def options_page() -> str:
 
 
 def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
-    """Split the help of an option into cells: names, value, effect, default.
+    """Cells of an option: names, value, effect, default, from what its help says.
 
-    >>> option_row("-o, --output FILE", "Image.  [default: out.exr]") ('`-o, --output`', '`FILE`',
-    'Image.', 'out.exr')
+    >>> option_row("-o, --output FILE", "Image.  [default: out.exr]")
+    ('`-o, --output`', '`FILE`', 'Image.', 'out.exr')
     """
     names, value = re.fullmatch(r"((?:-\S+(?:,| /)? ?)*)(.*)", usage, re.DOTALL).groups()  # type: ignore[union-attr]
     if not names:  # an argument of the command
@@ -113,7 +117,7 @@ def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
 
 
 def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple[str, Any, Any]]:
-    """Yield the commands of a group and below, with their paths."""
+    """Commands of a group and below, with their paths."""
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         if command is None or command.hidden:
@@ -126,11 +130,11 @@ def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple
 
 
 def settings_page() -> str:
-    """Page of the render settings."""
+    """The settings of a render."""
     parts = ["# Settings of a render\n", NOTE,
              "Keywords of `wavecomb.render`, fields of `wavecomb.Settings`, keys of a suite. As "
-             "options of commands they have `-` for `_`. *Expectation*: whether the image that "
-             "more and more samples tend to depends on the setting; `wavecomb merge` refuses "
+             "options of commands they have `-` for `_`. *Expectation*: whether the setting "
+             "changes the image that more and more samples converge to; `wavecomb merge` refuses "
              "images in which such settings differ.\n"]  # fmt: skip
     for group, title in ABOUT.items():
         parts.append(f"## {title}\n")
@@ -149,7 +153,7 @@ def settings_page() -> str:
 
 
 def loading_page() -> str:
-    """Page of the options for loading a stage."""
+    """How a stage is read."""
     item = re.compile(r"^    (\w+): (.+?)(?=^    \w+:|\Z)", re.DOTALL | re.MULTILINE)
     about = dict(item.findall(attributes(LoadOptions)))
     body = []
@@ -160,17 +164,17 @@ def loading_page() -> str:
         body.append((code(field.name), code(option), cell(about.get(field.name, ""))))
     head = "Keywords of `wavecomb.load`, `wavecomb.render` and `wavecomb.render_frames`.\n"
     return "\n".join(
-        ["# How a stage is read\n", NOTE, head, table(("keyword", "option", ""), body)]
+        ["# Options of loading a stage\n", NOTE, head, table(("keyword", "option", ""), body)]
     )
 
 
 def attributes(owner: Any) -> str:
-    """Return the section "Attributes" of a class's docstring."""
+    """The part "Attributes" of a class's docstring."""
     return inspect.getdoc(owner).partition("Attributes:\n")[2] + "\n"  # type: ignore[union-attr]
 
 
 def layers_page() -> str:
-    """Page of the AOVs."""
+    """The AOVs."""
     body = [(code(row.name), str(row.channels or ""), cell(row.kind.replace("_", " ")),
              cell(row.title)) for row in aovs.core_aovs().values()]  # fmt: skip
     several = [(code(name), ", ".join(map(code, names))) for name, names in aovs.groups().items()]
@@ -184,7 +188,7 @@ def layers_page() -> str:
 
 
 def lights_page() -> str:
-    """Page of the light parameters."""
+    """The parameters of lights."""
     body = []
     for row in light_parameters().values():
         values = ", ".join(map(code, row.choices)) or bounds(row.least, row.most) or row.kind
@@ -195,7 +199,7 @@ def lights_page() -> str:
 
 
 def materials_page() -> str:
-    """Page of the material parameters."""
+    """The parameters of materials."""
     body = [(code(row.name), row.kind, code(row.default), bounds(row.least, row.most),
              code(row.program)) for row in material_parameters().values()]  # fmt: skip
     head = ("parameter", "kind", "default", "values", "of the program alone")
@@ -204,7 +208,7 @@ def materials_page() -> str:
 
 
 def cameras_page() -> str:
-    """Page of the camera parameters."""
+    """The parameters of cameras."""
     body = []
     for row in camera_parameters().values():
         values = ", ".join(map(code, row.choices)) or bounds(row.least, None) or row.kind
@@ -215,8 +219,8 @@ def cameras_page() -> str:
 
 
 def python_page() -> str:
-    """Page of the names in `wavecomb`, from docstrings."""
-    parts = ["# Python\n", "What `import wavecomb` gives, from its docstrings.\n"]
+    """The public names of `wavecomb`, from docstrings."""
+    parts = ["# Python\n", "Public names of the package, from docstrings.\n"]
     for name in wavecomb.__all__:
         thing = getattr(wavecomb, name)
         if name == "__version__":
@@ -234,8 +238,39 @@ def python_page() -> str:
     return "\n".join(parts)
 
 
+def public_headers() -> list[Path]:
+    """Headers of programs that link with the core."""
+    text = (ROOT / "tools" / "words" / "public_headers.txt").read_text(encoding="utf-8")
+    return [ROOT / "src" / "wavecomb" / line for line in text.splitlines()
+            if line and not line.startswith("#")]  # fmt: skip
+
+
+def cpp_page() -> str:
+    """How to use the core from C++, its headers, and where Doxygen's pages are."""
+    body = []
+    for path in public_headers():
+        comment = re.search(r"^///? (?!SPDX)(.+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+        body.append((code(path.relative_to(ROOT / "src").as_posix()),
+                     cell(comment[1] if comment else "")))  # fmt: skip
+    example = (ROOT / "examples" / "cpp" / "render_sphere.cpp").read_text(encoding="utf-8")
+    pages = (
+        'Classes and functions are on <a href="../cpp/annotated.html">the pages of Doxygen</a>.\n'
+        if shutil.which("doxygen")
+        else "Build the site with Doxygen installed (`apt install doxygen`) for classes and "
+        "functions.\n"
+    )
+    return "\n".join([
+        "# C++\n", "Install the core and its headers from a build, and link with it:\n",
+        "```sh\n.venv/bin/cmake --install build/editable --component dev --prefix PREFIX\n```\n",
+        "```cmake\nfind_package(wavecomb REQUIRED)\n"
+        "target_link_libraries(mine PRIVATE wavecomb::core)\n```\n",
+        pages, table(("header", "content"), body),
+        "## Example\n", f"```cpp\n{example}```\n",
+    ])  # fmt: skip
+
+
 def signature(function: Any) -> str:
-    """Format a signature as Python writes it, with a line per argument if there are many."""
+    """As Python writes it, a line for each argument where there are many."""
     text = str(inspect.signature(function)).replace("'", "")
     if len(text) < 70:
         return text
@@ -245,7 +280,7 @@ def signature(function: Any) -> str:
 
 
 def docstring(thing: Any) -> str:
-    """Convert Google-style sections to headings and lists, and examples to code."""
+    """Google's sections as headings and lists; examples as code."""
     out: list[str] = []
     text = (inspect.getdoc(thing) or "").replace("``", "`").replace("  # doctest: +SKIP", "")
     is_code = False
@@ -268,5 +303,5 @@ def docstring(thing: Any) -> str:
 
 
 def escaped(line: str) -> str:
-    """Escape angle brackets that are not markup."""
+    """A line whose angle brackets are no markup."""
     return line.replace("<", "&lt;")
