@@ -61,6 +61,7 @@ def test_this_tree_is_clean_in_five_seconds() -> None:
         ("python/wavecomb/a.py", 'o(help="Length of a packet.")\n', '"packet": docs/glossary'),
         ("docs/a.md", "word\n" * 60_001, "docs: 600"),
         ("docs/decisions/a.md", "word\n" * 20_001, "docs/decisions: 20001 words"),
+        ("docs/decisions/a.md", "word\n" * 351, "docs/decisions/a.md: 351 words; 350"),
     ],
 )
 def test_refused(tmp_path: pathlib.Path, name: str, text: str, message: str) -> None:
