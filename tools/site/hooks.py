@@ -33,7 +33,7 @@ STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
 .md-typeset td:first-child code { white-space: nowrap; }
-.md-typeset td:not(:first-child) code { white-space: normal; overflow-wrap: anywhere; }
+.md-typeset td:not(:first-child) code { white-space: normal; overflow-wrap: break-word; }
 .md-grid { max-width: 68rem; }
 """
 
