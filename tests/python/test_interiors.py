@@ -126,6 +126,118 @@ def test_shadow_rays_bring_what_passes() -> None:
 
 
 @pytest.mark.parametrize(
+    ("rays", "passes"),
+    [({"shadow": False}, 0.0), ({"bounces": False}, 2.0), ({"camera": False}, 2.0)],
+)
+def test_fog_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> None:
+    """Light through a slab of 2: shadow rays decide, whatever bounces and cameras see."""
+    pixels = []
+    for sigma in (np.zeros(3) + 1e-6, SIGMA):
+        builder = wavecomb.SceneBuilder()
+        fog = filled(builder, 1.0, **absorbing(sigma))
+        box(builder, (-WIDE, -WIDE, 6.0), (WIDE, WIDE, 8.0), fog, name="/Fog")
+        builder.add_visibility("/Fog", rays)
+        floor = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+        slab(builder, -1.0, 0.0, floor)
+        builder.add_light("distant", np.eye(4), color=(1, 1, 1), angle=0.0)
+        pixels.append(seen_from_above(builder, depth=1))
+    assert np.all(pixels[0] > 0.01)
+    assert np.allclose(pixels[1] / pixels[0], np.exp(-passes * SIGMA), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("rays", "passes"),
+    [
+        ({}, 2.0),
+        ({"bounces": False}, 2.0),
+        ({"camera": False}, 1.0),
+        ({"shadow": False}, 1.0),
+        ({"camera": False, "shadow": False}, 0.0),
+    ],
+)
+def test_fog_around_a_floor_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> None:
+    """The camera above it: its ray's length in fog is 1, and the shadow ray's."""
+    pixels = []
+    for sigma in (np.zeros(3) + 1e-6, SIGMA):
+        builder = wavecomb.SceneBuilder()
+        fog = filled(builder, 1.0, **absorbing(sigma))
+        box(builder, (-WIDE, -WIDE, -0.5), (WIDE, WIDE, 1.0), fog, name="/Fog")
+        builder.add_visibility("/Fog", rays)
+        floor = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+        slab(builder, -1.0, 0.0, floor)
+        builder.add_light("distant", np.eye(4), color=(1, 1, 1), angle=0.0)
+        pixels.append(seen_from_above(builder, depth=1))
+    assert np.all(pixels[0] > 0.01)
+    assert np.allclose(pixels[1] / pixels[0], np.exp(-passes * SIGMA), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("rays", "passes"), [({}, 2.0), ({"bounces": False}, 1.0), ({"camera": False}, 1.0)]
+)
+def test_paths_know_that_they_have_left_fog(rays: dict[str, bool], passes: float) -> None:
+    """Through fog to a mirror, back through it to a ceiling above the camera, which is lit by a
+    lamp between both: the shadow ray is outside."""
+    pixels = []
+    for sigma in (np.zeros(3) + 1e-6, SIGMA):
+        builder = wavecomb.SceneBuilder()
+        fog = filled(builder, 1.0, **absorbing(sigma))
+        box(builder, (-WIDE, -WIDE, -0.5), (WIDE, WIDE, 1.0), fog, name="/Fog")
+        builder.add_visibility("/Fog", rays)
+        mirror = builder.add_material(
+            "principled", base_color=(1, 1, 1), metallic=1.0, roughness=0.0
+        )
+        slab(builder, -1.0, 0.0, mirror)
+        slab(builder, 4.0, 5.0, builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5)))
+        lamp = np.eye(4)
+        lamp[3, 2] = 2.0
+        builder.add_light("sphere", lamp, color=(1, 1, 1), radius=0.0)
+        pixels.append(seen_from_above(builder, depth=2, height=3.0))
+    assert np.all(pixels[0] > 0.001)
+    assert np.allclose(pixels[1] / pixels[0], np.exp(-passes * SIGMA), rtol=1e-4)
+
+
+@pytest.mark.parametrize("how", ["visibility", "shadow link"])
+@pytest.mark.parametrize("ior", [1.0, 1.5])
+def test_what_casts_no_shadow_neither_stops_nor_dims_light(ior: float, how: str) -> None:
+    """A slab of fog or glass above a floor, in a scene whose paths know what they are inside of."""
+    pixels = []
+    for sigma in (np.zeros(3) + 1e-6, SIGMA):
+        builder = wavecomb.SceneBuilder()
+        inside = filled(builder, ior, **absorbing(sigma), nested_priority=1.0)
+        box(builder, (-WIDE, -WIDE, 6.0), (WIDE, WIDE, 8.0), inside, name="/Slab")
+        slab(builder, -1.0, 0.0, builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5)))
+        more = {}
+        if how == "visibility":
+            builder.add_visibility("/Slab", {"shadow": False})
+        else:
+            rules = {"/": "expand", "/Slab": "exclude"}
+            more["shadow_link"] = builder.add_geometry_set(rules)
+        builder.add_light("distant", np.eye(4), color=(1, 1, 1), angle=0.0, **more)
+        pixels.append(seen_from_above(builder, depth=1))
+    assert np.all(pixels[0] > 0.01)
+    assert np.allclose(pixels[1], pixels[0], rtol=1e-4)
+
+
+def test_shadow_rays_meet_bounds_close_behind_a_cut_out() -> None:
+    """A card that is half there, a short way below the slab: light that passes it is dimmed."""
+    pixels = []
+    for sigma in (np.zeros(3) + 1e-6, SIGMA):
+        builder = wavecomb.SceneBuilder()
+        slab(builder, 6.0, 8.0, filled(builder, 1.0, **absorbing(sigma)))
+        floor = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+        slab(builder, -1.0, 0.0, floor)
+        half = builder.add_material("diffuse", base_color=(0, 0, 0), opacity=0.5, presence=True)
+        corners = [(x * WIDE, y * WIDE, 5.9997) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+        card = builder.add_mesh(np.array(corners, np.float32), faces, material=half)
+        builder.add_to_group(0, card)
+        builder.add_light("distant", np.eye(4), color=(1, 1, 1), angle=0.0)
+        pixels.append(seen_from_above(builder, depth=1, spp=64).mean(0))
+    assert np.all(pixels[0] > 0.01)
+    assert np.allclose(pixels[1] / pixels[0], np.exp(-2.0 * SIGMA), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
     ("ior", "roughness", "anisotropy"), [(1.0, 0.0, 0.6), (1.5, 0.0, 0.0), (1.4, 0.0, -0.5)]
 )
 def test_white_media_lose_nothing(ior: float, roughness: float, anisotropy: float) -> None:
@@ -238,7 +350,7 @@ def test_lamps_draw_distances_in_meshes() -> None:
     assert np.all(np.abs(means.mean(axis=0) - 1.0) < 3.5 * error)
 
 
-def scene() -> Any:
+def scene(hidden: bool = False) -> Any:
     """A glass of a cloudy liquid that reaches into its walls, fog about it, and a floor."""
     builder = wavecomb.SceneBuilder()
     glass = filled(builder, 1.5, nested_priority=1.0)
@@ -250,7 +362,7 @@ def scene() -> Any:
         builder, 1.0, transmission_color=(0.8, 0.7, 0.6), transmission_depth=3.0,
         transmission_scatter=(0.2, 0.3, 0.4),
     )  # fmt: skip
-    box(builder, (-4, -1.2, -9), (4, 3, -3), fog)
+    box(builder, (-4, -1.2, -9), (4, 3, -3), fog, name="/Fog")
     for low, high in (((-0.6, -1, -6), (0.6, -0.85, -4.8)), ((-0.6, -1, -6), (-0.45, 1, -4.8)),
                       ((0.45, -1, -6), (0.6, 1, -4.8))):  # fmt: skip
         box(builder, low, high, glass)
@@ -258,21 +370,25 @@ def scene() -> Any:
     cherry = builder.add_material("diffuse", base_color=(0.7, 0.05, 0.05))
     box(builder, (-0.1, -0.2, -5.5), (0.1, 0.0, -5.3), cherry)
     rough = filled(builder, 1.4, 0.3, **absorbing((0.2, 1.0, 2.0)))
-    box(builder, (1.0, -1.1, -6), (1.8, 0.0, -5), rough)
+    box(builder, (1.0, -1.1, -6), (1.8, 0.0, -5), rough, name="/Rough")
     grey = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
     box(builder, (-5, -1.3, -9), (5, -1.1, -2), grey)
     lamp = np.eye(4)
     lamp[3, :3] = (1.5, 2.2, -4.0)
-    builder.add_light("sphere", lamp, color=(30, 28, 25), radius=0.4)
+    link = {}
+    if hidden:
+        builder.add_visibility("/Fog", {"bounces": False})
+        link["shadow_link"] = builder.add_geometry_set({"/": "expand", "/Rough": "exclude"})
+    builder.add_light("sphere", lamp, color=(30, 28, 25), radius=0.4, **link)
     builder.add_light("dome", np.eye(4), color=(0.2, 0.25, 0.3))
     builder.set_camera(np.eye(4), window=(-0.45, 0.45, -0.3, 0.3))
     return builder.build()
 
 
-@pytest.mark.parametrize("equiangular", ["off", "on"])
-def test_one_picture_for_all_schedules(equiangular: str) -> None:
+@pytest.mark.parametrize(("equiangular", "hidden"), [("off", False), ("on", False), ("off", True)])
+def test_one_picture_for_all_schedules(equiangular: str, hidden: bool) -> None:
     """Lanes, waves, threads, policies, packets and the reference: the same bits."""
-    made = scene()
+    made = scene(hidden)
 
     def render(**settings: Any) -> Any:
         settings |= {"spp": 4, "max_depth": 6, "equiangular": equiangular}
@@ -392,3 +508,169 @@ def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
     clear = LIQUID.replace("(0.1, 0.2, 0.3)", "(0, 0, 0)")
     for text in (LIQUID, clear + volume):
         assert what not in said(load(tmp_path, text)[1])
+
+
+def stone_in_glass(layers: dict[str, Any], low: float = -1.5) -> Any:
+    """A shining block in a block of glass from -2 to 1, or, from ``low``, below it."""
+    builder = wavecomb.SceneBuilder()
+    slab(builder, -2.0, 1.0, filled(builder, 1.5, **layers))
+    glow = builder.add_material("emissive", emission=(1.0, 2.0, 3.0))
+    box(builder, (-1.5, -1.5, low), (1.5, 1.5, low + 0.5), glow)
+    return builder
+
+
+def test_what_lies_in_absorbing_glass_is_dimmed() -> None:
+    """exp(-sigma t) of the way out; a path does not end at the glass on that segment."""
+    clear = seen_from_above(stone_in_glass({}), spp=16)
+    tinted = seen_from_above(stone_in_glass(absorbing(SIGMA)), spp=16)
+    assert clear.mean() > 0.5
+    assert np.allclose(tinted.mean(0) / clear.mean(0), np.exp(-2 * SIGMA), rtol=1e-3)
+
+
+def lit_stone(seed: int, as_volume: bool) -> Any:
+    """A grey block in rough glass that absorbs, or that is clear and filled with a volume."""
+    builder = wavecomb.SceneBuilder()
+    low, high = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
+    box(builder, low, high, filled(builder, 1.5, 0.4, **({} if as_volume else absorbing(SIGMA))))
+    if as_volume:
+        sigma = tuple(float(s) for s in SIGMA)
+        bounds = (tuple(0.9999 * x for x in low), tuple(0.9999 * x for x in high))
+        builder.add_volume(np.eye(4), bounds=bounds, extinction=sigma, albedo=(0, 0, 0))
+    grey = builder.add_material("diffuse", base_color=(0.8, 0.8, 0.8))
+    box(builder, (-0.4, -0.4, -0.3), (0.4, 0.4, 0.4), grey)
+    builder.add_light("dome", np.eye(4), color=(1, 1, 1))
+    return seen_from_above(builder, spp=64, size=16, seed=seed, roulette="off").mean(axis=0)
+
+
+def test_a_stone_in_absorbing_glass_is_one_in_an_absorbing_volume() -> None:
+    """Each segment between the glass and the stone counts, which no interface of the glass ends."""
+    mesh = np.array([lit_stone(seed, False) for seed in range(8)])
+    volume = np.array([lit_stone(seed, True) for seed in range(8, 16)])
+    error = np.sqrt(mesh.var(axis=0, ddof=1) / 8 + volume.var(axis=0, ddof=1) / 8)
+    assert np.all(error < 0.01 * volume.mean(axis=0))
+    assert np.all(np.abs(mesh.mean(axis=0) - volume.mean(axis=0)) < 4.0 * error)
+
+
+def refuses_light_paths(builder: Any) -> bool:
+    """Whether paths have to know what they are inside of, which light paths do not."""
+    camera = np.eye(4)
+    camera[3, 2] = 5.0
+    builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
+    scene = builder.build()
+    wavecomb.render(scene, size=(4, 4), spp=1)
+    try:
+        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")
+    except _core.Error as error:
+        assert "objects inside of absorbing glass" in str(error)
+        return True
+    return False
+
+
+@pytest.mark.parametrize(("low", "refused"), [(-1.5, True), (-2.5, False), (-2.2, True)])
+def test_light_paths_do_not_go_with_objects_in_absorbing_glass(low: float, refused: bool) -> None:
+    """An object inside, one that the glass stands on, and one that reaches into it."""
+    assert refuses_light_paths(stone_in_glass(absorbing(SIGMA), low)) == refused
+    assert not refuses_light_paths(stone_in_glass({}, low))
+
+
+def glass_ball(builder: Any, inwards: bool = False, radius: float = 1.0, **layers: Any) -> int:
+    """A ball of absorbing glass around the origin; or a hollow of that size."""
+    mesh = ball(radius, 24)
+    faces = mesh.faces.astype(np.uint32)
+    material = filled(builder, 1.5, **{**absorbing(SIGMA), **layers})
+    number = builder.add_mesh(mesh.points, faces[:, ::-1].copy() if inwards else faces,
+                              material=material)  # fmt: skip
+    return int(number)
+
+
+def quad(builder: Any, z: float, half: float) -> None:
+    corners = [(x * half, y * half, z) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    grey = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
+    builder.add_to_group(0, builder.add_mesh(np.array(corners, np.float32), faces, material=grey))
+
+
+@pytest.mark.parametrize(
+    ("z", "refused"), [(-0.9, True), (-1.0, False), (-1.1, False), (0.3, True)]
+)
+def test_a_ball_that_is_sunk_into_a_floor_holds_a_part_of_it(z: float, refused: bool) -> None:
+    """Two triangles none of whose vertices is in the glass."""
+    builder = wavecomb.SceneBuilder()
+    builder.add_to_group(0, glass_ball(builder))
+    quad(builder, z, 50.0)
+    assert refuses_light_paths(builder) == refused
+
+
+@pytest.mark.parametrize(("hollow", "refused"), [(False, True), (True, False)])
+def test_what_is_in_a_hollow_is_not_in_the_glass(hollow: bool, refused: bool) -> None:
+    builder = wavecomb.SceneBuilder()
+    builder.add_to_group(0, glass_ball(builder))
+    if hollow:
+        builder.add_to_group(0, glass_ball(builder, True, 0.9))
+    quad(builder, 0.0, 0.5)
+    assert refuses_light_paths(builder) == refused
+
+
+@pytest.mark.parametrize(
+    ("kind", "refused"), [("dome", False), ("distant", False), ("sphere", True)]
+)
+def test_lights_in_absorbing_glass(kind: str, refused: bool) -> None:
+    """Those that are at no place are in no glass."""
+    builder = wavecomb.SceneBuilder()
+    builder.add_to_group(0, glass_ball(builder))
+    builder.add_light(kind, np.eye(4), color=(1, 1, 1), **({"radius": 0.1} if refused else {}))
+    assert refuses_light_paths(builder) == refused
+
+
+def test_placed_glass_holds_what_is_inside_of_it() -> None:
+    """An instance that is moved, scaled and mirrored, and a floor beside it or in it."""
+    for z, refused in ((0.0, False), (2.2, True)):
+        builder = wavecomb.SceneBuilder()
+        group = builder.add_group()
+        builder.add_to_group(group, glass_ball(builder))
+        place = np.diag([-2.0, 1.0, 0.5, 1.0])
+        place[3, :3] = (30.0, 0.0, 2.0)
+        builder.add_instances(0, group, place[None].astype(np.float32))
+        quad(builder, z, 50.0)
+        assert refuses_light_paths(builder) == refused
+
+
+def test_a_search_in_many_meshes_takes_no_time() -> None:
+    """Thousands of glasses on a floor of many triangles, and as many objects beside them."""
+    import time
+
+    def seconds(layers: dict[str, Any]) -> float:
+        builder = wavecomb.SceneBuilder()
+        glass, stone = builder.add_group(), builder.add_group()
+        mesh = ball(0.4, 48)
+        faces = mesh.faces.astype(np.uint32)
+        for group, material in (
+            (glass, filled(builder, 1.5, **layers)),
+            (stone, builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))),
+        ):
+            number = builder.add_mesh(mesh.points, faces, material=material)
+            builder.add_to_group(group, number)
+        places = np.tile(np.eye(4, dtype=np.float32), (20_000, 1, 1))
+        places[:, 3, 0], places[:, 3, 1] = np.arange(20_000) % 200, np.arange(20_000) // 200
+        builder.add_instances(0, glass, places[::2])
+        builder.add_instances(0, stone, places[1::2])
+        x, y = np.meshgrid(np.linspace(-5, 205, 300), np.linspace(-5, 205, 300), indexing="ij")
+        points = np.stack([x, y, np.full_like(x, -0.5)], axis=-1).reshape(-1, 3)
+        at = np.arange(300 * 300).reshape(300, 300)
+        corners = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], -1).reshape(-1, 4)
+        faces = np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]).astype(np.uint32)
+        floor = builder.add_mesh(points.astype(np.float32), faces, material=0)
+        builder.add_to_group(0, floor)
+        begin = time.process_time()
+        camera = np.eye(4)
+        camera[3, 2] = 5.0
+        builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
+        scene = builder.build()
+        spent = time.process_time() - begin
+        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")  # nothing is in the glass
+        return spent
+
+    seconds({})
+    plain, searched = seconds({}), seconds(absorbing(SIGMA))
+    print(f"{plain:.3f} s, {searched:.3f} s with absorbing glass")
+    assert searched < plain + 1.0

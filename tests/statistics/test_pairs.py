@@ -18,7 +18,7 @@ from wavecomb import _core
 
 pytestmark = needs("wavecomb._core")
 
-FEW = (1, 4, 12, 22, 38, 105, 342)
+FEW = (1, 4, 12, 22, 27, 38, 105, 342)
 """Seeds for `make test`: some that revealed faults (docs/testing.md), and three of other kinds."""
 MANY = 500
 REFUSED = "does not go with"

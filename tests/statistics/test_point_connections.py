@@ -11,6 +11,7 @@ import pytest
 from stages import camera, light, moved, sphere, write_stage
 
 import wavecomb
+from wavecomb import _core
 
 CASES = Path(__file__).parent / "cases"
 
@@ -109,3 +110,11 @@ def test_depth_0_has_no_scattered_light(transport: str) -> None:
     path = wavecomb.render(stage, size=(32, 32), spp=4, max_depth=0)
     other = wavecomb.render(stage, size=(32, 32), spp=4, max_depth=0, transport=transport)
     assert np.array_equal(path.beauty, other.beauty)
+
+
+def test_light_paths_do_not_go_with_a_stone_in_tinted_glass() -> None:
+    """They dimmed other segments than the camera's paths did; `auto` keeps to the latter."""
+    stage = wavecomb.load(CASES / "stone_in_glass.usda")
+    with pytest.raises(_core.Error, match="objects inside of absorbing glass"):
+        mean(stage, spp=1, transport="light")
+    assert mean(stage, spp=16, transport="auto") == mean(stage, spp=16, transport="path")

@@ -93,6 +93,8 @@ struct InteriorPacket {
   InteriorState<F> s;
   InteriorLoad<F> l;
   InteriorHit<F> hit;
+  uint32_t kind = kSeenByAll;  ///< RayVisibility of the rays
+  UInt<F> shadow_set{0u};  ///< of shadow rays: ShadowRow::set, 0 where every object is in the way
 };
 /// A bound that rays of a packet have met.
 template <typename F>

@@ -8,6 +8,25 @@
 namespace wavecomb {
 
 template <typename F>
+inline Mask<F> Interiors::sees(const Rays<F>& r, const UInt<F>& object,
+                               const Mask<F>& lanes) const {
+  using U = UInt<F>;
+  Mask<F> seen = lanes;
+  if (scene_.visibility) [[unlikely]] {
+    const U bits = gather<U>(scene_.visibility, object, Mask<U>(seen));
+    seen = seen & Mask<F>((bits & r.kind) != U(0u));
+  }
+  const LinkView& links = scene_.lights.links;
+  const Mask<F> linked = seen & Mask<F>(r.shadow_set != U(0u));
+  if (!links.members || none(linked)) return seen;
+  // As casts_shadow (accel/presence.h).
+  const U set = select(Mask<U>(linked), r.shadow_set, U(1u)) - 1u;
+  const U link = gather<U>(links.classes, object, Mask<U>(linked));
+  const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(linked));
+  return seen & (not_(linked) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u)));
+}
+
+template <typename F>
 inline detail::InteriorMet<F> Interiors::meet(Rays<F>& r, Inside<F>& inside, const Bound<F>& now,
                                               const Mask<F>& lanes) const {
   using U = UInt<F>;
@@ -23,15 +42,20 @@ inline detail::InteriorMet<F> Interiors::meet(Rays<F>& r, Inside<F>& inside, con
   met.bound = met.surface & Mask<F>(kind != U(static_cast<uint32_t>(InteriorKind::kNone)));
   if (scene_.has_curves)
     met.bound = met.bound & not_(detail::is_curved<F>(scene_, place.mesh, met.surface));
+  const Mask<F> unseen = met.surface & not_(sees<F>(r, place.object, met.surface));
+  const Mask<F> by = unseen & not_(met.bound);
+  r.s.o = select<F>(by, fma(r.s.d, past_hit<F>(h.t), r.s.o), r.s.o);
+  met.passes = by;
   if (none(met.bound)) return met;
   const Surface<F> at = setup_surface<F>(scene_, {h.inst, place.mesh, h.prim, h.u, h.v, r.l.time},
                                          r.s.d, false, false, met.bound);
   const BoundMet<F> b = meet_bound<F>(scene_.interiors, inside, now, {place.object, place.material},
                                       dot(r.s.d, at.ng) < 0.f, met.bound);
-  met.passes = b.passes;
+  const Mask<F> through = b.passes | (unseen & met.bound);
+  met.passes = met.passes | through;
   met.outer = select(met.bound, b.outer, met.outer);
-  inside.take(b.after, met.passes);
-  r.s.o = select<F>(met.passes, spawn_origin<F>(at, r.s.d), r.s.o);
+  inside.take(b.after, through);
+  r.s.o = select<F>(through, spawn_origin<F>(at, r.s.d), r.s.o);
   return met;
 }
 
@@ -39,7 +63,7 @@ template <typename F>
 inline void Interiors::draw(Rays<F>& r, const Inside<F>& inside, const F& u,
                             const Mask<F>& lanes) const {
   using U = UInt<F>;
-  const InteriorMedium<F> m = medium_of<F>(inside.top(scene_.interiors, lanes).material, lanes);
+  const InteriorMedium<F> m = medium_of<F>(r, inside.top(scene_.interiors, lanes), lanes);
   const F of_hero = select(r.s.hero == U(0u), m.scattering.x,
                            select(r.s.hero == U(1u), m.scattering.y, m.scattering.z));
   const Mask<F> some = lanes & (of_hero > 0.f);
@@ -113,7 +137,7 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
   detail::InteriorLoad<F>& l = r.l;
   Inside<F> inside(l);
   const Bound<F> now = inside.top(scene_.interiors, r.active);
-  const InteriorMedium<F> medium = medium_of<F>(now.material, r.active);
+  const InteriorMedium<F> medium = medium_of<F>(r, now, r.active);
   const Mask<F> open = Mask<F>(r.hit.inst == U(kNoHit));
   F far = select(open, F(kFar), min(r.hit.t, F(kFar)));
   LampWay<F> lamp;
@@ -248,7 +272,7 @@ inline size_t Interiors::advance_shadow(const InteriorRays& all, float* const (&
   using U = UInt<F>;
   Inside<F> inside(r.l);
   const Bound<F> now = inside.top(scene_.interiors, r.active);
-  const InteriorMedium<F> medium = medium_of<F>(now.material, r.active);
+  const InteriorMedium<F> medium = medium_of<F>(r, now, r.active);
   const Mask<F> open = r.active & Mask<F>(r.hit.inst == U(kNoHit));
   const F length = select(open, r.s.rest, min(r.hit.t, r.s.rest));
   const Color<F> e = medium.absorption + medium.scattering;
@@ -256,9 +280,9 @@ inline size_t Interiors::advance_shadow(const InteriorRays& all, float* const (&
       r.l.absorbed * Color<F>(exp(F(-e.x * length)), exp(F(-e.y * length)), exp(F(-e.z * length)));
   const Vec3<F> o = r.s.o;
   const Met<F> met = meet<F>(r, inside, now, r.active & not_(open));
-  // What else there is lets this ray through: it was asked.
+  // What bounds nothing lets this ray pass, since it was found to be free of it.
   const Mask<F> by = r.active & not_(open) & not_(met.bound);
-  const F past = r.hit.t * 1.0001f + scene_.scale * 1e-6f;
+  const F past = past_hit<F>(r.hit.t);
   r.s.o = select<F>(by, fma(r.s.d, past, o), r.s.o);
   r.s.rest = r.s.rest - select(by, past, length);
   inside.store_in(r.l);

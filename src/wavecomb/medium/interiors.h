@@ -38,7 +38,7 @@ class Interiors {
         counts_(counts) {}
 
   /// What is around a point. `keys`: of any path.
-  Inside<float> surround(Vec3<float> p, float time, const PresenceKeys& keys) const;
+  Inside<float> surround(Vec3<float> p, float time, PresenceKeys keys) const;
 
   /// Takes all rays to what stops them. `hits`: theirs, afterwards those of what is seen. Where a
   /// path begins it is in `around`; null: it goes on. start(i, path) gives the InteriorStart of the
@@ -46,7 +46,8 @@ class Interiors {
   template <typename F, typename Start>
   void fly(const InteriorRays& rays, const HitSpan& hits, const InteriorEvents& events,
            const Inside<float>* around, PresenceKeys keys, const Start& start) const;
-  /// Multiplies by what shadow rays pass, whose lengths are `most`; 0: nobody asks.
+  /// Multiplies by what shadow rays pass, whose lengths are `most`; 0: nobody asks. `keys`: with
+  /// the shadow sets where lights are linked.
   template <typename F>
   void pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
             PresenceKeys keys) const;
@@ -88,11 +89,19 @@ class Interiors {
     counts_.walk_steps += n;
   }
 
+  /// Lanes of a packet whose rays see an object (placed_geometry): it is visible to their kind, and
+  /// linked to the light of a shadow ray. An object that a ray does not see neither stops nor dims
+  /// it, but the ray enters and leaves it.
   template <typename F>
-  InteriorMedium<F> medium_of(const UInt<F>& material, const Mask<F>& active) const {
-    const Mask<F> there = active & Mask<F>(material != UInt<F>(kNothing));
+  Mask<F> sees(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
+  /// The medium between a bound and the next one ahead; nothing where the ray does not see the
+  /// bound.
+  template <typename F>
+  InteriorMedium<F> medium_of(const Rays<F>& r, const Bound<F>& bound,
+                              const Mask<F>& active) const {
+    const Mask<F> there = active & Mask<F>(bound.material != UInt<F>(kNothing));
     return load_row<InteriorMedium, F>(reinterpret_cast<const float*>(scene_.interiors.media),
-                                       material, there);
+                                       bound.material, sees<F>(r, bound.place, there));
   }
   /// What else stops a ray, and how far ahead.
   template <typename F>
@@ -108,6 +117,13 @@ class Interiors {
     const F at = gather<F>(events.t, r.who, may);
     return {select(may, max(F(at - r.s.start), F(0.f)), F(kInfinity)),
             gather<U>(events.material, r.who, Mask<U>(may))};
+  }
+  /// Distance at which a ray continues past a hit at t that does not stop it and bounds nothing.
+  /// The step is just above rounding errors, since a bound may lie close behind; to meet the same
+  /// surface again costs time only.
+  template <typename F>
+  F past_hit(const F& t) const {
+    return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
   }
   /// What a ray of the packet has met, and where it goes on that passes: `s` and `inside` are then
   /// on the other side.
@@ -185,6 +201,7 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
                            const InteriorEvents& events, const Inside<float>* around,
                            PresenceKeys keys, const Start& start) const {
   using U = UInt<F>;
+  const uint32_t kind = keys.ray_kind;
   size_t left = 0;
   for (size_t i = 0; i < rays.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(rays.size - i);
@@ -215,18 +232,27 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
     r.l.absorbed = r.l.ratio = Color<F>(F(1.f));
     r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
     r.hit = hit_at<F>(hits, i);
+    r.kind = kind;
     draw<F>(r, inside, begins.first, active);
-    left += advance<F>(rays, hits, events, r, left);
+    left +=
+        scene_.visibility ? put<F>(rays, r, active, left) : advance<F>(rays, hits, events, r, left);
   }
-  run<F>(rays, left, keys,
-         [&](Rays<F>& r, size_t at) { return advance<F>(rays, hits, events, r, at); });
+  // The hits leave out bounds that are hidden from these rays, which they enter and leave all the
+  // same.
+  if (scene_.visibility) keys.ray_kind = kSeenByAll;
+  run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
+    r.kind = kind;
+    return advance<F>(rays, hits, events, r, at);
+  });
 }
 
 template <typename F>
 inline void Interiors::pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
                             PresenceKeys keys) const {
   using U = UInt<F>;
-  keys.ray_kind = kSeenByBounces;
+  // A ray enters and leaves also the bounds that do not dim it.
+  const PresenceKeys asked = keys;
+  keys.ray_kind = kSeenByAll;
   keys.shadow_set = nullptr;
   size_t left = 0;
   for (size_t i = 0; i < rays.size; i += kWidth<F>) {
@@ -249,13 +275,19 @@ inline void Interiors::pass(const InteriorRays& rays, const float* most, float* 
     r.l.time = rays.times ? load<F>(rays.times + i) : F(0.f);
     left += put<F>(rays, r, active, left);
   }
-  run<F>(rays, left, keys,
-         [&](Rays<F>& r, size_t at) { return advance_shadow<F>(rays, product, r, at); });
+  run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
+    r.kind = kSeenByShadowRays;
+    if (asked.shadow_set) {
+      const U slot = gather<U>(rays.slot, r.who, Mask<U>(r.active));
+      r.shadow_set = gather<U>(asked.shadow_set, slot * asked.shadow_stride, Mask<U>(r.active));
+    }
+    return advance_shadow<F>(rays, product, r, at);
+  });
 }
 
 /// A ray that goes any way leaves what it has not entered. What it leaves first is the innermost.
-inline Inside<float> Interiors::surround(Vec3<float> p, float time,
-                                         const PresenceKeys& keys) const {
+inline Inside<float> Interiors::surround(Vec3<float> p, float time, PresenceKeys keys) const {
+  keys.ray_kind = kSeenByAll;
   Bound<float> left[kMostInside];
   size_t count = 0;
   Inside<float> entered;
@@ -269,7 +301,7 @@ inline Inside<float> Interiors::surround(Vec3<float> p, float time,
     trace(1, keys);
     const Hit<float> h = hit_at<float>(traced(), 0);
     if (h.inst == kNoHit) break;
-    const float past = h.t * 1.0001f + scene_.scale * 1e-6f;
+    const float past = past_hit<float>(h.t);
     p = fma(d, past, p);
     if (h.inst == kLightShape) continue;
     const HitPlace<float> place = hit_place<float>(scene_, h.inst, h.geom, h.prim, true);

@@ -139,7 +139,7 @@ class Volumes : public WalksBelow {
                         wave.times.floats(0),
                         wave.pool.paths,
                         wave.pool.inside},
-                       most, product, presence_keys(wave.pool, depth, true));
+                       most, product, presence_keys(wave.pool, depth, true, context_.links()));
   }
   template <typename F>
   Color<F> passed(const Wave& wave, size_t i) const {

@@ -49,7 +49,9 @@ LightPathRefusal light_path_refusal(const Scene& scene) {
   if (scene.view().walks.media)
     return {"light that walks below surfaces", "a stage without subsurface scattering"};
   if (scene.view().interiors.media)
-    return {"media inside of meshes", "a stage without transmission scatter and priorities"};
+    return {
+        "media inside of meshes",
+        "a stage without transmission scatter, priorities and objects inside of absorbing glass"};
   if (!scene.volumes().empty())
     return {"volumes, such as '" + scene.volumes()[0].name + "'", "a stage without them"};
   return {};

@@ -70,20 +70,26 @@ bool is_glass(const Material& m, const GraphSet& graphs) {
 
 }  // namespace
 
-bool asks_for_interiors(const Material& m, bool among_volumes) {
+bool absorbs_inside(const Material& m) {
+  if (!is_solid(m) || !(m.openpbr.transmission_weight > 0) || m.graph != kNoGraph) return false;
+  InteriorMedium<float> medium{};
+  set_medium(m.openpbr, medium);
+  return is_any(medium.absorption);
+}
+
+bool asks_for_interiors(const Material& m, bool absorbing) {
   if (!is_solid(m)) return false;
   InteriorMedium<float> medium{};
   set_medium(m.openpbr, medium);
-  const bool counts = is_any(medium.scattering) ||
-                      (among_volumes && m.graph == kNoGraph && is_any(medium.absorption));
-  if (m.openpbr.transmission_weight > 0 && counts) return true;
+  if (m.openpbr.transmission_weight > 0 && is_any(medium.scattering)) return true;
+  if (absorbing && absorbs_inside(m)) return true;
   return m.openpbr.nested_priority != 0 || (is_clear(m) && is_any(medium.absorption));
 }
 
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs, bool among_volumes) {
+                                                  const GraphSet& graphs, bool absorbing) {
   if (std::ranges::none_of(materials,
-                           [&](const Material& m) { return asks_for_interiors(m, among_volumes); }))
+                           [&](const Material& m) { return asks_for_interiors(m, absorbing); }))
     return {};
   std::vector<InteriorMedium<float>> all(materials.size());
   for (size_t i = 0; i < all.size(); ++i) {

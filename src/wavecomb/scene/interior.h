@@ -46,13 +46,15 @@ struct InteriorView {
   }
 };
 
+/// Whether a material is a solid that transmits light and absorbs it inside.
+bool absorbs_inside(const Material& material);
 /// Whether a material needs paths to know what they are inside of: it scatters, has a priority, or
-/// bounds an absorbing medium that does not refract. In a scene of volumes (`among_volumes`) it
-/// does, too, where it absorbs: a path that a volume scatters inside of it has come part of its way
-/// before.
-bool asks_for_interiors(const Material& material, bool among_volumes);
+/// bounds an absorbing medium that does not refract. With `absorbing` it does, too, where it
+/// absorbs: in a scene of volumes, where a path that a volume scatters inside of it has come part
+/// of its way before, and where objects are inside of absorbing glass (scene/contents.h).
+bool asks_for_interiors(const Material& material, bool absorbing);
 /// The media of all materials; none where no material asks for them.
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
-                                                  const GraphSet& graphs, bool among_volumes);
+                                                  const GraphSet& graphs, bool absorbing);
 
 }  // namespace wavecomb

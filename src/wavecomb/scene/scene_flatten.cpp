@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/scene/contents.h"
+#include "wavecomb/scene/interior.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
@@ -162,9 +164,11 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     materials_.push_back(white);
   }
   // And collisions in what fills meshes.
-  if (std::ranges::any_of(materials_, [&](const Material& m) {
-        return asks_for_interiors(m, !volumes_.empty());
-      })) {
+  const bool absorbing = !volumes_.empty() || absorbing_glass_holds_objects(
+                                                  materials_, meshes_, groups_, geometry->instances,
+                                                  geometry->steps, lights_);
+  if (std::ranges::any_of(materials_,
+                          [&](const Material& m) { return asks_for_interiors(m, absorbing); })) {
     geometry->inside_material = static_cast<uint32_t>(materials_.size());
     Material inside;
     inside.name = "inside of meshes";

@@ -138,9 +138,8 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     has_emission = has_emission || m.emits();
   }
   if (inside_material == kInheritMaterial) return;
-  // What collides in meshes is shaded by a material of that program, too.
-  const auto in_volumes = std::ranges::count(materials, ProgramId::kVolume, &Material::program);
-  interiors = make_interiors(shaded, *graphs, in_volumes > 1);
+  // The scene has found that paths need to know what they are inside of.
+  interiors = make_interiors(shaded, *graphs, true);
 }
 
 }  // namespace wavecomb
