@@ -33,6 +33,23 @@ template <typename F>
                                 not_(path.pdf > 0.f), from_camera, path.diffuse, active);
 }
 
+/// Emission of textures and graphs at their finest level, as light samples and light paths read it,
+/// in `lanes`; in others `filtered`. Filtered values have another mean wherever emission is cut
+/// off, by an edge of the mesh or by the weights of multiple importance sampling.
+template <typename F>
+[[gnu::noinline, gnu::cold]] Color<F> finest_emission(const SceneView& scene, const MeshHit<F>& hit,
+                                                      const Surface<F>& s, const Vec3<F>& dir,
+                                                      const UInt<F>& material,
+                                                      const Color<F>& filtered,
+                                                      const Mask<F>& lanes) {
+  const Footprint<F> finest(F(0.f));
+  const auto point = [&](const Mask<F>& driven) {
+    return graph_point<F>(scene, hit, s, dir, finest, driven);
+  };
+  return select<F>(lanes, fetch_emission<F>(scene.materials, material, s.uv, finest, point, lanes),
+                   filtered);
+}
+
 /// Radiance of a light's own shape met by a path.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
@@ -71,6 +88,17 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   Color<F> emission = at.emission;
+  // What the camera sees by itself or in a mirror is found by no other technique: there textures
+  // stay filtered, as an image needs it.
+  if constexpr (Bsdf::kTextured)
+    if (at.textured && v.depth > 0) [[unlikely]] {
+      const Mask<F> varies =
+          Mask<F>((at.textured_inputs & (input_bit(Input::kEmission) | kReadsGraph)) != U(0u));
+      const Mask<F> lanes = v.depth > 1 ? varies : varies & (v.path.pdf > 0.f);
+      if (any(v.active & lanes))
+        emission = finest_emission<F>(scene, v.hit, at.s, v.path.dir, v.material, emission,
+                                      v.active & lanes);
+    }
   if (v.has(kMeshLights) && scene.mesh_lights) [[unlikely]]
     emission =
         mesh_light_emission<F>(scene, v.hit.inst, v.geom, emission, v.path, v.depth == 0, v.active);
