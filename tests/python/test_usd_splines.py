@@ -244,3 +244,43 @@ def test_what_cannot_be_drawn_is_left_out(tmp_path, text, says):
     assert not scene.meshes
     (warning,) = loaded.report.warnings
     assert "left out" in warning.what and says in warning.what
+
+
+def two_nurbs(knots="0, 0, 0, 0, 1, 1, 1, 1", point="0, 1, 0", more=""):
+    """Two cubics, each of one segment; the knots and the last point are those of the second."""
+    return f"""def NurbsCurves "C" {{
+        int[] curveVertexCounts = [4, 4]
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0),
+                            (0, 1, 0), (1, 1, 0), (2, 1, 0), ({point})]
+        double[] knots = [0, 0, 0, 0, 1, 1, 1, 1, {knots}]
+        int[] order = [4, 4]
+        float[] widths = [1, 2] ( interpolation = "uniform" )
+        {more} }}"""
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (two_nurbs(knots="0, 0, 0, nan, 1, 1, 1, 1"), "knots are not in order"),
+        (two_nurbs(point="nan, 1, 0"), "not finite"),
+        (two_nurbs(more="double[] pointWeights = [1, 1, 1, 1, nan, 1, 1, 1]"), "add up to nothing"),
+        ('def HermiteCurves "C" {\n int[] curveVertexCounts = [2, 2]\n'
+         "point3f[] points = [(0, 0, 0), (3, 0, 0), (0, 1, 0), (3, 1, 0)]\n"
+         "vector3f[] tangents = [(1, 0, 0), (1, 0, 0), (nan, 0, 0), (1, 0, 0)] }", "not finite"),
+    ],
+)  # fmt: skip
+def test_one_bad_curve_is_left_out_alone(tmp_path, text, says):
+    scene, loaded = load(tmp_path, text)
+    mesh = scene.mesh("C")
+    assert np.all(mesh["positions"][:, 1] == 0) and np.isfinite(mesh["positions"]).all()
+    assert mesh["positions"][:, 0].max() == 3
+    (warning,) = loaded.report.warnings
+    assert "1 of 2 curves left out" in warning.what and says in warning.what
+
+
+def test_parts_of_many_nurbs_curves(tmp_path, monkeypatch):
+    """Prims of many segments are worked out part by part: the same points."""
+    text = two_nurbs()
+    whole = load(tmp_path, text)[0].mesh("C")["positions"]
+    monkeypatch.setattr("wavecomb.usd.geometry.strands._AT_ONCE", 1)
+    assert np.array_equal(load(tmp_path, text)[0].mesh("C")["positions"], whole)

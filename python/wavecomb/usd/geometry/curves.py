@@ -178,7 +178,7 @@ class CurveReader:
         """The layout of curves that have no basis by name."""
         if (counts < 2).any():
             raise MeshError("a curve has less than two points")
-        return layout(prim, counts, self.time)
+        return layout(prim, counts, self.time, self.report)
 
     def _token(self, prim: Usd.Prim, name: str, known: tuple[str, ...]) -> str:
         value = str(prim.GetAttribute(name).Get(self.time) or known[0])

@@ -7,7 +7,7 @@ those of higher order are ``PARTS`` cubics each, with the true points and tangen
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,9 @@ from pxr import Usd
 
 from wavecomb.usd.geometry.nurbs import Floats, Spline, rational
 from wavecomb.usd.geometry.primvar import Primvar, as_array
-from wavecomb.usd.geometry.strands import Index, Strands, lay_out, runs
+from wavecomb.usd.geometry.strands import PER_CURVE, Index, Strands, lay_out, runs
 from wavecomb.usd.geometry.triangulate import MeshError
+from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
 """Cubics for each piece between knots that is no cubic itself."""
@@ -45,6 +46,12 @@ class NurbsStrands(Strands):
     """
 
     pieces: tuple[_Piece, ...] = ()
+
+    def only(self, kept: NDArray[np.bool_] | slice) -> NurbsStrands:
+        """Some of the curves, with their pieces."""
+        numbers = np.arange(len(self.pieces))[kept].tolist()
+        fields = {name: getattr(self, name)[kept] for name in PER_CURVE}
+        return replace(self, pieces=tuple(self.pieces[i] for i in numbers), **fields)
 
     def _bezier(self, values: NDArray[Any]) -> list[Floats]:
         out = np.empty((4, self.count, values.shape[1]))
@@ -84,30 +91,50 @@ class HermiteStrands(Strands):
         ]
 
 
-def hermite_strands(prim: Usd.Prim, counts: Index, time: Usd.TimeCode) -> HermiteStrands:
+def hermite_strands(
+    prim: Usd.Prim, counts: Index, time: Usd.TimeCode, report: LoadReport
+) -> HermiteStrands:
     """The layout of a UsdGeomHermiteCurves prim of ``counts`` points each.
 
+    Curves with tangents that are not finite are left out, with a warning.
+
     Raises:
-        MeshError: Its tangents are none.
+        MeshError: It has another number of tangents, or no curve is left.
     """
     tangents = as_array(prim.GetAttribute("tangents").Get(time))
     total = int(counts.sum())
-    if tangents is None or tangents.shape != (total, 3) or not np.isfinite(tangents).all():
+    if tangents is None or tangents.shape != (total, 3):
         have = 0 if tangents is None else len(tangents)
-        raise MeshError(f"{total} points need as many tangents, finite ones, and there are {have}")
+        raise MeshError(f"{total} points need as many tangents, and there are {have}")
     plain = lay_out(counts, "linear", "nonperiodic")
     sizes = plain.sizes | {"varying": total}
-    return HermiteStrands(
+    strands = HermiteStrands(
         "hermite", plain.wrap, plain.kept, plain.counts, plain.starts, plain.segments,
         plain.starts, sizes, tangents.astype(np.float64),
     )  # fmt: skip
+    bad = ~np.isfinite(tangents).all(axis=1)
+    if not bad.any():
+        return strands
+    good = strands.over_each(np.maximum, bad) == 0
+    _say_left_out(prim, report, good, "their tangents are not finite")
+    return replace(strands, **{name: getattr(strands, name)[good] for name in PER_CURVE})
 
 
-def nurbs_strands(prim: Usd.Prim, counts: Index, time: Usd.TimeCode) -> NurbsStrands:
+def _say_left_out(prim: Usd.Prim, report: LoadReport, good: NDArray[np.bool_], why: str) -> None:
+    if not good.any():
+        raise MeshError(why)
+    report.warn(f"{int((~good).sum())} of {len(good)} curves left out: {why}", prim.GetPath())
+
+
+def nurbs_strands(
+    prim: Usd.Prim, counts: Index, time: Usd.TimeCode, report: LoadReport
+) -> NurbsStrands:
     """The layout of a UsdGeomNurbsCurves prim of ``counts`` control points each.
 
+    Curves whose knots, order or weights make no curve are left out, with a warning.
+
     Raises:
-        MeshError: Its knots, orders or weights are none.
+        MeshError: The numbers of knots, orders or weights do not fit, or no curve is left.
     """
 
     def numbers(name: str, columns: int) -> Floats:
@@ -131,8 +158,8 @@ def nurbs_strands(prim: Usd.Prim, counts: Index, time: Usd.TimeCode) -> NurbsStr
     if len(weights) not in (0, int(counts.sum())):
         raise MeshError(f"{int(counts.sum())} points have {len(weights)} pointWeights")
     first_knot, first = np.cumsum(counts + orders) - counts - orders, np.cumsum(counts) - counts
-    known: dict[bytes, _Piece] = {}
-    pieces: list[_Piece] = []
+    known: dict[bytes, _Piece | str] = {}
+    found: list[_Piece | str] = []
     for i, (count, order) in enumerate(zip(counts.tolist(), orders.tolist(), strict=True)):
         mine = knots[first_knot[i] : first_knot[i] + count + order]
         heavy = weights[first[i] : first[i] + count] if len(weights) else None
@@ -140,9 +167,20 @@ def nurbs_strands(prim: Usd.Prim, counts: Index, time: Usd.TimeCode) -> NurbsStr
         key = np.concatenate([[order], mine, [] if heavy is None else heavy,
                               [] if span is None else span]).tobytes()  # fmt: skip
         if key not in known:
-            known[key] = _piece(Spline.of(mine, order, count, span), heavy)
-        pieces.append(known[key])
-    segments = np.array([len(one.shares) for one in pieces], np.intp)
+            try:
+                known[key] = _piece(Spline.of(mine, order, count, span), heavy)
+            except MeshError as error:
+                known[key] = str(error)
+        found.append(known[key])
+    good = np.array([not isinstance(one, str) for one in found])
+    if not good.all():
+        whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
+        _say_left_out(prim, report, good, "; ".join(whys[:3]))
+    # What a curve that is left out would have, so that values for all curves still fit.
+    segments = np.array(
+        [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
+         for i, one in enumerate(found)], np.intp,
+    )  # fmt: skip
     sizes = {
         "constant": 1,
         "uniform": len(counts),
@@ -151,8 +189,8 @@ def nurbs_strands(prim: Usd.Prim, counts: Index, time: Usd.TimeCode) -> NurbsStr
     }
     varying = np.cumsum(segments + 1) - segments - 1
     return NurbsStrands(
-        "nurbs", "nonperiodic", np.arange(len(counts)), counts, first, segments, varying, sizes,
-        tuple(pieces),
+        "nurbs", "nonperiodic", np.flatnonzero(good), counts[good], first[good], segments[good],
+        varying[good], sizes, tuple(one for one in found if not isinstance(one, str)),
     )  # fmt: skip
 
 

@@ -30,6 +30,9 @@ _TO_BEZIER: dict[str, NDArray[np.float64]] = {
 """Rows: Bezier control points of a segment from the four authored points about it."""
 
 
+PER_CURVE = ("kept", "counts", "starts", "segments", "varying_starts")
+"""Attributes of Strands that have a value for each curve."""
+
 _AT_ONCE = 1 << 16
 """Segments whose values are worked out together: bounds the memory that it takes."""
 
@@ -104,8 +107,7 @@ class Strands:
 
     def only(self, kept: NDArray[np.bool_] | slice) -> Strands:
         """Some of the curves: a slice, or those for which ``kept``, (k,), holds."""
-        fields = ("kept", "counts", "starts", "segments", "varying_starts")
-        return replace(self, **{name: getattr(self, name)[kept] for name in fields})
+        return replace(self, **{name: getattr(self, name)[kept] for name in PER_CURVE})
 
     def over_each(self, combine: np.ufunc, values: NDArray[Any]) -> NDArray[np.float64]:
         """(k,) ``combine`` over the values (n,) of each curve's authored points."""
