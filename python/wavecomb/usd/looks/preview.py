@@ -357,7 +357,11 @@ class PreviewReader:
                 matrix = _compose(matrix, self._transform_2d(node))
                 key = "in"
             elif identifier.startswith("UsdPrimvarReader_float2"):
-                self._note_uv(str(self._value(node, "varname", "") or "st"), parameter)
+                name = str(self._value(node, "varname", "") or "st")
+                self._note_uv(name, parameter)
+                if any(pair(self._value(node, "fallback"), (0.0, 0.0))):
+                    what = f"fallback of a reader of {name!r}: (0, 0) where a mesh has none"
+                    self.report.missing(what, node.GetPath())
                 return matrix
             else:
                 self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
