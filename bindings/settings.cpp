@@ -141,6 +141,7 @@ nb::dict row_dict(const SettingInfo& setting) {
   d["choices"] = choices;
   d["group"] = kGroups[static_cast<size_t>(setting.group)];
   d["changes_picture"] = setting.changes_picture;
+  d["changes_bits"] = setting.changes_bits;
   d["changes_expectation"] = setting.changes_expectation;
   return d;
 }

@@ -33,6 +33,8 @@ class Setting:
         group: "picture": what the picture is; "work": how much is done for it; "order": what
             computes it, and in which order.
         changes_picture: Whether the picture depends on it.
+        changes_bits: Whether the bits of the beauty image depend on it, where each pixel has as
+            many samples. Costs may, with cost-aware roulette.
         changes_expectation: Whether the picture that more and more samples tend to depends on it.
     """
 
@@ -48,6 +50,7 @@ class Setting:
     choices: Mapping[str, str]
     group: str
     changes_picture: bool
+    changes_bits: bool
     changes_expectation: bool
 
     @property

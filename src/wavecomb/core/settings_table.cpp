@@ -113,6 +113,12 @@ SettingInfo in_expectation(SettingInfo info) {
   return info;
 }
 
+/// Marks a setting that leaves the bits of the image unchanged at equal samples.
+SettingInfo same_bits(SettingInfo info) {
+  info.changes_bits = false;
+  return info;
+}
+
 /// Returns the settings that define the image.
 std::vector<SettingInfo> picture_settings() {
   using S = Settings;
@@ -155,7 +161,8 @@ std::vector<SettingInfo> picture_settings() {
       in_expectation(row<&S::alpha>(
           "alpha", "Alpha",
           "Makes domes and distant lights transparent to the camera, with an alpha channel.")),
-      row<&S::error>("error", "Errors", "Stores error and variance estimates of each pixel."),
+      same_bits(
+          row<&S::error>("error", "Errors", "Stores error and variance estimates of each pixel.")),
       in_expectation(number<&S::overscan>("overscan", "Overscan", 0, kMaxSize / 2,
                                           "Extra pixels to render beyond each edge of the image.")),
       number<&S::deep_samples>("deep_samples", "Deep samples", 1, kMostDeepSamples,
@@ -242,8 +249,8 @@ std::vector<SettingInfo> work_settings() {
                         "off"),
       number<&S::min_spp>("min_spp", "Min samples", 1, kMostSamples,
                           "Samples per pixel before the first error estimate."),
-      number<&S::spp>("spp", "Samples", 1, kMostSamples,
-                      "Samples per pixel; the maximum with adaptive sampling."),
+      same_bits(number<&S::spp>("spp", "Samples", 1, kMostSamples,
+                                "Samples per pixel; the maximum with adaptive sampling.")),
       choice<&S::allocate>("allocate", "Sample allocation",
                            {{"even", "The same number for all pixels."},
                             {"error", "By relative error: standard deviation over brightness."},
@@ -294,9 +301,11 @@ std::vector<SettingInfo> order_settings() {
                            "Renders passes of 1, 1, 2, 4, ... samples, so that the whole image "
                            "appears soon."),
   };
-  for (SettingInfo& setting : settings)
+  for (SettingInfo& setting : settings) {
     setting.changes_picture =
         setting.name == std::string_view("costs") || setting.name == std::string_view("integrator");
+    setting.changes_bits = false;
+  }
   return settings;
 }
 

@@ -37,6 +37,8 @@ struct SettingInfo {
   const char* help = "";   ///< one sentence
   /// Whether the image depends on the setting; otherwise it affects only how it is computed.
   bool changes_picture = true;
+  /// Whether the bits of the beauty image depend on the setting, at equal samples of each pixel.
+  bool changes_bits = true;
   /// Whether the expectation of the image depends on the setting, that is, the limit for many
   /// samples. Other settings change noise, work, or layers that describe them.
   bool changes_expectation = false;

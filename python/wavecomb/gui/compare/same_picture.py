@@ -17,14 +17,7 @@ from wavecomb.gui.scheduling.run_log import describe, differences
 from wavecomb.gui.viewport.session import Session
 from wavecomb.options import settings
 
-BITS = (
-    *(
-        name
-        for name, row in settings().items()
-        if row.changes_picture and name not in ("spp", "integrator", "costs", "error")
-    ),
-    "region",
-)
+BITS = (*(name for name, row in settings().items() if row.changes_bits), "region")
 """Settings that decide over the bits, beside the samples of each pixel."""
 
 MAX_PICTURES = 32
