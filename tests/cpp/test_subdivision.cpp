@@ -111,7 +111,18 @@ TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
   sizes[0] = 2;
   EXPECT_EQ(complaint(desc), "a face has fewer than three corners");
   sizes[0] = 2000000000;
-  EXPECT_EQ(complaint(desc), "the face counts do not add up to the number of face indices");
+  EXPECT_EQ(complaint(desc), "the face counts add up to 2000000020, but there are 24 face indices");
+  desc = cube(1);
+  const std::vector<float> values(30);
+  desc.primvars = {{PrimvarKind::kVertex, values, 3, 0}};
+  EXPECT_EQ(complaint(desc), "the wrong number of components of a primvar, 30 where the mesh needs 24");
+  const std::vector<int32_t> edges = {0, 1, 1, 2};
+  const std::vector<float> sharpness = {2};
+  desc = cube(1);
+  desc.cage.crease_edges = edges;
+  desc.cage.crease_sharpness = sharpness;
+  EXPECT_EQ(complaint(desc),
+            "the wrong number of sharpnesses of creased edges, 1 where the mesh needs 2");
   desc = cube(11);
   EXPECT_EQ(complaint(desc), "the level of subdivision must be 1 to 10");
   desc = cube(10);

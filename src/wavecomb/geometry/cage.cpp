@@ -16,18 +16,23 @@ void check_points(std::span<const int32_t> points, uint32_t count, const char* w
 
 }  // namespace
 
+void check_count(const char* things, size_t found, size_t needed) {
+  if (found == needed) return;
+  throw Error(std::string("the wrong number of ") + things + ", " + std::to_string(found) +
+              " where the mesh needs " + std::to_string(needed));
+}
+
 void check_cage(const Cage& cage) {
   size_t at = 0;
   for (const int32_t size : cage.face_sizes) {
     if (size < 3) throw Error("a face has fewer than three corners");
     if (cage.scheme == Scheme::kLoop && size != 3)
       throw Error("Loop subdivision needs triangles, but a face is not a triangle");
-    if (static_cast<size_t>(size) > cage.corners.size() - at)
-      throw Error("the face counts do not add up to the number of face indices");
     at += static_cast<size_t>(size);
   }
   if (at != cage.corners.size())
-    throw Error("the face counts do not add up to the number of face indices");
+    throw Error("the face counts add up to " + std::to_string(at) + ", but there are " +
+                std::to_string(cage.corners.size()) + " face indices");
   if (at == 0) throw Error("no faces");
   check_points(cage.corners, cage.vertex_count, "a face");
   at = 0;
@@ -42,12 +47,12 @@ void check_cage(const Cage& cage) {
   }
   check_points(cage.crease_edges, cage.vertex_count, "a crease");
   check_points(cage.corner_vertices, cage.vertex_count, "a sharp corner");
-  if (cage.crease_edges.size() != 2 * cage.crease_sharpness.size() ||
-      cage.corner_vertices.size() != cage.corner_sharpness.size())
-    throw Error("creases or corners and their sharpness values differ in number");
+  check_count("sharpnesses of creased edges", cage.crease_sharpness.size(),
+              cage.crease_edges.size() / 2);
+  check_count("sharpnesses of corners", cage.corner_sharpness.size(),
+              cage.corner_vertices.size());
   for (const FaceVaryingIndices& channel : cage.channels) {
-    if (channel.indices.size() != cage.corners.size())
-      throw Error("a face-varying primvar does not have an index for each corner");
+    check_count("indices of a face-varying primvar", channel.indices.size(), cage.corners.size());
     check_points(channel.indices, channel.value_count, "a face-varying primvar");
   }
 }
@@ -55,8 +60,7 @@ void check_cage(const Cage& cage) {
 Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
                     std::span<const float> values, uint32_t width) {
   check_points(corners, vertex_count, "a face");
-  if (values.size() != corners.size() * width)
-    throw Error("a face-varying primvar has the wrong number of values");
+  check_count("components of a face-varying primvar", values.size(), corners.size() * width);
   Welded out;
   out.indices.resize(corners.size());
   // Linked list per point of the corners with distinct values found so far.

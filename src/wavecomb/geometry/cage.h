@@ -52,6 +52,10 @@ struct Cage {
 /// description of the first fault.
 void check_cage(const Cage& cage);
 
+/// Throws Error with both counts if they differ. `things`: plural noun for the message, such as
+/// "components of a primvar".
+void check_count(const char* things, size_t found, size_t needed);
+
 /// Face-varying values without duplicates: an index for each corner, and the values that they
 /// address, (count, width).
 struct Welded {

@@ -129,8 +129,7 @@ struct Subdivision::Refiner {
   std::vector<V> refine(std::span<const float> values, Size&& size, Step&& step) const {
     const size_t width = sizeof(V) / sizeof(float);
     std::vector<V> here(size(0));
-    if (values.size() != here.size() * width)
-      throw Error("a primvar has the wrong number of values");
+    check_count("components of a primvar", values.size(), here.size() * width);
     std::copy(values.begin(), values.end(), reinterpret_cast<float*>(here.data()));
     for (int l = 1; l <= level(); ++l) {
       std::vector<V> next(size(l));

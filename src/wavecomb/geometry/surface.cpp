@@ -226,9 +226,9 @@ Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
 Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces) {
   Spread out{{primvar.values.begin(), primvar.values.end()}, faces.corners};
   if (primvar.kind == PrimvarKind::kFaceVarying) std::iota(out.at.begin(), out.at.end(), 0u);
-  for (const uint32_t i : out.at)
-    if ((size_t{i} + 1) * primvar.width > out.values.size())
-      throw Error("a primvar has the wrong number of values");
+  size_t used = 0;
+  for (const uint32_t i : out.at) used = std::max(used, (size_t{i} + 1) * primvar.width);
+  if (used > out.values.size()) check_count("components of a primvar", out.values.size(), used);
   return out;
 }
 
@@ -264,9 +264,9 @@ SurfaceValues on_triangles(const Spread& spread, uint32_t width,
 
 void check_displacement(const SurfaceDesc& desc) {
   if (desc.displacements.empty()) return;
-  if (!desc.face_displacement.empty() &&
-      desc.face_displacement.size() != desc.cage.face_sizes.size())
-    throw Error("its faces and their displacement indices differ in number");
+  if (!desc.face_displacement.empty())
+    check_count("displacements of faces", desc.face_displacement.size(),
+                desc.cage.face_sizes.size());
   for (const int32_t which : desc.face_displacement)
     if (which >= static_cast<int32_t>(desc.displacements.size()))
       throw Error("a face refers to a displacement that does not exist");
@@ -293,8 +293,8 @@ Work polygons(const SurfaceDesc& desc) {
     work.uv_at.assign(desc.triangle_corners.begin(), desc.triangle_corners.end());
   else if (desc.uvs.kind != PrimvarKind::kNone)
     work.uv_at = work.faces.corners;
-  if (!work.uv_at.empty() && work.uv_at.size() != work.faces.corners.size())
-    throw Error("a face-varying primvar has the wrong number of values");
+  if (!work.uv_at.empty())
+    check_count("indices of a face-varying primvar", work.uv_at.size(), work.faces.corners.size());
   for (const uint32_t i : work.uv_at)
     if (i >= work.uvs.size() / 2)
       throw Error("a corner refers to a texture coordinate that does not exist");
