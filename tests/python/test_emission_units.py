@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,15 +39,15 @@ SQUARE = """def Mesh "Square" (prepend apiSchemas = ["MaterialBindingAPI"]) {
 }"""
 
 
-def mean(folder: Path, prims: str) -> np.ndarray:
+def mean(folder: Path, prims: str, aperture: float = 10, **settings: Any) -> np.ndarray:
     path = folder / "stage.usda"
     path.write_text(
         '#usda 1.0\n(\ndefaultPrim = "W"\nupAxis = "Y"\n)\ndef Xform "W" {\n'
-        'def Camera "C" {\nfloat focalLength = 50\nfloat horizontalAperture = 10\n'
-        "float verticalAperture = 10\ndouble3 xformOp:translate = (0, 0, 4)\n"
+        f'def Camera "C" {{\nfloat focalLength = 50\nfloat horizontalAperture = {aperture}\n'
+        f"float verticalAperture = {aperture}\ndouble3 xformOp:translate = (0, 0, 4)\n"
         'uniform token[] xformOpOrder = ["xformOp:translate"]\n}\n' + prims + "\n}\n"
     )
-    picture = wavecomb.render(path, size=(4, 4), spp=4, max_depth=0)
+    picture = wavecomb.render(path, size=(4, 4), **({"spp": 4, "max_depth": 0} | settings))
     return picture.beauty.mean((0, 1))
 
 
@@ -79,3 +80,76 @@ def test_area_lights_are_of_the_same_unit(tmp_path: Path, kind: str) -> None:
         'float xformOp:rotateY = 180\nuniform token[] xformOpOrder = ["xformOp:rotateY"]\n}'
     )
     assert np.allclose(mean(tmp_path, light), (250, 125, 50), rtol=1e-5)
+
+
+COLOUR = np.array((1.0, 0.5, 0.2))
+EMITTED = "float inputs:intensity = 250\ncolor3f inputs:color = (1, 0.5, 0.2)\n"
+
+
+@pytest.mark.parametrize("normalize", [False, True])
+def test_domes_are_of_the_same_unit(tmp_path: Path, normalize: bool) -> None:
+    """UsdLux: a dome ignores normalize."""
+    light = f'def DomeLight "L" {{\n{EMITTED}bool inputs:normalize = {int(normalize)}\n}}'
+    assert np.allclose(mean(tmp_path, light), 250 * COLOUR, rtol=1e-5)
+
+
+def illuminance(folder: Path, light: str) -> np.ndarray:
+    """Of a white square at the origin that faces +z."""
+    matte = (
+        'def Material "M" {\ntoken outputs:surface.connect = </W/M/S.outputs:surface>\n'
+        'def Shader "S" {\nuniform token info:id = "UsdPreviewSurface"\n'
+        "color3f inputs:diffuseColor = (1, 1, 1)\nfloat inputs:ior = 1\n"
+        "float inputs:roughness = 1\ntoken outputs:surface\n}\n}\n"
+    )
+    return np.pi * mean(folder, f"{matte}{SQUARE}\n{light}", 0.1, spp=1024, max_depth=1)
+
+
+@pytest.mark.parametrize(
+    ("angle", "normalize", "expected"),
+    [
+        (0.0, False, 1.0),
+        (0.0, True, 1.0),
+        (60.0, False, np.pi * 0.25),
+        (60.0, True, 1.0),
+        (180.0, True, 1.0),
+        (270.0, False, np.pi),
+        (270.0, True, 1 / 1.5),
+    ],
+)
+def test_distant_lights_are_divided_by_their_size_factor(
+    tmp_path: Path, angle: float, normalize: bool, expected: float
+) -> None:
+    """UsdLux: 1 for no angle, pi sin^2 of half the angle up to a hemisphere, then pi (2 - sin^2).
+
+    Normalized, intensity is illuminance in lux. The square sees a hemisphere at most.
+    """
+    light = (
+        f'def DistantLight "L" {{\n{EMITTED}float inputs:angle = {angle}\n'
+        f"bool inputs:normalize = {int(normalize)}\n}}"
+    )
+    found = illuminance(tmp_path, light)
+    assert np.allclose(found, 250 * COLOUR * expected, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("radius", "point", "normalize", "expected"),
+    [
+        (0.1, False, False, np.pi * 0.01),
+        (0.1, True, False, np.pi * 0.01),
+        (0.1, True, True, 0.25),
+        (0.0, False, True, 0.25),
+    ],
+)
+def test_points_shine_as_far_spheres(
+    tmp_path: Path, radius: float, point: bool, normalize: bool, expected: float
+) -> None:
+    """UsdLux: a hint that a sphere can be taken for one of no radius. Its illuminance at a distance
+    d is pi r^2 / d^2 of its luminance, or with an area of 4 pi r^2 that divides, 1 / (4 d^2)."""
+    light = (
+        f'def SphereLight "L" {{\n{EMITTED}float inputs:radius = {radius}\n'
+        f"bool inputs:normalize = {int(normalize)}\nbool treatAsPoint = {int(point)}\n"
+        "double3 xformOp:translate = (0, 3, 4)\n"
+        'uniform token[] xformOpOrder = ["xformOp:translate"]\n}'
+    )
+    found = illuminance(tmp_path, light)
+    assert np.allclose(found, 250 * COLOUR * expected / 25 * 0.8, rtol=0.01)

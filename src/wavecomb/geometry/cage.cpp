@@ -49,8 +49,7 @@ void check_cage(const Cage& cage) {
   check_points(cage.corner_vertices, cage.vertex_count, "a sharp corner");
   check_count("sharpnesses of creased edges", cage.crease_sharpness.size(),
               cage.crease_edges.size() / 2);
-  check_count("sharpnesses of corners", cage.corner_sharpness.size(),
-              cage.corner_vertices.size());
+  check_count("sharpnesses of corners", cage.corner_sharpness.size(), cage.corner_vertices.size());
   for (const FaceVaryingIndices& channel : cage.channels) {
     check_count("indices of a face-varying primvar", channel.indices.size(), cage.corners.size());
     check_points(channel.indices, channel.value_count, "a face-varying primvar");
