@@ -7,7 +7,7 @@
 namespace wavecomb {
 namespace {
 
-/// Spreads marks to kDilation neighbours along lines of `length` values that are `step` apart.
+/// Marks the kDilation neighbours of marked values along lines of `length` values, `step` apart.
 void dilate_along(std::vector<uint8_t>& marks, size_t lines, size_t line_step, size_t length,
                   size_t step) {
   std::vector<uint8_t> line(length);
@@ -68,7 +68,7 @@ AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
 
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share) {
-  if (done < 2) return std::max(done, share);  // there is no other half
+  if (done < 2) return std::max(done, share);  // the half buffers need two samples
   const double own = noise.own * before, splats = noise.splats * done;
   if (!(own > 0)) return splats > 0 ? std::max(done, share) : done;
   const double wanted = std::ceil(after * std::sqrt(splats * active_share / own));

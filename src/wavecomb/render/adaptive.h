@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Which pixels of an adaptive render go on.
+/// Selection of the pixels that an adaptive render continues to sample.
 #pragma once
 
 #include <cstdint>
@@ -11,40 +11,45 @@
 
 namespace wavecomb {
 
-/// Pixels to each side that go on with one whose error is too large.
+/// Width in pixels of the border around noisy pixels that is sampled with them.
 inline constexpr uint32_t kDilation = 2;
 
-/// The error that a pixel may have: the setting, or what a picture of this light and of the mean
-/// relative error that is asked for would have everywhere, were its noise spread evenly. Where no
-/// pixel is above that and the picture still is (few bright pixels in the dark have most of the
-/// error, which their windows spread over many): half of the largest error, so that it goes on.
+/// Returns the largest allowed error of a pixel: Settings::adaptive, or the error that every pixel
+/// would have if the image had the mean relative error Settings::noise, spread evenly. If no pixel
+/// exceeds that value but the image still exceeds its noise target (a few bright pixels in the dark
+/// can hold most of the error), returns half of the largest error, so that the render continues.
 double error_threshold(const ErrorMap& map, const Settings& settings);
 
-/// What a look at the errors says.
+/// Result of an error check.
 struct AdaptiveCheck {
-  std::vector<uint8_t> active;  ///< by pixel; none: the render is done
+  std::vector<uint8_t> active;  ///< by pixel; all 0: the render is done
   uint64_t active_count = 0;
-  /// Samples that the picture will take in all, if errors fall with the square root of samples.
+  /// Expected number of samples of the finished image, if errors fall with the square root of the
+  /// sample count.
   uint64_t expected_samples = 0;
 };
 
-/// Looks at the pixels of settings.rendered() only, of a film of `window`. Active are those above
-/// the threshold, and those around them, that have less than the most samples. With a noise target
-/// none is once the mean relative error is within it. A pixel that was done goes on again when
-/// noise comes up beside it.
+/// Checks the pixels of settings.rendered() in a film of `window`. A pixel is active if it, or a
+/// pixel within kDilation of it, is above the threshold and it has fewer than rules.spp samples. No
+/// pixel is active once the mean relative error is within the noise target. A finished pixel
+/// becomes active again if the noise around it rises.
 AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
                              std::span<const uint32_t> samples, const Settings& settings,
                              const PassRules& rules);
 
-/// Samples of light paths at the end of a pass, after `done` of them, where those of pixels go from
-/// `before` to `after` and `share` is what that would be of as many light paths as pixels' paths.
+/// Returns the number of samples of each light path at the end of a pass.
 ///
-/// A pass takes |A| (after - before) paths of active pixels' and P for each sample of light paths,
-/// P their numbers. Of errors V_c / n + V_l / m the least at a cost has
-///   m / n = sqrt(V_l |A| / (V_c P)),
-/// with the V over the active pixels, of the halves. `share` is the most, since more of one kind
-/// would do best with other weights. What earlier passes have shown decides, so no bias comes of
-/// it.
+/// Args: `done`: samples of light paths so far; `before`, `after`: samples of pixels at the start
+/// and the end of the pass; `share`: the most samples of light paths, from the ratio of the two
+/// kinds of paths that the render uses; `active_share`: |A| / P below.
+///
+/// A pass traces |A| (after - before) paths from the |A| active pixels, and P paths for each sample
+/// of the P light paths. With n samples of pixels, m of light paths and the variances V_c and V_l
+/// of one sample, the error V_c / n + V_l / m is least for a given cost where
+///   m / n = sqrt(V_l |A| / (V_c P)).
+/// Both variances are estimated from half buffers over the active pixels. `share` is the limit
+/// because more samples of one kind would need other MIS weights. Only earlier passes decide, so
+/// the image stays unbiased.
 uint32_t light_samples_after(const NoiseParts& noise, uint32_t done, uint32_t before,
                              uint32_t after, uint32_t share, double active_share);
 

@@ -12,13 +12,14 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kLeastPilot = 8, kMostPilot = 64, kTimedPilot = 16;
-/// Pixels below this share of the picture's usual light count as that: nobody sees their noise.
+/// Fraction of the usual brightness of the image below which noise is not visible: darker pixels
+/// are weighted as if they were this bright.
 constexpr double kDarkShare = 0.25;
 
-/// What the pilot knows of pixels, by pixel.
+/// Measurements of the pilot.
 struct Pilot {
-  std::vector<double> error;  ///< deviation of a sample over light; negative: not known
-  std::vector<double> cost;   ///< of a sample; empty: not asked for
+  std::vector<double> error;  ///< by pixel: deviation over brightness; negative: unknown
+  std::vector<double> cost;   ///< by pixel: mean cost of a sample; empty: not measured
 };
 
 double light_of(const Film& film, size_t pixel) {
@@ -31,7 +32,8 @@ double light_of(const Film& film, size_t pixel) {
   return std::isfinite(light) ? std::max(0.0, light) : 0.0;
 }
 
-/// The light of the picture: the square of the mean root, which few bright pixels do not decide.
+/// Returns the usual brightness of the image: the squared mean of square roots, which a few bright
+/// pixels hardly change.
 double usual_light(const Film& film) {
   double root = 0;
   for (size_t i = 0; i < film.pixel_count(); ++i) root += std::sqrt(light_of(film, i));
@@ -62,7 +64,8 @@ Pilot measure(Film& film, bool with_cost) {
   return pilot;
 }
 
-/// Means over the pixels around each, without itself and without negative ones.
+/// Returns the mean over the window around each pixel, without the pixel and without negative
+/// values.
 std::vector<double> means_around(const std::vector<double>& values, uint32_t width,
                                  uint32_t height) {
   constexpr auto kSide = static_cast<int64_t>(kAllotWindow);
@@ -85,7 +88,7 @@ std::vector<double> means_around(const std::vector<double>& values, uint32_t wid
   return out;
 }
 
-/// Within the factors of the mean; all alike where there is nothing to tell them apart.
+/// Divides the weights by their mean and clamps them. All become 1 if they are all 0.
 void limit_weights(std::vector<double>& weights) {
   double mean = 0;
   for (const double w : weights) mean += w;
@@ -93,7 +96,8 @@ void limit_weights(std::vector<double>& weights) {
   for (double& w : weights) w = mean > 0 ? std::clamp(w / mean, kLeastWeight, kMostWeight) : 1.0;
 }
 
-/// Samples beyond the pilot of each pixel: max(0, s w - pilot) with the s that gives out `total`.
+/// Returns the samples of each pixel beyond the pilot, max(0, scale * weight - pilot), with the
+/// scale for which they add up to `total`.
 std::vector<double> fill_up(const std::vector<double>& weights, double pilot, double total) {
   double scale = 0;
   for (int round = 0; round < 64; ++round) {
@@ -112,8 +116,8 @@ std::vector<double> fill_up(const std::vector<double>& weights, double pilot, do
   return more;
 }
 
-/// Whole numbers that have `parts` as means over a hash of the pixel's number, and sum up to
-/// `total`.
+/// Rounds `parts` to integers that add up to `total`, up or down by a hash of the pixel index, so
+/// that the expected value of each is unchanged.
 std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t total, uint32_t seed) {
   const size_t count = parts.size();
   std::vector<uint32_t> out(count);
@@ -123,7 +127,7 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         std::ldexp(static_cast<double>(hash_u32<uint32_t>(static_cast<uint32_t>(i), seed)), -32);
     given += out[i] = static_cast<uint32_t>(std::floor(parts[i] + u));
   }
-  // Few are left over, or too many: pixels at even distances give or take one.
+  // The sum may be off by a little: change pixels at even distances by one.
   while (given != total) {
     const uint64_t wrong = std::min<uint64_t>(given < total ? total - given : given - total, count);
     const uint64_t before = given;
@@ -137,7 +141,7 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         --given;
       }
     }
-    if (given == before) {  // none of those had any: the first that has
+    if (given == before) {  // all of those are 0: take one from the first that is not
       --*std::find_if(out.begin(), out.end(), [](uint32_t n) { return n > 0; });
       --given;
     }
@@ -181,7 +185,8 @@ Allotment allot(Film& film, const Settings& settings, AllotmentFacts& facts) {
 
   Allotment out{pilot_samples(settings), settings.spp, {}};
   const uint32_t more = out.spp - out.pilot;
-  // Whole quanta: nets of Sobol's sequence, and few different counts, so that waves are full.
+  // Multiples of a quantum keep the samples of a pixel nets of the Sobol sequence, and give few
+  // different counts, so that waves are full.
   const uint32_t quantum = std::max(1u, std::bit_floor(settings.spp) / 8);
   const uint32_t quanta = more / quantum;
   const size_t count = film.pixel_count();

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How many samples of a render each pixel gets, by what a pilot of all pixels has shown.
+/// Number of samples of each pixel, from a pilot render of all pixels.
 ///
-/// A pixel with deviation s, mean I and cost c a sample, that has n of all N samples, adds
-/// (s / I)^2 / n to the picture's relative error and n c to its time. For a given N the error is
-/// least where n is proportional to s / I; error times time is least where it is proportional to
-/// (s / I) / sqrt(c) (Neyman, JRSS 97(4), 1934, and with costs).
+/// A pixel with standard deviation s, mean I and cost c per sample that gets n of all N samples
+/// adds (s / I)^2 / n to the relative error of the image and n c to its render time. For a given N,
+/// the error is least if n is proportional to s / I (Neyman, JRSS 97(4), 1934); error times time is
+/// least if n is proportional to (s / I) / sqrt(c).
 ///
-/// Light of splats counts for I: no pixel's samples change its noise.
+/// I includes light splats, although the samples of a pixel do not change their noise.
 ///
-/// A pixel's count must not depend on its own samples, or the mean of them is biased: s / I and c
-/// are means over the pixels around it, without itself. What is left is the scale, to which a pixel
-/// adds its share of 24 of all pixels.
+/// A pixel's count must not depend on its own samples, or its mean is biased. Therefore s / I and c
+/// are means over the surrounding pixels without the pixel itself. A pixel then influences its
+/// count only through the common scale of all weights, to which it contributes through its 24
+/// neighbours.
 #pragma once
 
 #include <span>
@@ -21,25 +22,26 @@
 
 namespace wavecomb {
 
-/// Pixels to each side of the square whose means are taken.
+/// Pixels to each side in the window of these means.
 inline constexpr uint32_t kAllotWindow = 2;
-/// Weights of pixels are within these factors of the mean one: nobody starves for having been dark
-/// by chance, and no firefly takes all.
+/// Limits of a pixel's weight, relative to the mean weight. They keep a pixel that was dark by
+/// chance from getting too few samples, and a firefly from taking all of them.
 inline constexpr double kLeastWeight = 0.125, kMostWeight = 8;
 
-/// Samples that all pixels have before they are looked at; 0: there are too few to allot, or they
-/// are even.
+/// Returns the samples per pixel of the pilot. 0 means that all pixels get the same number, because
+/// the settings ask for it or because there are too few samples.
 uint32_t pilot_samples(const Settings& settings);
 
-/// What an allotment does, by what the pilot knows.
+/// Statistics of an allotment.
 struct AllotmentFacts {
-  uint32_t pilot = 0;            ///< samples of every pixel; 0: nothing was allotted
+  uint32_t pilot = 0;            ///< samples per pixel of the pilot; 0: pixels are sampled evenly
   uint32_t least = 0, most = 0;  ///< samples of a pixel at the end
-  double gain = 0;               ///< efficiency to that of even samples, as expected; 0: not known
+  double gain = 0;               ///< predicted efficiency over even sampling; 0: unknown
 };
 
-/// Allots settings.spp samples a pixel in the mean, exactly, of which all have the pilot's. `film`
-/// has error sums, and costs for Allocate::kEfficiency, of the pilot.
+/// Distributes samples so that the mean per pixel is exactly settings.spp and every pixel has at
+/// least the samples of the pilot. `film` holds the pilot's samples with error sums, and with costs
+/// for Allocate::kEfficiency. Writes statistics to `facts`.
 Allotment allot(Film& film, const Settings& settings, AllotmentFacts& facts);
 
 }  // namespace wavecomb

@@ -13,8 +13,8 @@
 namespace wavecomb {
 namespace {
 
-/// One over how far the bounce from vertex `i` of a path went; 0: it met nothing; below 0: not
-/// known, for no more vertices are kept.
+/// Returns one over the length of the bounce ray from vertex `i`. 0: it left the scene; negative:
+/// unknown, because the next vertex was not recorded.
 float bounce_nearness(const PathHistory& history, uint32_t slot, uint32_t i) {
   if (i + 1 == BounceReader::kVertices) return -1;
   if (i + 1 >= history.count(slot)) return 0;
@@ -55,8 +55,8 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
   std::array<bool, kVertices> teaches;
   uint32_t count = 0;
   Color<float> throughput(1.f);
-  double reached = 1;  // the probability, were there roulette
-  // The vertex of the greatest depth makes no bounce.
+  double reached = 1;  // probability that a path with roulette gets here
+  // The vertex at the maximum depth has no bounce.
   for (; count < std::min(history.count(slot), plan_.most_depth); ++count) {
     const HistoryRow<float> v = history.vertex(slot, count);
     const GuidePlace<float> place = find_guide<float>(plan_.guide, v.p, v.axis, v.material, true);
@@ -71,7 +71,7 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
     step = {double{arrived}, double{luminance(throughput)},
             is_bright && !is_dead ? double{brought} : 0.0, 1, plan_.costs.vertex(v.material)};
     if (count + 1 >= plan_.roulette_depth) {
-      // Of a path that has come here, and is divided by what it went through.
+      // Throughput over brightness of a path that got here, divided by its survival probability.
       const double share = double{arrived} * double{inverse_scale} / reached;
       step.survival = place.known
                           ? double{worthwhile_survival<float>(place, static_cast<float>(share))}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Gathers what paths teach the field that guides bounces, each path's in its own place.
+/// Collects training samples for path guiding, in path order whichever worker traced the path.
 #pragma once
 
 #include <cstdint>
@@ -14,54 +14,57 @@
 
 namespace wavecomb {
 
-/// What paths have taught, path by path.
+/// Training samples, in path order.
 struct Lessons {
-  std::vector<TrainingRecord> records;  ///< bounces that brought light, of all rounds
+  std::vector<TrainingRecord> records;  ///< bounces that contributed light, of all rounds
   std::vector<BounceLesson> bounces;    ///< all bounces of the last round
-  // Of the paths of the last round.
+  // One per path of the last round:
   std::vector<float> luminances;
   std::vector<PathLesson> paths;
 };
 
-/// Costs in rays that are traced in a hierarchy.
+/// Cost model in units of one ray traced through a BVH.
 struct PathCosts {
-  double ray = 1;                         ///< of a bounce or of a shadow
-  double lookup = 0;                      ///< of the field, at a vertex
-  const CostSnapshot* shading = nullptr;  ///< of materials
+  double ray = 1;                         ///< of a bounce ray or a shadow ray
+  double lookup = 0;                      ///< of a guiding field lookup at a vertex
+  const CostSnapshot* shading = nullptr;  ///< costs of materials
 
-  /// Of a vertex and its light sample.
+  /// Returns the cost of a vertex with its light sample.
   double vertex(uint32_t material) const {
     return ray + lookup + double{shading->material(material) / kModelRayNs};
   }
 };
 
-/// What the reader has to know of a round.
+/// Parameters of a training round.
 struct LessonPlan {
-  uint32_t first, samples;  ///< of each pixel
+  uint32_t first, samples;  ///< first sample and number of samples of each pixel
   uint32_t most_depth;
   const GuideGrid& grid;
-  GuideView guide;            ///< that bounces were guided by; empty: none
-  const PictureTiles* tiles;  ///< null: not known yet
+  GuideView guide;            ///< field that guides the bounces; empty: none
+  const PictureTiles* tiles;  ///< brightness of the image; null: unknown
   PathCosts costs;
   uint32_t roulette_depth;
 };
 
-/// Contract: all workers call ended() at once, for paths of their own.
+/// Converts finished paths to training samples.
+///
+/// Contract: workers may call ended() concurrently, each for different paths.
 class BounceReader final : public HistoryReader {
  public:
-  /// Vertices of a path that teach.
+  /// Most vertices of a path that become training samples.
   static constexpr uint32_t kVertices = 6;
 
-  /// Paths of `pixels`, as `plan` says, which outlives the reader.
+  /// `pixels` and `plan` must outlive the reader.
   BounceReader(std::span<const uint32_t> pixels, const LessonPlan& plan);
 
   uint32_t most() const override { return kVertices; }
   void ended(const PathHistory& history, const float* radiance, const WaveTask& task) override;
-  /// Appends what they taught, path by path.
+  /// Appends the training samples in path order.
   void append_to(Lessons& lessons) const;
 
  private:
-  /// What the path in `slot` has taught: number `path`, over a pixel of one over `inverse_scale`.
+  /// Adds the training samples of the path in `slot`. `end`: its radiance; `path`: its index;
+  /// `inverse_scale`: one over the brightness of the image at its pixel.
   void read(const PathHistory& history, uint32_t slot, const Color<float>& end, size_t path,
             float inverse_scale);
   void add_record(size_t path, const HistoryRow<float>& v, const GuidePlace<float>& place,
@@ -69,8 +72,8 @@ class BounceReader final : public HistoryReader {
 
   std::span<const uint32_t> pixels_;
   const LessonPlan& plan_;
-  std::vector<TrainingRecord> records_;  ///< kVertices of each path
-  std::vector<BounceLesson> bounces_;    ///< kVertices of each path
+  std::vector<TrainingRecord> records_;  ///< kVertices for each path
+  std::vector<BounceLesson> bounces_;    ///< kVertices for each path
   std::vector<uint8_t> record_counts_, bounce_counts_;
   std::vector<float> luminance_;
   std::vector<PathLesson> paths_;

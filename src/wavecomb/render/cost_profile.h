@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Costs that a render has measured, by name.
+/// Measured shading costs by name.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Costs by name of material and of texture, nanoseconds a record: a profile that a later render of
-/// the same stage can start from.
+/// Costs of materials and textures by name, in nanoseconds per shading record. A later render of
+/// the same stage can start from them.
 struct CostProfile {
   std::vector<std::pair<std::string, float>> materials, textures;
 };

@@ -16,55 +16,57 @@
 namespace wavecomb {
 namespace {
 
-/// Share of a render's samples that training may take, and its most and least paths.
+/// Training takes one path for every kTrainingShare samples of the render, within these limits.
 constexpr uint64_t kTrainingShare = 8, kMostTrainingPaths = 700'000, kLeastTrainingPaths = 16'384;
-/// Of Guiding::kAuto.
+/// The same for Guiding::kAuto, which does not train with fewer paths.
 constexpr uint64_t kAutoShare = 100, kLeastAutoPaths = 200'000;
-/// Paths without which that is not worth it, where their cost leaves fewer.
+/// Least number of training paths for Guiding::kAuto if cost limits them.
 constexpr uint64_t kFewestAutoPaths = 120'000;
-/// Paths that a thread teaches in a second, until the first round tells, and the shares of a time
-/// limit that may go to them.
+/// Training paths per thread and second, assumed before the first round is timed, and the divisors
+/// of a time limit that give the time for training (the second for Guiding::kAuto).
 constexpr double kTaughtInSecond = 50'000, kTimeShare = 8, kAutoTimeShare = 25;
-/// Of Guiding::kAuto: the share of a time limit after which it gives up, and that where it is
-/// known to pay.
+/// For Guiding::kAuto: divisors of the time limit after which training gives up, at first and once
+/// guiding is known to reduce noise.
 constexpr double kMostTimeShare = 20, kMostPaidTimeShare = 4;
-/// Of Guiding::kAuto: what training may cost, as a share of the picture, where it is counted; and
-/// what a path that teaches costs beside its rays and vertices, which are kept, read and sorted.
+/// For Guiding::kAuto: largest cost of training as a fraction of the cost of the render, and the
+/// cost of recording and sorting the vertices of a training path, as a factor on its rays and
+/// shading.
 constexpr double kAutoCostShare = 0.05, kTeachingCost = 1.5;
-/// Samples of a trial, twice, and those of a pixel: as many as the picture has, of some. (Sobol's
-/// points gain by their number, and by what a pixel is smooth, which guiding makes less of.)
+/// Paths in each image of a pilot render, and limits of its samples per pixel. It renders fewer
+/// pixels rather than fewer samples, because the noise of Sobol samples falls with their number the
+/// faster the smoother a pixel is, and guiding makes the integrand less smooth.
 constexpr uint64_t kTrialPaths = 65'536;
 constexpr uint32_t kLeastTrialSamples = 16, kMostTrialSamples = 32;
-/// Samples of a pixel that tell how they spread, for a roulette.
+/// Samples per pixel from which the variance is estimated for learned roulette.
 constexpr uint32_t kSpreadSamples = 16;
-/// Share of the paths that teach, of more that tell how samples spread.
+/// One such sample for every kSpreadShare training paths.
 constexpr uint64_t kSpreadShare = 8;
-/// Share of the paths that differ most and do not count for the picture's variance.
+/// Fraction of paths with the largest differences that are left out of the variance.
 constexpr double kUncountedPaths = 0.001;
-/// Efficiency to the same without the field that is worth it, for trials scatter, and promise more
-/// than longer renders keep; and that which half of the training has to promise, so that the other
-/// half follows.
+/// Least measured gain in efficiency for which the render is guided, and for which training
+/// continues after its first half. The first is well above 1, because pilot renders scatter and
+/// overestimate the gain of longer renders.
 constexpr double kWorthwhileGain = 1.5, kPromisingGain = 1.2;
 constexpr uint32_t kTrainingRounds = 3;
-/// The round after which half of the training has been.
+/// Round after which the gain is measured, at about half of the training.
 constexpr uint32_t kHalfway = 1;
 
-/// A number of paths, at most as many as are ever taken.
+/// Converts to a number of paths, at most kMostTrainingPaths.
 uint64_t as_count(double paths) {
   return static_cast<uint64_t>(std::min(paths, static_cast<double>(kMostTrainingPaths)));
 }
 
-/// Paths that are a share of a render's samples.
+/// Returns one path for every `share` samples of the render, at most kMostTrainingPaths.
 uint64_t share_of_samples(const Settings& settings, uint64_t share) {
   const uint64_t samples = uint64_t{settings.width} * settings.height * settings.spp;
   return std::min(samples / share, kMostTrainingPaths);
 }
 
-/// Paths that training may take; 0: too few to learn from.
+/// Returns the number of training paths; 0: too few to learn from.
 uint64_t training_paths(const Settings& settings, uint32_t threads) {
   const bool is_auto = settings.guiding == Guiding::kAuto;
   uint64_t paths = share_of_samples(settings, is_auto ? kAutoShare : kTrainingShare);
-  // A limit of time is a render's only measure where it has more samples than it can take.
+  // With a time limit, the sample count may be out of reach, so time bounds the training.
   if (settings.time_limit > 0) {
     const double taught = double{settings.time_limit} * threads * kTaughtInSecond /
                           (is_auto ? kAutoTimeShare : kTimeShare);
@@ -73,9 +75,9 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
   return paths >= (is_auto ? kLeastAutoPaths : kLeastTrainingPaths) ? paths : 0;
 }
 
-/// Cost and variance of a path: of those of the last round, which are of `pixels`, with what
-/// roulette adds. `spread`: the variance without; where it is not known yet, neighbours tell. The
-/// paths that differ most do not count, as in trials.
+/// Returns the mean cost and variance of a path, from the paths of the last round, which belong to
+/// `pixels`, with the effect of roulette. `spread`: variance without roulette; if it is unknown,
+/// estimated from differences between neighbours. Leaves out the paths that differ most.
 PathLesson mean_path(const Lessons& lessons, std::span<const uint32_t> pixels,
                      const PictureTiles& tiles, std::optional<double> spread) {
   PathLesson mean;
@@ -96,7 +98,8 @@ PathLesson mean_path(const Lessons& lessons, std::span<const uint32_t> pixels,
   return mean;
 }
 
-/// One training: its rounds, and for Guiding::kAuto whether they pay.
+/// One training with all its rounds. For Guiding::kAuto it also decides whether to continue and
+/// whether the render uses the field.
 class Trainer {
  public:
   Trainer(const WaveContext& render, const Scene& scene, const WaveSetup& waves, uint64_t budget,
@@ -118,8 +121,8 @@ class Trainer {
         trial_pixels_(some_pixels(order_, kTrialPaths / trial_samples_)),
         field_(std::make_shared<const GuideField>(grid_)) {
     settings_.seed = 0x2545f491u;
-    // A survivor of roulette brings many times what it stands for: noise that hides what aiming
-    // wins.
+    // Roulette multiplies the contribution of survivors, and this noise would hide the gain of
+    // guiding.
     settings_.roulette = RouletteKind::kOff;
     if (is_auto() && is_timed()) most_s_ = double{settings_.time_limit} / kMostTimeShare;
     context_.settings = &settings_;
@@ -145,7 +148,7 @@ class Trainer {
   }
 
  private:
-  /// The settings without what makes a render one of a part.
+  /// Returns the settings of the whole image, without region, crop and AOVs.
   static Settings whole_picture(Settings settings) {
     settings.region.reset();
     settings.crop = false;
@@ -155,7 +158,7 @@ class Trainer {
   bool is_auto() const { return trial_settings_.guiding == Guiding::kAuto; }
   bool is_timed() const { return settings_.time_limit > 0; }
   bool guides() const { return trial_settings_.guiding != Guiding::kOff; }
-  /// Whether the render was stopped, or training takes too much of its time.
+  /// Returns whether the render was stopped or training has used up its time.
   bool ended() const { return stopped_() || seconds_since(start_) > most_s_; }
 
   GuideTraining result(bool used) {
@@ -183,7 +186,7 @@ class Trainer {
     return view;
   }
 
-  /// What the field there is brings, as trials tell it; 0 where they cannot.
+  /// Returns the gain in efficiency of the current field, measured by a pilot render; 0: unknown.
   double tell_gain(const Trial& without) {
     if (!tiles_->is_lit() || field_->facts().regions == 0) return 0;
     const GuideView guide = view();
@@ -194,21 +197,22 @@ class Trainer {
     return statistics_.gain;
   }
 
-  /// Of Guiding::kAuto: whether the rounds after `round`, which has cost `cost`, are worth it. Sets
-  /// what they may take.
+  /// For Guiding::kAuto: returns whether to continue after `round`, whose paths had the cost
+  /// `cost`. Updates the budget.
   bool goes_on(uint32_t round, double cost, const Trial& without) {
     if (round == 0) return can_afford(cost, without);
     if (round != kHalfway) return true;
     const double gain = tell_gain(without);
     if (gain >= kWorthwhileGain) {
-      // It is guided then: what more paths cost, a better field brings back.
+      // The render will be guided, so more training pays through a better field.
       budget_ = std::max(budget_, most_paths());
       if (is_timed()) most_s_ = double{settings_.time_limit} / kMostPaidTimeShare;
     }
     return gain >= kPromisingGain;
   }
 
-  /// Lowers the budget to what the picture's cost allows. `cost`: of the first round's paths.
+  /// Lowers the budget to what the cost of the image allows. `cost`: cost of the first round's
+  /// paths. Returns false if too few paths are left.
   bool can_afford(double cost, const Trial& without) {
     if (is_timed()) return true;
     const auto samples = static_cast<double>(settings_.spp * uint64_t{order_.size()});
@@ -220,7 +224,7 @@ class Trainer {
     return budget_ >= kFewestAutoPaths;
   }
 
-  /// Paths that training may take altogether where it pays, by what they have taken so far.
+  /// Returns the most training paths for a render that will be guided, from the speed so far.
   uint64_t most_paths() const {
     const uint64_t most = share_of_samples(settings_, kTrainingShare);
     if (!is_timed()) return std::min(most, as_count(picture_paths_ / kTrainingShare));
@@ -229,8 +233,8 @@ class Trainer {
     return std::min(most, as_count(taught * (1 + std::max(0.0, left) / taught_s_)));
   }
 
-  /// Teaches by the paths of a round, and makes the field of what was taught so far. Gives what
-  /// the paths cost.
+  /// Traces the paths of a round and builds the field from all training samples so far. Returns the
+  /// cost of the paths.
   double run(uint32_t round) {
     const uint64_t wanted = (budget_ << round) / ((1u << kTrainingRounds) - 1);
     const auto samples = static_cast<uint32_t>(std::max<uint64_t>(1, wanted / order_.size()));
@@ -268,7 +272,7 @@ class Trainer {
     return cost;
   }
 
-  /// The variance of a path by a field, of paths that are as well spread as the picture's.
+  /// Returns the variance of a path guided by `field`, for samples distributed as in the image.
   double spread_with(const GuideField& field) const {
     GuideView taught = field.view();
     tiles_->apply(taught);
@@ -279,8 +283,8 @@ class Trainer {
   }
 
   const Clock::time_point start_ = Clock::now();
-  const Settings trial_settings_;  ///< as the picture is
-  Settings settings_;              ///< as paths that teach are
+  const Settings trial_settings_;  ///< of the whole image
+  Settings settings_;              ///< of the training paths
   const WaveSetup waves_;
   const Scene& scene_;
   uint64_t budget_;
@@ -295,8 +299,8 @@ class Trainer {
   const uint32_t trial_samples_;
   const std::vector<uint32_t> trial_pixels_;
   double most_s_ = std::numeric_limits<double>::infinity();
-  double taught_s_ = 0;  ///< of the rounds, trials aside
-  /// Paths that would cost what the picture does, where that is counted.
+  double taught_s_ = 0;  ///< time of the rounds, without pilot renders
+  /// Number of training paths that cost as much as the image, if known.
   double picture_paths_ = std::numeric_limits<double>::infinity();
   Lessons lessons_;
   uint32_t first_sample_ = 0;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Teaches the field that guides bounces, before the first pass.
+/// Trains the guiding field before the first pass.
 ///
-/// Paths of the whole picture's camera are traced in rounds of twice as many each, the first by the
-/// materials alone, the others by the field that the rounds before have taught. Nothing of it
-/// depends on seed, region, threads, waves or lanes; so parts of a picture, a resumed one and
-/// merged ones are guided alike. Its paths are not in the picture, which a field made of its own
-/// samples would bias.
+/// Camera paths over the whole image are traced in rounds, each with twice as many paths as the one
+/// before. The first round samples the BSDFs only, the others use the field of the rounds before.
+/// The result does not depend on seed, region, threads, waves or lanes, so that crops, resumed
+/// renders and merged renders are guided by the same field. Training paths do not contribute to the
+/// image, because a field built from the samples that it guides would bias them.
 #pragma once
 
 #include <functional>
@@ -22,40 +22,40 @@ namespace wavecomb {
 
 struct WaveContext;
 
-/// What a render says of it.
+/// Statistics of the training.
 struct GuideStatistics {
-  GuideFacts facts;    ///< of the last field that was made
-  uint64_t paths = 0;  ///< that taught; 0: nothing was learned
+  GuideFacts facts;    ///< of the last field that was built
+  uint64_t paths = 0;  ///< training paths; 0: nothing was learned
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;
-  /// Of Guiding::kAuto: efficiency of some pixels with the field to the same without; 0: not known.
+  /// For Guiding::kAuto: efficiency with the field over efficiency without, measured in pilot
+  /// renders; 0: unknown.
   double gain = 0;
-  /// Of the roulette that was learned, as training expects it: the share of vertices from which
-  /// paths go on.
+  /// Expected fraction of vertices at which a path survives learned roulette.
   double survival = 1;
-  bool used = false;  ///< whether the picture is guided, or its roulette told, by the field
+  bool used = false;  ///< whether the render uses the field for bounces or roulette
   double seconds = 0;
-  bool is_kept = false;  ///< learned by a render that this one goes on with
+  bool is_kept = false;  ///< taken over from an earlier render or a checkpoint
 };
 
-/// What came of it.
+/// Result of the training.
 struct GuideTraining {
   std::shared_ptr<const GuideField> field;  ///< null: nothing was learned
-  std::optional<PictureTiles> tiles;        ///< of the picture, with a field
+  std::optional<PictureTiles> tiles;        ///< brightness of the image; set if there is a field
   GuideStatistics statistics;
 };
 
-/// The field and the tiles as kernels read them. Contract: valid as long as `training`.
+/// Returns the device layout of the field and of the tiles. Contract: valid as long as `training`.
 GuideView view_of(const GuideTraining& training);
 
-/// The grid of a scene's field.
+/// Returns the grid of a scene's guiding field.
 GuideGrid grid_of(const Scene& scene);
 
-/// Whether a render with such settings is guided, or told where paths end, by what is learned.
+/// Returns whether the settings ask for path guiding or learned roulette.
 bool is_taught(const Settings& settings);
 
-/// Trains for a render with `context`, whose lights are weighed. `stopped`: give up; what comes
-/// back is then of no use.
+/// Trains the field for a render with `context`, whose lights are calibrated. Gives up if `stopped`
+/// returns true; the result is then invalid.
 GuideTraining train_guide(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                           const std::function<bool()>& stopped);
 

@@ -14,12 +14,12 @@ namespace wavecomb {
 namespace {
 
 constexpr std::array<uint32_t, 2> kTrialSeeds = {0x6c078965u, 0x9908b0dfu};
-/// Share of a trial's pixels that differ most and do not count.
+/// Fraction of pixels with the largest differences that are left out.
 constexpr double kUncounted = 0.005;
-/// Paths whose vertices are kept at once: some 30 MB.
+/// Paths whose vertices are held at once: about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
 
-/// Cost of what an integrator has done, in rays of a hierarchy.
+/// Returns the cost of the work that an integrator has done, in rays traced through a BVH.
 double cost_of(const Integrator& integrator, const WaveSetup& waves, bool has_list, bool looks_up) {
   double rays = 0, records = 0;
   for (uint32_t i = 0; i < waves.threads; ++i)
@@ -49,7 +49,7 @@ double mean_without_largest(std::vector<double>& values, double share) {
 
 double teach(WaveContext context, const WaveSetup& waves, std::span<const uint32_t> pixels,
              const LessonPlan& plan, Lessons& lessons, const std::function<bool()>& stopped) {
-  // Integrators keep vertices where somebody reads them when they are made.
+  // An integrator records vertices only if there is a reader when it is made.
   BounceReader nobody({}, plan);
   context.histories = &nobody;
   const std::unique_ptr<Integrator> integrator = make_integrator(

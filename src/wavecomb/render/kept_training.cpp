@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Changes with what follows it.
+/// Version of the packed format. Increase it when the format changes.
 constexpr uint32_t kKeptFormat = 2;
 
 class ByteWriter {
@@ -54,7 +54,7 @@ class ByteReader {
     values.resize(count);
     take(values.data(), count * sizeof(T));
   }
-  /// Throws Error where anything is left.
+  /// Throws Error if any bytes are left.
   void end() const { check(left_.empty()); }
 
  private:
@@ -70,7 +70,7 @@ class ByteReader {
   std::span<const std::byte> left_;
 };
 
-/// Writes or reads what statistics keep.
+/// Writes or reads the statistics.
 template <typename Archive, typename Statistics>
 void pass_statistics(Archive& archive, Statistics& s) {
   archive.value(s.facts.records);
@@ -97,7 +97,7 @@ void pass_parts(Archive& archive, Parts& parts) {
   archive.row(parts.survival);
 }
 
-/// The settings with all that training does not ask about as in a fresh one.
+/// Returns the settings with those that do not affect training reset to their defaults.
 Settings that_teach(Settings settings) {
   const Settings fresh;
   settings.seed = fresh.seed;
@@ -116,7 +116,7 @@ Settings that_teach(Settings settings) {
   settings.traversal = fresh.traversal;
   settings.cost_weight = fresh.cost_weight;
   settings.progressive = fresh.progressive;
-  // Of a limit of time they say how many paths there are.
+  // With a time limit, the number of training paths depends on the number of threads.
   if (!(settings.time_limit > 0)) settings.threads = fresh.threads;
   return settings;
 }

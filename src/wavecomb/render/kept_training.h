@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What was learned, kept for a later render, which then learns nothing again: as bytes, in a
-/// checkpoint of a render that goes on; or as it is, where a scene is rendered once more.
+/// Reuse of a training by later renders, which skip their own: as bytes in a checkpoint, or in
+/// memory when a scene is rendered again.
 #pragma once
 
 #include <cstddef>
@@ -14,22 +14,22 @@
 
 namespace wavecomb {
 
-/// The bytes of a training: as many as the field has, and a few hundred. Empty where nothing was
-/// learned, since the render is too short or was stopped before.
+/// Serializes a training: the size of the field and a few hundred bytes. Returns nothing if nothing
+/// was learned, because the render is too short or was stopped.
 std::vector<std::byte> packed_training(const GuideTraining& training);
 
-/// The training that packed_training() gave `bytes` of, for the same scene and size of the picture.
-/// Throws Error where they are not such.
+/// Restores the training that packed_training() wrote, for the same scene and image size. Throws
+/// Error if `bytes` are damaged or of another version or build.
 GuideTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
                                 const Settings& settings);
 
-/// The last training, for renders of the same scene with settings that lead to the same: seeds,
-/// regions, layers and what never changes the picture may be others.
+/// Cache of the last training, reused by renders of the same scene whose settings lead to the same
+/// training: seed, region, layers and scheduling may differ.
 ///
 /// Contract: one thread at a time.
 class GuideTrainingCache {
  public:
-  /// train_guide(), or what it gave before.
+  /// Returns the cached training, or calls train_guide().
   std::shared_ptr<const GuideTraining> get(const std::shared_ptr<const Scene>& scene,
                                            const WaveContext& context, const WaveSetup& waves,
                                            const std::function<bool()>& stopped);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The kernels of each lane width that this build has.
+/// Kernels for the lane widths of this build.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// The kernels of one width.
+/// Kernels for one lane width.
 struct LaneKernels {
   using RunWave = void (*)(Wave&, const WaveContext&, const WaveTask&);
   RunWave run = nullptr;
@@ -19,17 +19,18 @@ struct LaneKernels {
   double (*time_material)(Wave&, const WaveContext&, const CalibrationHits&) = nullptr;
 };
 
-/// Null pointers for a width that this build has no kernels for.
+/// Returns the kernels for a lane width. All pointers are null if this build has none.
 LaneKernels lane_kernels(uint32_t lanes);
-/// Lane widths that this build has kernels for, ascending.
+/// Returns the lane widths of this build in ascending order.
 std::vector<uint32_t> lane_widths();
-/// The width to use where `wanted` is asked for; 0: the widest. Throws Error for one that is not
-/// there.
+/// Returns the lane width to use: `wanted`, or the widest for 0. Throws Error for a width that this
+/// build does not have.
 uint32_t choose_lanes(uint32_t wanted);
-/// The integrator that the settings ask for: waves of `lanes` lanes, or the reference.
+/// Creates the wavefront integrator with `lanes` lanes, or the scalar reference integrator.
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveContext& context,
                                             uint32_t lanes, uint32_t threads, uint32_t wave_size);
-/// The -march that this library is compiled with: "native", "x86-64-v3" ...; "default" without one.
+/// Returns the -march value that this library was compiled with ("native", "x86-64-v3"), or
+/// "default".
 const char* library_name();
 
 }  // namespace wavecomb

@@ -25,13 +25,13 @@ void look_up_field(const GuideTraining& training, const SeenPlace& place, Learne
     out.density[i] = guide_pdf<float>(view, found, bin_direction(i), true);
 }
 
-/// Counts what evenly spaced numbers choose, as vertices at the place do.
+/// Counts the lights that evenly spaced random numbers select at the point.
 void count_lights(const Learned& learned, const SeenPlace& place, LearnedPlace& out) {
   const Scene& scene = *learned.scene;
-  const LightParts parts = divide_lights(scene, false);  // for their names
+  const LightParts parts = divide_lights(scene, false);  // gives the names
   LightView lights = scene.view().lights;
   if (lights.count == 0 || lights.count > kMostWeighed) return;
-  if (parts.size() == 0) {  // a lamp, or an emissive mesh, by itself
+  if (parts.size() == 0) {  // a single light or emissive mesh
     out.light_shares.emplace_back("the only light", 1.f);
     return;
   }

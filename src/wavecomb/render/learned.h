@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render has learned that bears on a place: where light comes from as bounces are guided
-/// there, and which lights are chosen there. For those who want to look at it; kernels read the
-/// same tables.
+/// Lookup of learned data at a surface point: the guiding distribution and the selection
+/// probabilities of lights. Kernels read the same tables.
 #pragma once
 
 #include <array>
@@ -18,42 +17,41 @@
 
 namespace wavecomb {
 
-/// What a render learned before its first pass. Nothing of it changes any more.
+/// Data that a render learned before its first pass. Does not change afterwards.
 struct Learned {
-  std::shared_ptr<const Scene> scene;              ///< that was rendered
+  std::shared_ptr<const Scene> scene;              ///< the rendered scene
   bool by_tree = false;                            ///< LightView::by_tree
-  std::shared_ptr<const LightCalibration> lights;  ///< null: shares are those of power
-  std::shared_ptr<const GuideTraining> training;   ///< with or without a field
+  std::shared_ptr<const LightCalibration> lights;  ///< null: lights are chosen by power
+  std::shared_ptr<const GuideTraining> training;   ///< may have no field
 };
 
-/// A surface, as a path meets it.
+/// Surface point at which learned data is looked up.
 struct SeenPlace {
-  Vec3<float> p, n;       ///< n: unit, on the side that it is seen from
-  uint32_t material = 0;  ///< of the scene
+  Vec3<float> p, n;       ///< n: unit normal on the viewer's side
+  uint32_t material = 0;  ///< index into the scene's materials
 };
 
-/// What was learned of a place.
+/// Learned data at a surface point.
 struct LearnedPlace {
-  /// Which way the surface faces, of kGuideAxes; whether the field has a region there.
+  /// Axis that the surface faces (one of kGuideAxes), and whether the field has a region there.
   uint32_t axis = 0;
   bool known = false;
-  /// With a region: density of directions per steradian, rows of kGuideSide x kGuideSide bins of
-  /// the square (learn/directions.h).
+  /// If `known`: density per steradian of the guiding distribution, kGuideSide rows of kGuideSide
+  /// bins of the square map of directions (learn/directions.h).
   std::vector<float> density;
-  float guided_share = 0;  ///< of bounces, by region and material
-  /// Probability with which roulette lets a path go on that would bring the brightness of the
-  /// picture with a throughput of 1; 0: not known.
+  float guided_share = 0;  ///< fraction of bounces that sample the guiding field
+  /// Survival probability of learned roulette for a throughput equal to the brightness of the
+  /// image, before clamping (learn/worth.h); 0: unknown.
   float survival = 0;
-  /// Names of lights and emissive meshes with the probability of their choice there, largest
-  /// first; those of 0 are left out. Empty where there is no light, or where there are more than
-  /// kMostWeighed.
+  /// Names of lights and emissive meshes with their selection probability at the point, largest
+  /// first, without those of probability 0. Empty if there are no lights or more than kMostWeighed.
   std::vector<std::pair<std::string, float>> light_shares;
 };
 
-/// Choices of lights that the shares of LearnedPlace are counted in.
+/// Number of light selections from which the probabilities are counted.
 inline constexpr uint32_t kCountedChoices = 4096;
 
-/// Looks `place` up.
+/// Looks up the learned data at `place`.
 LearnedPlace look_up(const Learned& learned, const SeenPlace& place);
 
 }  // namespace wavecomb

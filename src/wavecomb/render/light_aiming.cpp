@@ -16,12 +16,13 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kAimRounds = 4, kAimSeed = 0x9e3779b9u;
-/// Of the picture, along each side, that places are looked for in.
+/// Cells along each side of the image through which rays look for surface points.
 constexpr uint32_t kSeenCells = 48;
-/// Paths of a round: a quarter of one sample of the picture's, but so many at least and at most.
+/// Paths of a round: one for every kAimShare pixels of the image, within these limits.
 constexpr uint64_t kAimShare = 4, kLeastAimPaths = 8192, kMostAimPaths = 131'072;
 
-/// Spheres around what the camera sees, with as much room again for what throws light there.
+/// Returns spheres around the points that the camera sees. Their radii are doubled, to include
+/// objects that reflect or focus light onto these points.
 LightAim aim_at_seen(const Scene& scene, const EmbreeAccelerator& accel, const Settings& settings,
                      float scene_radius) {
   std::vector<AimLesson> seen;
@@ -34,8 +35,8 @@ LightAim aim_at_seen(const Scene& scene, const EmbreeAccelerator& accel, const S
   return aim;
 }
 
-/// The first `count` numbers of paths, as pixels (below the picture, where it is small), to be
-/// traced once.
+/// Returns a plan with one sample of each of the first `count` light paths. Path numbers are coded
+/// as pixels, which may lie below the image if it is small.
 PassPlan first_paths(const Settings& settings, uint64_t count, uint32_t sample) {
   PassPlan plan;
   plan.pixels.reserve(count);
@@ -57,7 +58,7 @@ LightAiming learn_to_aim(const WaveContext& render, const Scene& scene, const Wa
   settings.crop = false;
   settings.aovs = {};
   settings.seed = kAimSeed;
-  // A survivor of roulette brings many times what it stands for.
+  // Roulette would multiply the contribution of survivors, which adds noise.
   settings.roulette = RouletteKind::kOff;
   const FilterTable filter(settings.filter, settings.used_filter_width());
   const SplatFilter splat_filter = splat_filter_of(*render.camera, filter, settings.rendered());

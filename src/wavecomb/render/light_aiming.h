@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Learns where to aim paths from lights, before the first pass.
+/// Learns where to aim light paths, before the first pass.
 ///
-/// Paths are traced in rounds, the first aimed at what the camera sees, the others at what the
-/// round before has found. They are not in the picture. Nothing of it depends on seed, region,
-/// samples, threads, waves or lanes: so parts of a picture, a resumed one and merged ones are aimed
-/// alike.
+/// Light paths are traced in rounds. The first round aims at the points that the camera sees, the
+/// others at the results of the round before. These paths do not contribute to the image. The
+/// result does not depend on seed, region, samples, threads, waves or lanes, so that crops, resumed
+/// renders and merged renders aim alike.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +16,15 @@
 
 namespace wavecomb {
 
-/// What came of it, and what a render says of it.
+/// Result of learning to aim, with statistics.
 struct LightAiming {
-  LightAim aim;        ///< of no spheres: paths are not aimed
-  uint64_t paths = 0;  ///< that taught
+  LightAim aim;        ///< without spheres: paths are not aimed
+  uint64_t paths = 0;  ///< training paths
   double seconds = 0;
 };
 
-/// Learns for a render with `context`, whose lights are weighed and send paths. `stopped`: give up;
-/// what comes back is then of no use.
+/// Learns for a render with `context`, whose lights are calibrated and send paths. Gives up if
+/// `stopped` returns true; the result is then invalid.
 LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped);
 

@@ -7,10 +7,11 @@
 namespace wavecomb {
 namespace {
 
-constexpr double kStep = 0x1p-20;  ///< of sums
-/// Shares are taken to be no less, so that terms are no more than 2^24 and sums of 2^19 fit.
+constexpr double kStep = 0x1p-20;  ///< resolution of sums
+/// Lower limit of probabilities in sums. Terms are then at most 2^24, and a sum of 2^19 of them
+/// fits in 64 bits.
 constexpr double kLeastShare = 0x1p-8;
-constexpr double kMostMean = 64;  ///< of N - M
+constexpr double kMostMean = 64;  ///< limit of |N - M|
 constexpr int kIterations = 24;
 
 int64_t to_steps(double value) {
@@ -40,7 +41,7 @@ void LightBalance::add(size_t cell, size_t part, double value, double weight) {
 std::vector<double> LightBalance::gains(std::span<const double> p) const {
   struct Term {
     double a, r, inverse;
-    int64_t bounces_less_lights;  ///< what the sample says of N - M
+    int64_t bounces_less_lights;  ///< estimate of N - M from this sample
   };
   const auto term = [&](const Sample& s) {
     const double share = std::max(p[s.part], kLeastShare), a{s.a}, r{s.r};
@@ -51,7 +52,7 @@ std::vector<double> LightBalance::gains(std::span<const double> p) const {
   for (const Sample& s : samples_) cells[s.cell] += term(s).bounces_less_lights;
   for (const Sample& s : samples_) {
     const Term t = term(s);
-    // Of the other vertices: a sample must not be its own mean.
+    // The mean over the other vertices: with the sample itself, the estimate would be biased.
     const uint64_t others = vertices_[s.cell] - 1;
     double mean = 0;
     if (others > 0)
@@ -106,7 +107,8 @@ float NodeBalance::odds() const {
   double least = INFINITY;
   float best = 1;
   for (int i = -kSteps; i <= kSteps; ++i) {
-    // Some samples that are alike on both sides: few others do not move the odds far.
+    // A prior of kPrior samples with equal contributions from both sides keeps a few samples from
+    // changing the odds much.
     const double odds = std::exp2(0.5 * i);
     const double sum = static_cast<double>(squares_[static_cast<size_t>(i + kSteps)]) +
                        mean * kPrior * (2 + odds + 1 / odds) / 4;

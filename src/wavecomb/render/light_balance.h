@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shares of lights out of samples: what each brings, beside what bounces find.
+/// Selection probabilities of lights from samples, with the multiple importance sampling of light
+/// samples and bounces taken into account.
 ///
-/// One light sample, of density p q over directions (p the probability of the light, q its own),
-/// and a bounce of density b, by the balance heuristic, have at a vertex the variance
+/// A vertex takes one light sample of density p q over directions (p the probability of the light,
+/// q the density of its sampling) and one bounce of density b, combined by the balance heuristic.
+/// Their variance is
 ///
 ///   sum over lights of  integral g^2 / (p q + b)  -  M^2 - N^2,      g = f |cos| Le V,
 ///   M = sum of integral g p q / (p q + b),   N = sum of integral g b / (p q + b),
 ///
-/// M and N being what light samples and bounces bring in the mean. For a sum of all p of 1 it is
-/// least where
+/// where M and N are the expected contributions of light samples and of bounces. With probabilities
+/// that add up to 1, it is least where
 ///
 ///   G = E_q[(a / (p + r))^2] - 2 (N - M) E_q[a r / (p + r)^2],   a = g / q, r = b / q,
 ///
-/// is alike for all lights that have a share at all: p is proportional to the square root of the
-/// second moment where bounces do not find a light, and 0 where they find it as well.
+/// has the same value for all lights of nonzero probability. Then p is proportional to the square
+/// root of the second moment for a light that bounces do not find, and 0 for one that bounces find
+/// as well as light samples do.
 #pragma once
 
 #include <array>
@@ -23,21 +26,23 @@
 
 namespace wavecomb {
 
-/// Samples of the choice of a light, and the shares that follow from them. All sums over samples
-/// are in integers, so that their order does not matter.
+/// Samples of the light selection, and the selection probabilities that follow from them. Sums over
+/// samples are integers, so that they do not depend on the order.
 class LightBalance {
  public:
-  /// Samples are taken with these `shares` of the parts (> 0), in so many cells: vertices that are
-  /// alike, for which M and N are taken together.
+  /// `shares`: selection probabilities (> 0) of the parts while samples are taken. `cells`: number
+  /// of groups of similar vertices, each of which has its own M and N.
   LightBalance(std::span<const double> shares, size_t cells);
 
-  /// A choice of `part` in `cell`: `value` is what the light sample brought, times its MIS weight,
-  /// over the scale of the picture there; `weight` that MIS weight. What is not finite counts as
-  /// nothing, what is above kMostValue as that.
+  /// Adds a selection of `part` at a vertex in `cell`. `value`: contribution of the light sample
+  /// times its MIS weight, over the brightness of the image there. `weight`: that MIS weight.
+  /// Ignores values that are not finite, and clamps to kMostValue the value that the sample would
+  /// have at a selection probability of 1.
   void add(size_t cell, size_t part, double value, double weight);
 
-  /// The shares of least variance, of which kFloor is given out by heads and by `power` (> 0, sum
-  /// 1), half each; `power` where no part has brought anything. The sum is 1, each share above 0.
+  /// Returns the selection probabilities of least variance. The fraction kFloor is distributed half
+  /// evenly and half by `power` (> 0, sum 1). Returns `power` if no part contributed. All are above
+  /// 0, and the sum is 1.
   std::vector<double> shares(std::span<const double> power) const;
 
   static constexpr double kFloor = 0.1;
@@ -48,27 +53,27 @@ class LightBalance {
     uint32_t cell, part;
     float a, r;
   };
-  /// G of each part at shares p.
+  /// Returns G of each part at the selection probabilities p.
   std::vector<double> gains(std::span<const double> p) const;
 
   std::vector<double> first_;
-  std::vector<uint64_t> choices_;   ///< of each part
-  std::vector<uint64_t> vertices_;  ///< of each cell
-  std::vector<Sample> samples_;     ///< that brought something
+  std::vector<uint64_t> choices_;   ///< by part
+  std::vector<uint64_t> vertices_;  ///< by cell
+  std::vector<Sample> samples_;     ///< with a contribution
 };
 
-/// How the odds at a node of a tree are to be changed, from samples below it.
+/// Odds between the two children of a light tree node, from samples of the lights below it.
 class NodeBalance {
  public:
-  /// A light sample below the node, on its right or left, whose child had the probability
-  /// `probability`; value and weight as LightBalance::add.
+  /// Adds a light sample below the node. `right`: it is below the right child; `probability`:
+  /// selection probability of its child; `value`, `weight`: see LightBalance::add.
   void add(bool right, double probability, double value, double weight);
-  /// Factor of the odds of the right child, of least second moment: a power of sqrt(2) within
-  /// [1/8, 8]; 1 where samples are few.
+  /// Returns the factor on the odds of the right child for which the second moment is least: a
+  /// power of sqrt(2) in [1/8, 8], or 1 if there are too few samples.
   float odds() const;
 
  private:
-  static constexpr int kSteps = 6;  ///< to each side
+  static constexpr int kSteps = 6;  ///< in each direction
   static constexpr uint64_t kLeast = 64, kPrior = 16;
   std::array<uint64_t, 2 * kSteps + 1> squares_{};
   uint64_t count_ = 0;

@@ -19,14 +19,14 @@
 namespace wavecomb {
 namespace {
 
-/// Paths of a large picture, and of any; between them one for four pixels.
+/// Calibration traces one path for every kPixelsOfPath pixels, within these limits.
 constexpr uint32_t kMostPaths = 16384, kLeastPaths = 1024, kPixelsOfPath = 4;
-/// Vertices of a path that choose a light.
+/// Vertices of a path at which a light is selected.
 constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
-/// Nodes above this depth of the light tree are balanced.
+/// Light tree nodes above this depth are balanced.
 constexpr uint32_t kTiltDepth = 6;
-/// Most lights of a tree whose nodes are: it is copied, 64 bytes each.
+/// Largest light tree whose nodes are balanced: the nodes are copied, 64 bytes for each light.
 constexpr size_t kMostTilted = size_t{1} << 20;
 
 uint32_t path_count(const Settings& settings) {
@@ -35,7 +35,7 @@ uint32_t path_count(const Settings& settings) {
       std::clamp<uint64_t>(pixels / kPixelsOfPath, kLeastPaths, kMostPaths));
 }
 
-/// Pixels all over the picture: M. Roberts' R2 sequence, in integers.
+/// Returns pixels spread over the whole image by M. Roberts' R2 sequence, in integer arithmetic.
 std::vector<uint32_t> spread_pixels(const Settings& settings, uint32_t count) {
   std::vector<uint32_t> pixels(count);
   for (uint32_t i = 0; i < count; ++i) {
@@ -47,7 +47,7 @@ std::vector<uint32_t> spread_pixels(const Settings& settings, uint32_t count) {
   return pixels;
 }
 
-/// Odds at the upper nodes of the tree, by the samples that went through them.
+/// Returns the changed odds of the upper tree nodes, from the samples that passed through them.
 std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes& probes,
                                     std::span<const double> scales) {
   std::unordered_map<uint32_t, size_t> index;
@@ -81,7 +81,7 @@ std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes
   return tilts;
 }
 
-/// Whether a calibration for `a` serves `b`.
+/// Returns whether a calibration for settings `a` is valid for `b`.
 bool alike(const Settings& a, const Settings& b) {
   return a.width == b.width && a.height == b.height && a.max_depth == b.max_depth &&
          a.filter == b.filter && a.used_filter_width() == b.used_filter_width() &&
@@ -89,7 +89,8 @@ bool alike(const Settings& a, const Settings& b) {
          a.cosine_sampling == b.cosine_sampling && a.texture_filter == b.texture_filter;
 }
 
-/// The paths through the scene of `view`, whose lights have the shares to calibrate with.
+/// Traces the calibration paths through the scene of `view`, whose lights have the initial
+/// probabilities.
 LightProbes trace_probes(const Scene& scene, const EmbreeAccelerator& accel, const SceneView& view,
                          const Settings& settings, std::span<const uint32_t> pixels,
                          const std::function<bool()>& stopped) {
@@ -138,7 +139,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMostTilted;
   if (parts.size() < 2 && !has_nodes) return out;
 
-  // Half by heads, so that what power thinks little of is looked at, too.
+  // Mix with even probabilities, so that lights of little power are sampled too.
   std::vector<double> even(parts.size());
   for (size_t i = 0; i < parts.size(); ++i)
     even[i] = 0.5 * parts.power[i] + 0.5 / static_cast<double>(parts.size());

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Finds out, before the first pass, what each light brings to the picture.
+/// Estimates the contribution of each light to the image before the first pass, and sets the
+/// selection probabilities of lights accordingly.
 ///
-/// Paths of the whole picture's camera choose lights with other shares than the picture will. What
-/// light samples bring with their MIS weight, so beside what bounces find anyway, over the scale of
-/// the picture around, decides over the shares (render/light_balance.h). Nothing of it depends on
-/// seed, sampler, samples, region, threads, waves or lanes; so parts of a picture, a resumed one
-/// and merged ones have the same shares.
+/// Camera paths over the whole image select lights with probabilities between those of power and
+/// even ones. The contributions of the light samples with their MIS weights, relative to the
+/// brightness of the image around, give the new probabilities (render/light_balance.h). The result
+/// does not depend on seed, sampler, samples, region, threads, waves or lanes, so that crops,
+/// resumed renders and merged renders use the same probabilities.
 #pragma once
 
 #include <functional>
@@ -17,29 +18,29 @@
 
 namespace wavecomb {
 
-/// Lights weighed for one camera, and how that came about.
+/// Lights calibrated for one camera, with statistics.
 struct LightCalibration {
-  LightParts parts;       ///< none: there was nothing to share out
-  WeighedLights weighed;  ///< for the picture
+  LightParts parts;       ///< empty: nothing to calibrate
+  WeighedLights weighed;  ///< calibrated probabilities
   uint32_t paths = 0;
-  uint32_t tilted_nodes = 0;  ///< of the light tree
+  uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
   double seconds = 0;
-  bool kept = false;  ///< of an earlier render of the same
+  bool kept = false;  ///< taken over from an earlier render
 };
 
-/// Calibrates the lights of `scene` for `settings`, of which the size of the whole picture, the
-/// filter, max_depth and what changes materials' responses count. On the threads of the caller's
-/// arena. `stopped`: give up; what comes back is then of no use.
+/// Calibrates the lights of `scene` for the size of the whole image, the filter, max_depth and the
+/// settings that change the response of materials. Runs on the threads of the caller's arena. Gives
+/// up if `stopped` returns true; the result is then invalid.
 LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& accel,
                                   const SceneView& view, const Settings& settings,
                                   const std::function<bool()>& stopped);
 
-/// The last calibration, for renders of the same scene with the same settings.
+/// Cache of the last calibration, reused by renders of the same scene with the same settings.
 ///
 /// Contract: one thread at a time.
 class LightCalibrationCache {
  public:
-  /// calibrate_lights(), or what it gave before.
+  /// Returns the cached calibration, or calls calibrate_lights().
   std::shared_ptr<const LightCalibration> get(const std::shared_ptr<const Scene>& scene,
                                               const EmbreeAccelerator& accel, const SceneView& view,
                                               const Settings& settings,

@@ -13,12 +13,12 @@ namespace {
 
 constexpr uint32_t kNumbers = 1u << 24;
 
-/// A part in the making: a record, or the triangles of a mesh.
+/// Candidate for a part: a light record, or the triangles of an emissive mesh.
 struct Candidate {
   double power;
   std::string name;
-  uint32_t record;  ///< or kNoLight
-  uint32_t mesh;    ///< index into LightParts::of_mesh, or kNoLight
+  uint32_t record;  ///< or kNoLight for a mesh
+  uint32_t mesh;    ///< index into LightParts::of_mesh; kNoLight for a record
 };
 
 void add_records(const Scene& scene, size_t count, std::span<const double> powers,
@@ -31,7 +31,7 @@ void add_records(const Scene& scene, size_t count, std::span<const double> power
     if (powers[i] > 0) out.push_back({powers[i], scene.lights()[input[i]].name, i, kNoLight});
 }
 
-/// Emissive meshes, in the order of their triangles, which is that of the instances.
+/// Adds the emissive meshes in the order of their triangles, which is the order of the instances.
 void add_meshes(const Scene& scene, LightParts& parts, std::vector<Candidate>& out) {
   const LightSet& set = scene.light_set();
   if (set.triangles.empty()) return;
@@ -57,8 +57,8 @@ void add_meshes(const Scene& scene, LightParts& parts, std::vector<Candidate>& o
     if (powers[m] > 0) out.push_back({powers[m], meshes[m]->name, kNoLight, m});
 }
 
-/// Makes parts of candidates: one each, in their order, and one of the weakest at the end where
-/// there would be more than `most`.
+/// Makes one part of each candidate, in their order. If there are more than `most`, the weakest
+/// together form the last part.
 void make_parts(const std::vector<Candidate>& candidates, size_t most, LightParts& parts) {
   std::vector<size_t> by_power(candidates.size());
   std::iota(by_power.begin(), by_power.end(), size_t{0});
@@ -98,7 +98,7 @@ void weigh_tree(const LightSet& set, const LightTree& tree, const LightParts& pa
     const uint32_t part = parts.of_record[i];
     if (part == kNoPart) continue;
     const double share = shares[part] * double{tree.infinite_pdf[i]} / parts.power[part];
-    // The tree keeps some in any case, and each light behind this one has a number.
+    // Leave at least a thousandth to the tree, and one random value to each later light.
     const uint32_t kept = std::min(kNumbers / 1000, left - to_come) + to_come - 1;
     --to_come;
     numbers[i] = std::min(left - kept, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));

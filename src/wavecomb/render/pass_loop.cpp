@@ -31,10 +31,10 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
       throw Error("the counts of samples to resume from are not of such a render");
     allotment_ = {rules_.pilot, *least, *most, 0};
   }
-  // The light of a region, too, comes of the paths of the whole picture.
+  // A render of a region also needs the light paths of the whole image.
   if (settings.joins_light())
     light_order_ = morton_pixel_order({0, 0, settings.width, settings.height});
-  // Those that camera paths connect to are traced with them.
+  // Light paths that camera paths connect to are traced in the same wave as these.
   if (settings.connects())
     std::erase_if(light_order_, [region = settings.rendered()](uint32_t pixel) {
       return region.contains(pixel & 0xffffu, pixel >> 16);
@@ -54,7 +54,8 @@ PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
     all_begun &= samples[i] > 0;
   }
   may_be_cut_ = all_begun;
-  // What a render without a limit has begun may be a long pass: here one sample each comes first.
+  // An interrupted pass of a render without a time limit may be long. One sample for each pixel
+  // comes first.
   if (rules_.timed && !all_begun) pass_.target = std::min(pass_.target, 1u);
   if (!rules_.adaptive || pass_.light_target == 0)
     pass_.light_target = light_share_.samples(pass_.target);
@@ -113,7 +114,7 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   const uint64_t active = active_pixels_;
   if (active == 0 || (done >= rules_.spp && !rules_.adaptive)) return false;
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
-  // Pixels of an adaptive render that go on late catch up.
+  // Pixels that become active again late catch up with the others.
   pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
   pass_.light_target = light_share_.samples(pass_.target);
   if (rules_.adaptive && done > 0 && !light_order_.empty())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Pass after pass, until the picture is what the settings ask for.
+/// Loop over the passes of a render.
 #pragma once
 
 #include <atomic>
@@ -20,28 +20,30 @@
 
 namespace wavecomb {
 
-/// Contract: run() on one thread, within the runner's arena; status() on any. What is rendered
-/// depends on film, settings and pass alone, but where there is a time limit.
+/// Renders passes until the settings' goal is reached: samples, error or time.
+///
+/// Contract: run() on one thread, within the runner's arena; status() on any thread. The rendered
+/// samples depend on film, settings and pass only, unless there is a time limit.
 class PassLoop {
  public:
-  /// `pass`: of the film, where it comes from a checkpoint. `step`: samples a pixel that a pass of
-  /// a render that is not adaptive adds. `light_share`: of paths from lights, where there are any.
-  /// `before_lights`: called before the paths of a pass that start at lights, after the others; or
-  /// null.
+  /// `pass`: the state that belongs to the film, if both come from a checkpoint. `step`: samples
+  /// per pixel that a pass adds if the render is not adaptive. `light_share`: number of light
+  /// paths, if there are any. `before_lights`: called in each pass between its camera paths and its
+  /// light paths; may be null.
   PassLoop(const Settings& settings, uint32_t step, PassState pass, LightPathShare light_share,
            Film& film, PassRunner& runner, RenderCosts& costs, Watch& watch,
            std::function<void()> before_lights = nullptr);
 
   void run();
   RenderStatus status() const;
-  /// While the work stands still.
+  /// State of the pass. Contract: while no worker runs.
   const PassState& pass() const { return pass_; }
   const AllotmentFacts& allotment() const { return allotment_; }
 
  private:
-  /// Paths from lights that the pass is to have still; none where there are no such paths.
+  /// Plans the remaining light paths of the pass; empty if the render has none.
   PassPlan light_plan() const;
-  /// Decides on the next pass. False: the picture is done.
+  /// Sets up the next pass. Returns false if the image is finished.
   bool begin_pass(std::span<const uint32_t> samples);
   bool is_late() const;
   double seconds() const;
@@ -56,11 +58,11 @@ class PassLoop {
   Watch& watch_;
   std::function<void()> before_lights_;
   std::vector<uint32_t> order_;
-  std::vector<uint32_t> light_order_;  ///< of the numbers of paths from lights
+  std::vector<uint32_t> light_order_;  ///< Morton order of light path numbers
   AllotmentFacts allotment_;
   Clock::time_point start_ = Clock::now();
   uint64_t resumed_samples_ = 0;
-  double samples_per_s_ = 0;  ///< of the last pass
+  double samples_per_s_ = 0;  ///< speed of the last pass
   std::atomic<bool> may_be_cut_{false};
   std::atomic<uint32_t> passes_{0};
   std::atomic<uint64_t> expected_samples_{0}, active_pixels_{0};

@@ -9,7 +9,7 @@
 namespace wavecomb {
 namespace {
 
-/// Share of the time left that a pass may take by the speed so far: what remains takes ever
+/// Fraction of the time left that a pass may take at the current speed. The rest is filled by ever
 /// shorter passes.
 constexpr double kPassShare = 0.75;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a pass renders: which pixels, from which sample on, how many. Pure functions of what the
-/// film holds, of the settings, and of the time left where there is a limit.
+/// Planning of a pass: which pixels it renders, from which sample on, and how many samples. Pure
+/// functions of the film's sample counts, the settings, and the time left if there is a limit.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +12,17 @@
 
 namespace wavecomb {
 
-/// Adaptive renders look at errors at multiples of this many samples a pixel: two blocks of each
-/// half (ErrorSums), and a net of Sobol's sequence.
+/// Adaptive renders check errors at multiples of this many samples per pixel: two blocks of each
+/// half buffer (ErrorSums), and a net of the Sobol sequence.
 inline constexpr uint32_t kCheckSamples = 16;
 
-/// Samples that pixels are to have, where they are not all to have the same (render/allotment.h).
+/// Target samples of each pixel if they differ (render/allotment.h).
 struct Allotment {
-  uint32_t pilot = 0;            ///< samples that all have first; 0: pixels are alike
-  uint32_t spp = 0;              ///< in the mean
-  std::vector<uint32_t> counts;  ///< by pixel, at the end; empty until the pilot is done
+  uint32_t pilot = 0;            ///< samples of the pilot; 0: pixels are sampled evenly
+  uint32_t spp = 0;              ///< final mean per pixel
+  std::vector<uint32_t> counts;  ///< final samples by pixel; empty until the pilot is done
 
-  /// Samples that a pixel has when the mean is `target`.
+  /// Returns the samples of a pixel when the mean is `target`.
   uint32_t at(size_t pixel, uint32_t target) const {
     if (counts.empty() || target <= pilot) return target;
     const uint64_t more = counts[pixel] - pilot;
@@ -30,48 +30,50 @@ struct Allotment {
   }
 };
 
-/// Where a pass stands: what a checkpoint keeps beside the film.
+/// State of a pass. A checkpoint keeps it with the film.
 struct PassState {
-  uint32_t target = 0;        ///< samples that each pixel of the pass has at its end; or the mean
-  uint32_t light_target = 0;  ///< likewise of paths from lights, where there are any
-  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1: of the pass. Empty: all are
+  uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
+  uint32_t light_target = 0;      ///< samples of each light path after the pass
+  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1 if active; empty: all are
   Allotment allotment{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
 };
 
-/// What the settings say of passes.
+/// Settings that determine passes.
 struct PassRules {
-  uint32_t spp = 1;      ///< samples a pixel at most
-  uint32_t min_spp = 0;  ///< adaptive: before the first look at errors
+  uint32_t spp = 1;      ///< most samples per pixel
+  uint32_t min_spp = 0;  ///< adaptive: samples before the first error check
   bool adaptive = false;
-  bool timed = false;        ///< there is a limit: passes must fit
+  bool timed = false;        ///< the render has a time limit
   uint32_t step = 16;        ///< not adaptive: samples that a pass adds
-  bool progressive = false;  ///< passes double from one sample on
-  uint32_t pilot = 0;        ///< a pass ends when pixels have so many; 0: they are alike
+  bool progressive = false;  ///< sample counts double from one sample on
+  uint32_t pilot = 0;        ///< a pass ends at this sample count; 0: pixels are sampled evenly
 };
 
-/// Time until the limit, and the speed so far.
+/// Time until the limit, and rendering speed so far.
 struct TimeLeft {
   double seconds = std::numeric_limits<double>::infinity();
   double samples_per_s = 0;
 };
 
-/// Whether an adaptive render looks at errors when its pixels have `n` samples: at min_spp, rounded
-/// up, then at steps of a quarter of the power of two below, at least kCheckSamples; and at spp.
-/// So nobody gets more than a quarter beyond what is needed, and counts are sums of two or three
-/// nets. Nothing else decides, so no wave size and no thread count can.
+/// Returns whether an adaptive render checks errors when its pixels have `n` samples. The first
+/// check is at min_spp, rounded up to a multiple of kCheckSamples, and the last at spp. The step in
+/// between is a quarter of the power of two below n, at least kCheckSamples. So a pixel gets at
+/// most a quarter more samples than it needs, and sample counts are sums of two or three Sobol
+/// nets. Since only n decides, wave size and thread count do not change the image.
 bool is_check(uint32_t n, const PassRules& rules);
 
-/// The first check after `done` samples.
+/// Returns the sample count of the first check after `done` samples.
 uint32_t next_check(uint32_t done, const PassRules& rules);
 
-/// Samples that pixels have at the end of the pass that begins when they have `done` (< spp);
-/// `pixels` are active. Timed and progressive: passes double from one sample on. Timed: they shrink
-/// by powers of two as the limit comes near, so that the last one, which the limit cuts, is short.
+/// Returns the sample count at the end of a pass that begins with `done` (< spp) samples in each of
+/// `pixels` active pixels. Timed and progressive renders double the count from one sample on. Near
+/// the time limit, passes shrink by powers of two, so that the last pass, which the limit cuts
+/// short, is a short one.
 uint32_t next_target(uint32_t done, const PassRules& rules, const TimeLeft& left, uint64_t pixels);
 
-/// Pixels [begin, end) of a plan; each has samples [0, first_sample) and is to get `samples` more.
+/// Pixels [begin, end) of a plan, which have the samples [0, first_sample) and get `samples` more.
 struct PassBatch {
   size_t begin, end;
   uint32_t first_sample, samples;
@@ -83,11 +85,11 @@ struct PassPlan {
   uint64_t samples() const;
 };
 
-/// What is left of a pass: its pixels below the target, those of one sample count and one target
-/// together, fewest samples first.
+/// Plans the remaining work of a pass: its active pixels below their target, grouped by sample
+/// count and target, fewest samples first.
 ///
-/// Args: `order`: the pixels that are rendered (x | y << 16); `window`: the film's; `samples` each
-/// pixel of it has, row by row. Empty batches: the pass is done.
+/// Args: `order`: the rendered pixels (x | y << 16); `window`: pixels of the film; `samples`:
+/// sample count of each film pixel, row by row. Returns no batches if the pass is done.
 PassPlan plan_pass(std::span<const uint32_t> order, const Region& window,
                    std::span<const uint32_t> samples, const PassState& pass);
 

@@ -12,19 +12,19 @@
 namespace wavecomb {
 namespace {
 
-/// A hit, in columns of one.
+/// Columns of a single hit, as the accelerator writes them.
 struct OneHit {
   float t, u, v;
   uint32_t prim, geom, inst;
 };
 
-/// Of the shutter: what moves is picked where it is then.
+/// Shutter time at which moving objects are picked: the middle.
 constexpr float kMiddle = 0.5f;
 
 OneHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {
   OneHit hit{};
   const float time = kMiddle;
-  const uint32_t path = 0;  // partly present surfaces are there for some paths: for this one
+  const uint32_t path = 0;  // decides whether partly present surfaces are hit
   accel.intersect(
       {&ray.o.x, &ray.o.y, &ray.o.z, &ray.d.x, &ray.d.y, &ray.d.z, &ray.tfar, nullptr, 1, &time},
       {&hit.t, &hit.u, &hit.v, &hit.prim, &hit.geom, &hit.inst}, 1, false, {&path, &path, 1, 0});

@@ -11,7 +11,7 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kMostRows = 16, kPathsOfTile = 64;
-/// Of sums, relative to the median; and what one path counts for at most.
+/// Resolution of sums, and largest luminance that counts, both relative to the median.
 constexpr double kStep = 0x1p-20, kMostOfMedian = 64;
 
 }  // namespace
@@ -33,7 +33,7 @@ PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> p
   std::vector<Tile> tiles(count());
   Tile all;
   for (size_t i = 0; i < pixels.size(); ++i) {
-    const double y = luminance[i] > 0 ? double{luminance[i]} / unit : 0;  // false for NaN
+    const double y = luminance[i] > 0 ? double{luminance[i]} / unit : 0;  // 0 for NaN
     const auto steps = static_cast<uint64_t>(std::nearbyint(std::min(y, kMostOfMedian) / kStep));
     Tile& tile = tiles[of(pixels[i])];
     tile.sum += steps;
@@ -44,7 +44,7 @@ PictureTiles::PictureTiles(const Settings& settings, std::span<const uint32_t> p
   const auto mean = [&](const Tile& t) {
     return t.count == 0 ? 0 : kStep * static_cast<double>(t.sum) / static_cast<double>(t.count);
   };
-  // As relMSE, with room for what few paths miss.
+  // Regularized as relMSE is, since few paths can miss the light of a tile.
   const double least = 0.05 * mean(all) * mean(all);
   for (const Tile& tile : tiles) {
     const double m = mean(tile);
@@ -65,7 +65,7 @@ void PictureTiles::apply(GuideView& view) const {
   if (!is_lit()) return;
   view.tiles = table_.data();
   view.tile_rows = rows_;
-  // A hair less, so that no rounding leads beyond the last.
+  // Slightly less, so that rounding never leads beyond the last tile.
   view.tiles_of_x = static_cast<float>(rows_) / static_cast<float>(width_) * (1 - 0x1p-20f);
   view.tiles_of_y = static_cast<float>(rows_) / static_cast<float>(height_) * (1 - 0x1p-20f);
 }

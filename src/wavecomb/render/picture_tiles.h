@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How bright the picture is, roughly: what paths before the first pass brought, by tiles.
+/// Approximate brightness of the image in tiles, from paths traced before the first pass.
 #pragma once
 
 #include <cstdint>
@@ -11,33 +11,34 @@
 
 namespace wavecomb {
 
-/// The whole picture in at most 16 x 16 tiles of 64 paths or more. The same for paths in any order:
-/// sums are integers.
+/// Brightness of the whole image in at most 16 x 16 tiles of at least 64 paths. Sums are integers,
+/// so the result does not depend on the order of the paths.
 class PictureTiles {
  public:
-  /// Path i is of pixel pixels[i] (x | y << 16) and brought luminance[i].
+  /// Path i belongs to pixel pixels[i] (x | y << 16) and has the radiance luminance[i].
   PictureTiles(const Settings& settings, std::span<const uint32_t> pixels,
                std::span<const float> luminance);
-  /// Tiles of before: inverse_scales() of a picture of this size. Throws Error for what cannot be.
+  /// Restores tiles from inverse_scales() of an image of this size. Throws Error if the size does
+  /// not match.
   PictureTiles(const Settings& settings, std::vector<double> inverse_scales);
 
   uint32_t count() const { return rows_ * rows_; }
-  /// The tile of a pixel.
+  /// Returns the tile of a pixel.
   uint32_t of(uint32_t pixel) const;
-  /// Whether any path brought light.
+  /// Whether any path contributed light.
   bool is_lit() const { return !inverse_.empty(); }
-  /// One over the scale of the picture at a pixel: of the mean of what paths of its tile bring,
-  /// none above 64 medians. Contract: is_lit().
+  /// Returns one over the brightness of the image at a pixel: the mean over its tile, with each
+  /// path clamped to 64 times the median. Contract: is_lit().
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
-  /// By tile, row by row; empty where no path brought light.
+  /// By tile, row by row; empty if no path contributed light.
   const std::vector<double>& inverse_scales() const { return inverse_; }
-  /// Lets kernels know it, where any path brought light.
+  /// Writes the tiles to `view`, if any path contributed light.
   void apply(GuideView& view) const;
 
  private:
   uint32_t width_, height_, rows_ = 1;
   std::vector<double> inverse_;
-  std::vector<float> table_;  ///< the same
+  std::vector<float> table_;  ///< inverse_ in single precision
 };
 
 }  // namespace wavecomb

@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-/// The training that a render uses: learned now or before.
+/// Returns the training that a render uses: a new one, or that of an earlier render.
 std::shared_ptr<const GuideTraining> training_for(const PilotInput& input,
                                                   const WaveContext& context, PilotCache& cache) {
   if (input.learned.empty())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Pilots: small renders before the first pass that find out what the render needs.
+/// Pilot renders: small renders before the first pass that measure what the render needs.
 ///
 /// They run in this order, and each uses the results of those before:
 /// 1. light calibration: the contribution of each light to the image (light_calibration.h);
@@ -39,8 +39,8 @@ struct PilotResults {
   std::shared_ptr<const LightAiming> aiming;       ///< null: paths from lights are not aimed
   std::shared_ptr<const GuideTraining> training;   ///< null: not trained yet; may have no field
 
-  /// Makes the waves of `context` use it. Contract: the context is used while this object lives and
-  /// does not change.
+  /// Makes the waves of `context` use these results. Contract: this object outlives the use of the
+  /// context and does not change meanwhile.
   void apply(WaveContext& context, const Scene& scene);
 
  private:
@@ -55,17 +55,19 @@ struct PilotInput {
   RenderCosts& costs;          ///< gets what is measured
   /// Costs of an earlier render, or null.
   const CostProfile* profile = nullptr;
-  /// The image that lights are calibrated for: that of the plan, or the one that a trial is for.
+  /// The image that lights are calibrated for: that of the plan, or of the render that this pilot
+  /// render is for.
   const Settings& light_settings;
   /// Packed training of an earlier render (packed_training()), which replaces training; or empty.
   std::span<const std::byte> learned;
-  /// Of an earlier trial for the same image, in place of learning it; null: there was none.
+  /// Result of an earlier pilot render of the same image, which replaces learning to aim; may be
+  /// null.
   std::shared_ptr<const LightAiming> aiming;
   std::function<bool()> stopped;  ///< whether to give up
-  std::function<bool()> halted;   ///< whether to rest soon
+  std::function<bool()> halted;   ///< whether to pause soon
 };
 
-/// Runs the pilots of a render. Where `stopped` said yes, what comes back is of no use.
+/// Runs the pilots of a render. The results are invalid if `stopped` returned true.
 PilotResults run_pilots(const PilotInput& input, PilotCache& cache);
 
 }  // namespace wavecomb

@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// The pixels of a region (x | y << 16) along a Morton curve, so that a wave covers a compact
+/// Returns the pixels of a region (x | y << 16) in Morton order, so that each wave covers a compact
 /// patch.
 std::vector<uint32_t> morton_pixel_order(const Region& region);
 

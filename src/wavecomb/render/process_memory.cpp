@@ -19,7 +19,7 @@ void give_back_memory() {
 
 uint64_t peak_rss_bytes() {
 #ifdef __linux__
-  // Not ru_maxrss, which begins with what the parent had when it started this process.
+  // ru_maxrss would include the memory of the parent process before exec.
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;)
     if (word == "VmHWM:") {

@@ -5,9 +5,9 @@
 
 namespace wavecomb {
 
-/// The most memory this process has held, bytes.
+/// Returns the peak resident memory of this process in bytes.
 uint64_t peak_rss_bytes();
-/// Returns freed memory to the system where the C library keeps it (glibc): call after loading.
+/// Returns freed memory to the system. Call after loading; only glibc keeps such memory.
 void give_back_memory();
 
 }  // namespace wavecomb

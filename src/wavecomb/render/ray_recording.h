@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The rays of a render, kept and traced again: by Embree alone, the limit, or as a render does.
+/// Recording of the rays of a render, to trace them again: by Embree alone, which is the upper
+/// limit of speed, or by the accelerator as in a render.
 #pragma once
 
 #include <array>
@@ -18,31 +19,31 @@ namespace wavecomb {
 enum class RayKind : uint8_t { kCamera, kBounce, kShadow };
 inline constexpr size_t kRayKinds = 3;
 
-/// How recorded rays are traced again.
+/// Options of RayRecording::replay().
 struct Replay {
-  bool alone = true;     ///< by Embree alone; false: by EmbreeAccelerator, as a render does
-  uint32_t threads = 0;  ///< 0: all
-  /// By kind: rays per packet, and whether Embree is told that they are coherent; nothing: as the
-  /// render told it, stage by stage.
+  bool alone = true;     ///< by Embree alone; false: by EmbreeAccelerator
+  uint32_t threads = 0;  ///< 0: all hardware threads
+  /// By kind of ray: rays per packet, and whether Embree is told that they are coherent. Without a
+  /// value, coherence is as recorded.
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
   std::array<std::optional<bool>, kRayKinds> coherent{};
-  std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace; others are left out
+  std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace
 };
 
-/// What that took. `hits`: rays that hit or are blocked.
+/// Result of a replay. `hits`: rays that hit something or are blocked.
 struct ReplayTimes {
   double wall_s = 0;
   std::array<double, kRayKinds> thread_s{};
   std::array<uint64_t, kRayKinds> rays{}, hits{};
 };
 
-/// Keeps the rays of one render of a scene.
+/// Recorded rays of one render of a scene.
 ///
-/// Contract: as RayRecorder while recording; replay() by one thread at a time, after the render.
+/// Contract: see RayRecorder while recording. replay() by one thread at a time, after the render.
 class RayRecording final : public RayRecorder {
  public:
   /// Holds up to `byte_limit` bytes. Throws Error for scenes with partly present surfaces, which
-  /// Embree alone would take for opaque.
+  /// Embree alone would treat as opaque.
   RayRecording(std::shared_ptr<const Scene> scene, uint64_t byte_limit);
   ~RayRecording() override;
 
@@ -51,16 +52,16 @@ class RayRecording final : public RayRecorder {
 
   uint64_t bytes() const { return bytes_; }
   size_t waves() const { return waves_.size(); }
-  /// Closest-hit rays and shadow rays of each depth.
+  /// Closest-hit rays and shadow rays of each path depth.
   const std::vector<uint64_t>& rays_at() const { return rays_at_; }
   const std::vector<uint64_t>& shadow_rays_at() const { return shadow_rays_at_; }
 
-  /// Traces all rays again: waves in the order in which they began, handed out to threads as a
-  /// render does, the stages of a wave in order, rays in theirs. Builds the hierarchy on first use.
+  /// Traces all rays again in recorded order. Threads take waves in the order in which the waves
+  /// began. Builds the BVH on first use.
   ReplayTimes replay(const Replay& how);
 
  private:
-  /// The rays of one stage of a wave.
+  /// Rays of one wave stage.
   struct Stage {
     RayKind kind;
     bool has_tfar, has_time, coherent;

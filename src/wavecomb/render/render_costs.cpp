@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Costs measured on synthetic hits: the quickest of three runs each.
+/// Measures costs on synthetic hits: the fastest of three runs for each material.
 CostSnapshot calibrate(const Scene& scene, const WaveContext& context, const LaneKernels& kernels,
                        const std::function<bool()>& halted) {
   constexpr uint32_t kRecords = 256;
@@ -59,7 +59,7 @@ void RenderCosts::start(const WaveContext& context, const LaneKernels& kernels,
     if (profile) apply(*profile);
   }
   calibrated_ = order;
-  // Roulette decides over the picture: it keeps to costs that do not vary, unless told otherwise.
+  // Roulette affects the image, so it uses reproducible costs unless the settings ask for others.
   if (settings_.costs == CostSource::kMeasured || profile) roulette = order;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Costs of materials over a render: where they start, and what each pass teaches.
+/// Costs of materials during a render: initial values, and updates after each pass.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,9 @@
 
 namespace wavecomb {
 
-/// Contract: waves read `order` and `roulette` while a pass runs; between passes they are written.
+/// Measured and predicted shading costs of a render.
+///
+/// Contract: waves read `order` and `roulette` during a pass; they are written only between passes.
 class RenderCosts {
  public:
   RenderCosts(const Scene& scene, std::span<const MaterialTraits> traits, const Settings& settings);
@@ -22,34 +24,35 @@ class RenderCosts {
   CostSnapshot roulette;  ///< for cost-aware roulette
   bool measures() const { return measures_; }
 
-  /// Before the first pass: takes over what a profile knows, and measures synthetic hits unless
-  /// that is all or a model is asked for. Ends early where `halted` says so.
+  /// Sets the costs before the first pass: from a profile, and by measuring synthetic hits if the
+  /// profile does not cover all materials and the settings ask for measured costs. Ends early if
+  /// `halted` returns true.
   void start(const WaveContext& context, const LaneKernels& kernels, const CostProfile* profile,
              const std::function<bool()>& halted);
-  /// After a pass: what a worker measured. Empties the worker's tracker.
+  /// Adds the measurements of a worker after a pass and resets its tracker.
   void take(CostTracker& worker) { measured_.take(worker); }
-  /// Then once for all workers.
+  /// Updates the costs, after take() for all workers.
   void merge();
 
   CostProfile profile() const;
-  /// Before the first pass.
+  /// Costs before the first pass.
   const CostSnapshot& calibrated() const { return calibrated_; }
   double calibration_s() const { return calibration_s_; }
-  /// Of the last pass that had any.
+  /// Quality of the predictions for the last pass that had any.
   const CostPrediction& prediction() const { return prediction_; }
   /// Sums over all passes, by material.
   const std::vector<double>& total_ns() const { return total_ns_; }
   const std::vector<uint64_t>& total_timed() const { return total_timed_; }
 
  private:
-  /// Returns whether the profile knows all materials and textures.
+  /// Applies a profile. Returns whether it covers all materials and textures.
   bool apply(const CostProfile& profile);
 
   const Scene& scene_;
   std::span<const MaterialTraits> traits_;
   const Settings& settings_;
   bool measures_;
-  CostTracker measured_;  ///< of the pass
+  CostTracker measured_;  ///< measurements of the pass
   std::vector<double> total_ns_;
   std::vector<uint64_t> total_timed_;
   CostSnapshot calibrated_;

@@ -12,15 +12,16 @@
 namespace wavecomb {
 namespace {
 
-/// Paths a wave holds unless told otherwise (docs/decisions/wave-size.md), and samples of a pixel
-/// that a pass adds.
+/// Default number of paths in a wave (docs/decisions/wave-size.md), and samples per pixel that a
+/// pass adds.
 constexpr uint32_t kDefaultWaveSize = 4096;
 constexpr uint32_t kPassSamples = 16;
 
-/// Brightness of the darkest layer of cascades (film/cascades.h), over that of the scene.
+/// Brightness of the darkest layer of cascades (film/cascades.h), relative to that of the scene.
 constexpr float kDarkestShare = 0x1p-12f;
 
-/// The policies that `name` stands for: one, or those that "adaptive" chooses among, "none" first.
+/// Creates the policy called `name`. For "adaptive", creates all those to choose among, "none"
+/// first.
 std::vector<std::unique_ptr<SchedulingPolicy>> make_policies(const std::string& name) {
   std::vector<std::unique_ptr<SchedulingPolicy>> policies;
   if (name == "adaptive")
@@ -31,7 +32,7 @@ std::vector<std::unique_ptr<SchedulingPolicy>> make_policies(const std::string& 
   return policies;
 }
 
-/// The grid over the scene for Morton codes.
+/// Returns the grid over the scene for Morton codes.
 OrderGrid order_grid(const Bounds& bounds) {
   OrderGrid grid;
   if (bounds.empty()) return grid;
@@ -72,7 +73,7 @@ uint32_t wave_size_for(const Settings& settings, uint64_t pixels) {
 }
 
 uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wave_size) {
-  // Vertices are merged with those that one sample of each pixel sees.
+  // Light vertices are merged with the points seen by one sample of each pixel.
   if (settings.merges()) return 1;
   const auto fill = static_cast<uint32_t>((wave_size + pixels - 1) / pixels);
   return std::min({settings.spp, wave_size, std::max(kPassSamples, fill)});

@@ -22,25 +22,25 @@
 
 namespace wavecomb {
 
-/// Number of threads of a render: that of the settings, else that of the machine.
+/// Returns the number of threads of a render: that of the settings, or all hardware threads.
 uint32_t thread_count(const Settings& settings);
 
-/// Number of paths in a wave of a render of `pixels` pixels: that of the settings, else 4096, but
-/// small enough that every thread gets several waves.
+/// Returns the number of paths in a wave of a render of `pixels` pixels: that of the settings or
+/// 4096, but small enough that every thread gets several waves.
 uint32_t wave_size_for(const Settings& settings, uint64_t pixels);
 
-/// Samples that a pass adds to each pixel, unless the render is adaptive. In images smaller than a
-/// wave, enough to fill one.
+/// Returns the samples per pixel that a pass of a render adds if it is not adaptive. For images
+/// smaller than a wave, returns enough to fill a wave.
 uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wave_size);
 
-/// Everything about a render that follows from the scene and the settings. Nothing is traced to
-/// make a plan, and it does not change while the render runs.
+/// Data of a render that follow from the scene and the settings. Making a plan traces no rays, and
+/// the plan does not change while the render runs.
 ///
 /// Contract: scene, accelerator, settings and policy outlive the plan, and the plan outlives the
-/// films and contexts made of it.
+/// films and contexts made from it.
 struct RenderPlan {
-  /// `policy`: replaces the one that the settings name, unless null. Throws Error where the scene
-  /// or this build cannot do what the settings ask for.
+  /// `policy`: replaces the policy of the settings, unless null. Throws Error if the scene or this
+  /// build does not support what the settings ask for.
   RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator, const Settings& settings,
              LightPathShare light_share, const SchedulingPolicy* policy);
   RenderPlan(const RenderPlan&) = delete;
@@ -49,24 +49,24 @@ struct RenderPlan {
   const Scene& scene;
   const EmbreeAccelerator& accelerator;
   const Settings& settings;
-  LightPathShare light_share;  ///< of paths from lights, where there are any
+  LightPathShare light_share;  ///< number of light paths, if there are any
   WaveSetup waves;
   LaneKernels kernels;
   uint32_t pass_samples;  ///< samples_of_pass()
-  /// The policy of the render; of `adaptive` all among which each thread chooses.
+  /// The policy of the render, or for `adaptive` all those among which each thread chooses.
   std::vector<const SchedulingPolicy*> policies;
   std::vector<MaterialTraits> traits;  ///< by material
   FilterTable filter;
   CameraSetup camera;
   AovTables aovs;
   Region window;             ///< pixels of the film
-  SplatFilter splat_filter;  ///< of light that paths from lights bring to the camera
-  SceneView view;            ///< with the light tree, where lights are chosen by it
+  SplatFilter splat_filter;  ///< pixel filter of connections from light paths to the camera
+  SceneView view;            ///< with the light tree, if lights are selected by it
 
-  /// An empty film with all that the settings ask for.
+  /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;
-  /// The data that the waves of the render read. `film`: of make_film(). `costs`: of this render.
-  /// `visible`: with whose points paths from lights are merged, or null.
+  /// Creates the data that the waves of the render read. `film`: from make_film(). `costs`: those
+  /// of this render. `visible`: the points with which light paths are merged, or null.
   WaveContext make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
                            const VisibleGrid* visible) const;
 

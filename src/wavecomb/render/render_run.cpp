@@ -18,7 +18,7 @@
 namespace wavecomb {
 namespace {
 
-/// Names of the ids in the Cryptomatte layers among `layers`.
+/// Returns the names of the ids in the Cryptomatte layers among `layers`.
 std::vector<CryptoManifest> crypto_manifests(const Scene& scene,
                                              const std::vector<AovLayer>& layers) {
   std::vector<CryptoManifest> manifests;
@@ -76,7 +76,7 @@ void RenderRun::work(PilotCache& cache, const TrialShared& shared,
       cache);
   pilots_.apply(context_, *scene_);
   if (shared.aiming) *shared.aiming = pilots_.aiming;
-  // Pilots measure light, whatever the render's splats hold.
+  // Set only now, since the pilots measure light.
   if (options_.wants_camera_squares) context_.camera_squares = scene_brightness(*scene_);
   if (!stopped()) learned(pilots_);
   loop_.run();

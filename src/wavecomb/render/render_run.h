@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A render by a plan, from the empty film to the image.
+/// Execution of a render plan, from the empty film to the image.
 #pragma once
 
 #include <cstddef>
@@ -23,39 +23,41 @@
 
 namespace wavecomb {
 
-/// Data that the trials for one image share. Both pointers are null in other renders.
+/// Data that the pilot renders for one image share. Both pointers are null in other renders.
 struct TrialShared {
-  const Settings* image = nullptr;                  ///< whose lights are calibrated
-  std::shared_ptr<const LightAiming>* aiming = {};  ///< learned by the first trial, for the others
+  const Settings* image = nullptr;                  ///< image whose lights are calibrated
+  std::shared_ptr<const LightAiming>* aiming = {};  ///< from the first pilot render
 };
 
+/// One render by a plan.
+///
 /// Contract: all functions on one thread; run() once, finish() once and last. The arguments of the
 /// constructor outlive the run.
 class RenderRun {
  public:
-  /// `build_s`: seconds that the accelerator took to build, for statistics.
+  /// `build_s`: build time of the accelerator in seconds, for statistics.
   RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
             const RenderOptions& options, Watch& watch, double build_s);
 
-  /// Runs the pilots and all passes. `learned`: called when the pilots are done, by the thread that
-  /// works, unless the render was stopped before. Throws what callbacks and workers throw.
+  /// Runs the pilots and all passes. Calls `learned` on the worker thread when the pilots are done,
+  /// unless the render was stopped before. Throws what callbacks and workers throw.
   void run(PilotCache& cache, const TrialShared& shared,
            const std::function<void(const PilotResults&)>& learned);
 
-  /// Statistics of the render so far. Contract: while no worker runs.
+  /// Returns the statistics of the render so far. Contract: while no worker runs.
   RenderStatistics statistics() const;
   CostProfile cost_profile() const { return costs_.profile(); }
-  /// The image. The film is freed meanwhile. `statistics`: get the error of the image and the peak
-  /// of memory.
+  /// Returns the image and frees the film. Adds the error of the image and the peak memory to
+  /// `statistics`.
   Picture finish(RenderStatistics& statistics);
 
  private:
-  /// Fills the film by what a checkpoint kept, if there is one; returns its pass.
+  /// Fills the film from a checkpoint, if there is one. Returns the state of its pass.
   PassState resume();
   void work(PilotCache& cache, const TrialShared& shared,
             const std::function<void(const PilotResults&)>& learned);
   void take_snapshot(bool is_finished);
-  /// Throws where a texture could not be read: pixels that used it are black.
+  /// Throws Error if a texture could not be read, because pixels that use it are black.
   void check_textures() const;
 
   std::shared_ptr<const Scene> scene_;

@@ -10,7 +10,7 @@
 namespace wavecomb {
 namespace {
 
-/// Counts by depth, without the depths that nothing reached.
+/// Returns counts by depth, without the depths that no path reached.
 template <typename Counts>
 std::vector<uint64_t> reached(const Counts& at) {
   size_t n = at.size();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render took.
+/// Statistics of a render.
 #pragma once
 
 #include <cstdint>
@@ -23,77 +23,77 @@ class RenderCosts;
 struct LightCalibration;
 struct WaveContext;
 
-/// What became of one material.
+/// Statistics of one material.
 struct MaterialStatistics {
   std::string name, program;
-  uint64_t records = 0;  ///< shading hits
+  uint64_t records = 0;  ///< shading records
   uint64_t timed_records = 0;
-  double measured_ns = 0;    ///< per record, over the timed ones; 0 where none was timed
+  double measured_ns = 0;    ///< mean of the timed records; 0 if none was timed
   double calibrated_ns = 0;  ///< before the first pass
-  double predicted_ns = 0;   ///< by the costs that the next pass would be scheduled by
+  double predicted_ns = 0;   ///< cost that the next pass would be scheduled by
 };
 
-/// The share that a part of the lights had of the choice of a light.
+/// Selection probability of a part of the lights: as rendered, and by power alone.
 struct LightShare {
   std::string name;
   double share, by_power;
 };
 
-/// What the calibration of lights took and found.
+/// Statistics of the light calibration.
 struct LightShares {
   double seconds = 0;
   uint32_t paths = 0;         ///< 0: there was nothing to calibrate
-  bool kept = false;          ///< from the render before
-  uint32_t tilted_nodes = 0;  ///< of the light tree
+  bool kept = false;          ///< taken over from an earlier render
+  uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
   std::vector<LightShare> parts;
 };
 
-/// How paths from lights were aimed.
+/// Statistics of the aiming of light paths.
 struct AimStatistics {
-  uint32_t targets = 0;  ///< spheres; 0: nowhere
-  uint64_t paths = 0;    ///< that taught; 0: none were asked to
+  uint32_t targets = 0;  ///< spheres; 0: paths are not aimed
+  uint64_t paths = 0;    ///< training paths; 0: aiming was not trained
   double seconds = 0;
 };
 
-/// What a render took. Phase times are sums over workers.
+/// Statistics of a render. Phase times are sums over workers.
 struct RenderStatistics {
   double build_s = 0, render_s = 0;
-  double first_samples_s = 0;  ///< of render_s, until the first wave was done
+  double first_samples_s = 0;  ///< part of render_s, until the first wave was done
   std::vector<std::pair<std::string, double>> phases_s;
   uint64_t samples = 0, rays = 0, shadow_rays = 0, records = 0;
   uint64_t packets = 0, packet_lanes = 0;
   VolumeCounts volume_counts;
-  uint64_t walks = 0, walk_steps = 0, walk_lanes = 0;  ///< of Counts
+  uint64_t walks = 0, walk_steps = 0, walk_lanes = 0;  ///< subsurface random walks; see Counts
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
   Sharing sharing;
-  uint64_t resumed_samples = 0;  ///< that a checkpoint brought; not in `samples`
-  double error = 0;              ///< mean relative error of the picture; infinite: not known
+  uint64_t resumed_samples = 0;  ///< from a checkpoint; not in `samples`
+  double error = 0;              ///< mean relative error of the image; infinite: unknown
   SceneBytes scene_bytes;
   uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
-  bool cancelled = false;  ///< by whoever watched; not by a time limit
-  // Per depth; the last entry holds all deeper ones.
+  bool cancelled = false;  ///< stopped by the caller; false if a time limit ended the render
+  // By path depth; the last entry holds all deeper ones.
   std::vector<uint64_t> rays_at, shadow_rays_at, records_at;
   double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
   std::vector<MaterialStatistics> materials;
   double cost_r2 = 0, cost_mean_error = 0;  ///< of predictions for the last pass that had any
-  uint64_t cost_materials = 0;              ///< how many materials that compares; 0: no prediction
+  uint64_t cost_materials = 0;              ///< number of materials compared; 0: no prediction
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;
   AllotmentFacts allotment;
   GuideStatistics guiding;
   AimStatistics light_aiming;
-  std::vector<std::string> lights_without_paths;  ///< where others send some
-  std::optional<TransportChoice> transport;       ///< of Transport::kAuto
-  std::optional<StoreStatistics> texture_store;   ///< where textures have a limit
+  std::vector<std::string> lights_without_paths;  ///< names, if other lights send light paths
+  std::optional<TransportChoice> transport;       ///< for Transport::kAuto
+  std::optional<StoreStatistics> texture_store;   ///< if texture memory has a limit
 };
 
-/// Adds up what the workers counted, by phase, depth, policy and material, into `statistics`.
+/// Adds up the counters of the workers, by phase, depth, policy and material, into `statistics`.
 void add_up(const PassRunner& runner, const WaveContext& context, const Scene& scene,
             const RenderCosts& costs, RenderStatistics& statistics);
 
-/// Of a calibration, for statistics.
+/// Returns the statistics of a light calibration.
 LightShares light_shares(const LightCalibration& calibration);
 
 }  // namespace wavecomb

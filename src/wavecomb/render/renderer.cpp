@@ -21,12 +21,12 @@
 
 namespace wavecomb {
 struct WavefrontRenderer::Impl {
-  // Replaced by edits and renders, under the mutex.
+  // Guarded by the mutex; replaced by edits and renders.
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeAccelerator> accel;
   uint64_t version = 0;
-  std::shared_ptr<const Learned> learned;  ///< of the last render that was not stopped before
-  Watch* watch = nullptr;                  ///< of the render that goes on
+  std::shared_ptr<const Learned> learned;  ///< by the last render that was not stopped before
+  Watch* watch = nullptr;                  ///< of the running render
   RenderStatistics statistics;             ///< of the last render
   CostProfile profile;                     ///< after the last render
   mutable std::mutex mutex;
@@ -35,17 +35,17 @@ struct WavefrontRenderer::Impl {
   double build_s = 0;
   PilotCache pilot_cache;
 
-  /// Renders with settings whose transport is chosen. `shared`: for trials.
+  /// Renders with settings whose transport is decided. `shared`: for pilot renders.
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
                  Watch& watch, const TrialShared& shared = {});
-  /// Renders a small image, for choose_transport; ends where `outer` is stopped.
+  /// Renders a small image for choose_transport(). Stops if `outer` is stopped.
   TransportTrial try_out(const Settings& settings, LightPathShare share, bool wants_squares,
                          const TrialShared& shared, const Watch& outer);
 };
 
 namespace {
 
-/// Says that a render goes on, for as long as it lives.
+/// Marks the renderer as rendering during its lifetime.
 template <typename Impl>
 class Running {
  public:
@@ -181,7 +181,7 @@ Picture WavefrontRenderer::render(const Settings& settings, const RenderOptions&
   Watch watch(options.interval_s);
   const Running running(*impl_, watch);
   if (settings.transport != Transport::kAuto) {
-    // A light path shows light that is scattered once or more.
+    // Light paths contribute only light that is scattered at least once.
     Settings used = settings;
     if (used.max_depth == 0) used.transport = Transport::kPath;
     return impl_->render(used, {}, options, watch);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Renders a scene: passes of waves, progress, cancellation, statistics.
+/// Renderer of a scene, with progress, cancellation and statistics.
 #pragma once
 
 #include <cstddef>
@@ -31,97 +31,100 @@ struct RenderStatistics;
 struct SceneEdit;
 struct Snapshot;
 
-/// Names of the ids of one Cryptomatte level that a picture holds.
+/// Names of the ids of one Cryptomatte level in an image.
 struct CryptoManifest {
   std::string level;  ///< name of the AOV
   std::vector<std::pair<std::string, uint32_t>> names;
 };
 
-/// A picture: means over the samples, row 0 at the top. What was not asked for is empty.
+/// Rendered image: means over the samples, row 0 at the top. Layers that were not requested are
+/// empty.
 struct Picture {
   uint32_t width = 0, height = 0;
   std::vector<float> beauty;  ///< rgb, linear Rec.709
   std::vector<float> albedo;  ///< rgb
   std::vector<float> normal;  ///< xyz, world space, mean of unit vectors
-  std::vector<float> depth;   ///< along the camera's axis; infinite where nothing was hit
+  std::vector<float> depth;   ///< along the camera's axis; infinite where rays leave the scene
   std::vector<uint32_t> samples;
-  // Empty unless Settings::keeps_error():
+  // Empty unless Settings::keeps_error() is true:
   std::vector<float> error{};     ///< ErrorMap::error
   std::vector<float> variance{};  ///< rgb, Film::variance
-  std::vector<AovLayer> aovs{};   ///< further layers that Settings::aovs asks for
+  std::vector<AovLayer> aovs{};   ///< other layers of Settings::aovs
   std::vector<CryptoManifest> manifests{};
   DeepLayer deep{};
 };
 
-/// What a render may be given beside its settings. Callbacks are called on the thread that called
-/// render(); what they throw ends it.
+/// Callbacks and inputs of a render beside its settings. The thread that called render() calls the
+/// callbacks. An exception from a callback ends the render.
 struct RenderOptions {
-  /// Called every interval, and once at the end unless the render was cancelled.
+  /// Called every `interval_s`, and once at the end unless the render was cancelled.
   std::function<Request(const RenderStatus&)> progress{};
-  /// Called where progress asked for it, and at the end in any case.
+  /// Called if `progress` requests a snapshot, and always at the end.
   std::function<void(const Snapshot&)> snapshot{};
-  /// Fills the empty film and the pass with what a snapshot of a render with these settings held,
-  /// and gives the packed_training() of that; empty: it is learned again.
+  /// Restores the empty film and the pass state from a snapshot of a render with these settings.
+  /// Returns the packed_training() of that render, or nothing to train again.
   std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
-  /// packed_training() of a render of such a scene, which guides this one in place of what it would
-  /// learn; empty: it learns. What resume() gives comes first.
+  /// packed_training() of an earlier render of such a scene, used instead of training. Empty: the
+  /// render trains. The result of resume() takes precedence.
   std::vector<std::byte> learned{};
-  /// Replaces the one that the settings name.
+  /// Replaces the policy of the settings.
   const SchedulingPolicy* policy = nullptr;
-  /// Costs to start from, for the order and for roulette; what it does not know is measured on
-  /// synthetic hits or modelled.
+  /// Initial costs for shading order and roulette. Costs that it lacks are measured on synthetic
+  /// hits, or modelled.
   const CostProfile* profile = nullptr;
-  /// Gets the rays of the wavefront integrator; what it throws ends the render.
+  /// Records the rays of the wavefront integrator. An exception from it ends the render.
   RayRecorder* recorder = nullptr;
-  double interval_s = 0.1;  ///< seconds between calls of progress
-  /// For trials of light paths: splats bring no light, but what it would add to the variance of a
-  /// pixel's samples were it left to camera paths, over scene_brightness() (light_vertex.h).
+  double interval_s = 0.1;  ///< seconds between calls of `progress`
+  /// For pilot renders with light paths. Light splats then hold, instead of light, the variance
+  /// that this light would add to one sample of a pixel if camera paths had to find it, divided by
+  /// scene_brightness() (light_vertex.h).
   bool wants_camera_squares = false;
-  /// False: the picture is empty, for who took what it needs from snapshots. A stopped render of a
-  /// large picture ends sooner then.
+  /// If false, render() returns an empty image, for callers that use snapshots. This makes stopping
+  /// the render of a large image faster.
   bool wants_picture = true;
 };
 
-/// A scene ready to be rendered, and to be changed: its acceleration structure is built here, and
-/// again only as far as edits ask for it.
+/// Renderer of an editable scene. The constructor builds the acceleration structure, and an edit
+/// rebuilds only the parts that it changes.
 ///
-/// Contract: render() may be called any number of times, one at a time; edit() between renders, and
-/// both by one thread at a time. All else may be called by any thread at any time.
+/// Contract: render() may be called any number of times, one call at a time, and edit() between
+/// renders, both by one thread at a time. Any thread may call the other functions at any time.
 class WavefrontRenderer {
  public:
-  /// `threads`: for building; 0: all.
+  /// `threads`: number of threads for building; 0 means all.
   explicit WavefrontRenderer(std::shared_ptr<const Scene> scene, uint32_t threads = 0);
   ~WavefrontRenderer();
 
-  /// Renders with `settings`. The picture depends on the scene and the picture's settings only, not
-  /// on threads, wave size, lanes or policy, nor on whether the render was resumed; but with a time
-  /// limit, on how many samples there was time for. Throws Error for settings that cannot be.
+  /// Renders with `settings`. The image depends only on the scene and on the settings that affect
+  /// the image, not on threads, wave size, lanes or policy, nor on whether the render was resumed.
+  /// With a time limit, it also depends on the number of samples rendered in that time. Throws
+  /// Error for invalid settings.
   Picture render(const Settings& settings, const RenderOptions& options = {});
-  /// Ends the render that goes on, if there is one, within a wave; it returns what was done.
+  /// Stops the running render, if there is one, at the end of a wave. render() then returns the
+  /// samples so far.
   void stop();
 
-  /// Changes the scene: `scene()` is another one then, which shares what did not change. Throws
-  /// Error for bad values, as Scene::edited does, and while a render goes on; nothing is changed
-  /// then.
+  /// Edits the scene. `scene()` then returns a new scene, which shares all unchanged data. Throws
+  /// Error for invalid values (see Scene::edited) and during a render, and then changes nothing.
   void edit(const SceneEdit& change);
-  /// Another renderer of the same scene, to be edited and run by itself. They share hierarchy and
-  /// geometry.
+  /// Returns another renderer of the same scene, which can be edited and run independently. Both
+  /// share the acceleration structure and the geometry.
   std::unique_ptr<WavefrontRenderer> twin() const;
   std::shared_ptr<const Scene> scene() const;
-  /// Edits so far.
+  /// Returns the number of edits so far.
   uint64_t version() const;
-  /// wavecomb::pick for the scene as it is.
+  /// Picks in the current scene (wavecomb::pick).
   std::optional<Pick> pick(float x, float y, uint32_t width, uint32_t height) const;
-  /// What the render that goes on, or else the last one, has learned of the surface that pick()
-  /// finds. Nothing where there is none, or before anything was learned.
+  /// Returns the learned data at the surface that pick() finds, from the running or else the last
+  /// render. Returns nothing if there is no surface or nothing was learned yet.
   std::optional<LearnedPlace> learned(float x, float y, uint32_t width, uint32_t height) const;
 
-  /// packed_training() of the last render() that was not stopped before it began.
+  /// Returns the packed_training() of the last render, unless it was stopped before it learned.
   std::vector<std::byte> packed_learned() const;
 
-  /// Costs after the last render(); a copy, since the next render replaces them.
+  /// Returns the costs after the last render: a copy, since the next render replaces them.
   CostProfile cost_profile() const;
-  /// Statistics of the last render(); a copy likewise.
+  /// Returns the statistics of the last render: a copy, since the next render replaces them.
   RenderStatistics statistics() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A render that stands still.
+/// Access to a render that is paused between waves.
 #pragma once
 
 #include <functional>
@@ -16,19 +16,19 @@
 
 namespace wavecomb {
 
-/// Valid while the callback that gets it runs.
+/// State of a paused render. Valid during the callback that receives it.
 struct Snapshot {
   Film& film;
   const PassState& pass;
-  const GuideTraining& training;  ///< what was learned before the first pass, if anything
+  const GuideTraining& training;  ///< from before the first pass; may be empty
   RenderStatus status;
-  bool finished;  ///< done, cancelled or out of time: there is no more to come
-  const std::vector<std::string>& light_groups;  ///< that the film keeps
-  /// What the render took so far.
+  bool finished;  ///< done, cancelled or out of time: no more samples follow
+  const std::vector<std::string>& light_groups;  ///< light groups that the film keeps
+  /// Returns the statistics of the render so far.
   std::function<RenderStatistics()> statistics;
 
-  /// A layer by its name in pictures (beauty, depth, error, cost, light_NAME ...), made when it is
-  /// asked for; nothing where the film does not keep it. Samples are Film::samples.
+  /// Returns a layer by its name in image files (beauty, depth, error, cost, light_NAME ...), or
+  /// nothing if the film does not keep it. Sample counts are in Film::samples.
   std::optional<AovLayer> layer(const std::string& name) const;
 };
 

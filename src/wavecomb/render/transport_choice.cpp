@@ -13,31 +13,34 @@
 namespace wavecomb {
 namespace {
 
-/// Samples of a pixel of a trial, which Sobol's points and roulette are in as they are in the
-/// picture, and pixels of it at least and at most.
+/// Samples per pixel of a pilot render, enough for the effects of the Sobol sequence and of
+/// roulette, and limits of its pixel count.
 constexpr uint32_t kTransportSamples = 8;
 constexpr uint64_t kLeastTransportPixels = 400, kMostTransportPixels = 16'384;
-/// Of the samples of a render, a trial has a pixel's: five pictures, of which three cost two or
-/// three times as much, are then a fiftieth of the render at most.
+/// A pilot render takes one of every kTransportShare samples of the render. With five images, of
+/// which three cost two or three times as much as the others, pilots take at most a fiftieth of the
+/// render.
 constexpr uint64_t kTransportShare = 500;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
-/// Cost of a vertex in rays, and of one whose kernels know of light paths.
+/// Costs in rays of a vertex: by kernels for camera paths only, and by kernels that support light
+/// paths.
 constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
-/// Where light paths are merged, a camera path that may leave a point costs so much more, and a
-/// vertex of a light path.
+/// With merging, additional costs in rays of a camera path (which may store a visible point) and of
+/// a light vertex.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
-/// Of the pixels of a trial, the noisiest ones are looked at apart: one of them in a small picture
-/// may be all of its noise, and no two small pictures then tell the same.
+/// Fraction of the noisiest pixels that are also left out for a second estimate. A single one may
+/// hold most of the noise of a small image, which makes results differ between pilot renders.
 constexpr double kNoisiest = 0.01;
-/// What is hardly ever found is black in nearly all pixels and far too bright in the others. Its
-/// squared error counts up to so many squares of the light that there is.
+/// Light that is rarely found makes nearly all pixels black and the others far too bright. Its
+/// squared error is limited to this many squares of the light at the pixel.
 constexpr double kMostLost = 8;
-/// Efficiency that light paths must promise.
+/// Least predicted gain in efficiency for light paths to be used.
 constexpr double kWorthwhileLight = 1.3;
-/// Below this a material's lobe is sharp enough for light that it sends on to be seen.
+/// Roughness below which a lobe is sharp enough for visible caustics.
 constexpr float kSharpRoughness = 0.4f;
 
-/// Width and height of a trial of as many pixels as a render of `settings` bears; 0: of none.
+/// Returns the width and height of a pilot render for a render with settings `s`, or 0 if the
+/// render has too few samples.
 std::array<uint32_t, 2> trial_size(const Settings& s) {
   const uint64_t samples = uint64_t{s.width} * s.height * s.spp;
   const uint64_t pixels = std::min({samples / kTransportShare / kTransportSamples,
@@ -54,7 +57,8 @@ float brightness(const std::vector<float>& rgb, size_t pixel) {
   return luminance(Vec3<float>{rgb[3 * pixel], rgb[3 * pixel + 1], rgb[3 * pixel + 2]});
 }
 
-/// 1 / (I^2 + a hundredth of its mean's square) by pixel, I the mean of pictures over 3 x 3 pixels.
+/// Returns 1 / (I^2 + 0.01 mean(I)^2) for each pixel, with I the mean of the images over 3 x 3
+/// pixels.
 std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t width) {
   const auto height = static_cast<uint32_t>(mean.size() / width);
   double all = 0;
@@ -74,7 +78,7 @@ std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t wi
   return out;
 }
 
-/// Rays and vertices of a small picture.
+/// Rays and shading records of a pilot render.
 struct TrialWork {
   double rays = 0, records = 0;
 
@@ -88,7 +92,7 @@ TrialWork work_of(const std::array<TransportTrial, 2>& trials) {
   }
   return work;
 }
-/// That of camera paths alone: what is left of two shares when none is.
+/// Returns the work of camera paths alone, extrapolated from two ratios of light paths.
 TrialWork work_without(const TransportTrials& trials) {
   const TrialWork few = work_of(trials.with[0]), many = work_of(trials.with[1]);
   const double a = double{kTriedShares[0].paths()}, b = double{kTriedShares[1].paths()};
@@ -103,7 +107,7 @@ double sum(const PixelNoise& noise) {
   return std::accumulate(noise.begin(), noise.end(), 0.0);
 }
 
-/// Without the noisiest ones.
+/// Returns the sum without the noisiest pixels.
 double sum_of_most(PixelNoise noise) {
   const auto most =
       noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
@@ -111,7 +115,7 @@ double sum_of_most(PixelNoise noise) {
   return std::accumulate(noise.begin(), most, 0.0);
 }
 
-/// What a lobe of this roughness may be, where `varies`: anything.
+/// Returns whether a lobe of this roughness is sharp. If the roughness varies, it may be.
 bool is_sharp(float roughness, bool varies) {
   return varies || roughness < kSharpRoughness;
 }

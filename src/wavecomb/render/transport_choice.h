@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Whether paths start at the lights, too, of Transport::kAuto, and how many.
+/// Choice of the transport for Transport::kAuto: whether and how many light paths a render traces.
 ///
-/// Not where they do not go with the settings or the scene, nor where no surface is clear or glossy
-/// or no light sends paths. Elsewhere a small picture of the whole view is rendered before the
-/// first pass, twice with each share of light paths that there may be: how noisy the two kinds of
-/// paths are depends on the weights that they have, and these on the share. How noisy it would be
-/// without light paths is not looked at, since what camera paths hardly find they may not meet in
-/// so few samples: light paths tell (integrate/light_vertex.h). With e_camera the squared error of
-/// the part that camera paths find beside light paths, e_left that of the other one were it left to
-/// camera paths, and c the cost without light paths, by rays and vertices at fixed costs, the
-/// efficiency of a share with the error e_s and the cost c_s is
+/// There are none if the settings or the scene do not support them, if no surface is transmissive
+/// or glossy, or if no light sends paths. Otherwise small images of the whole view are rendered
+/// before the first pass, two for each candidate ratio of light paths. (Each ratio needs its own
+/// images, because the MIS weights depend on the ratio, and the noise of both kinds of paths on the
+/// weights.) The noise without light paths cannot be measured in images of so few samples, since
+/// camera paths may not find a caustic at all. Light paths estimate it instead
+/// (integrate/light_vertex.h). Let e_camera be the squared error of the light that camera paths
+/// contribute beside light paths, e_left the squared error of the remaining light if camera paths
+/// had to find it, and c the cost without light paths, from counts of rays and vertices at fixed
+/// costs. The gain in efficiency of a ratio with squared error e_s and cost c_s is
 ///   (e_camera + e_left) c / (e_s c_s).
-/// Nothing of it depends on seed, region, threads, waves or lanes; so parts of a picture, a resumed
-/// one and merged ones are rendered alike. Its samples are not in the picture.
+/// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed
+/// renders and merged renders use the same transport. Its samples do not contribute to the image.
 #pragma once
 
 #include <array>
@@ -27,51 +28,51 @@
 
 namespace wavecomb {
 
-/// What was chosen, and why.
+/// The chosen transport, with the reason.
 struct TransportChoice {
   Transport transport = Transport::kPath;
-  LightPathShare share;  ///< of Transport::kLight
-  std::string why;       ///< the rest of a sentence about what was chosen
-  double gain = 0;       ///< expected efficiency to that without light paths; 0: not looked at
+  LightPathShare share;  ///< for Transport::kLight
+  std::string why;       ///< completes a sentence about the choice
+  double gain = 0;  ///< predicted efficiency over a render without light paths; 0: not measured
   double seconds = 0;
 };
 
-/// A small picture.
+/// Result of a small pilot render.
 struct TransportTrial {
   std::vector<float> beauty;          ///< rgb
-  std::vector<float> by_light_paths;  ///< the part of it that light paths found; empty: none
-  uint64_t rays = 0, records = 0;     ///< that it took
+  std::vector<float> by_light_paths;  ///< the part of beauty from light paths; empty: none
+  uint64_t rays = 0, records = 0;     ///< traced rays and shading records
 };
-/// With a share of light paths. With true, by_light_paths is RenderOptions::wants_camera_squares,
-/// over that brightness.
+/// Renders a small image with the given ratio of light paths. If the last argument is true,
+/// by_light_paths holds the variance of RenderOptions::wants_camera_squares.
 using RenderTrial = std::function<TransportTrial(const Settings&, LightPathShare, bool)>;
 
-/// The shares that are tried. Around the better one efficiency is flat on stages with caustics,
-/// merged or not.
+/// Candidate ratios of light paths. Near the better one, efficiency hardly depends on the ratio on
+/// stages with caustics, with and without merging.
 inline constexpr std::array<LightPathShare, 2> kTriedShares = {{{-3}, {0}}};
 
-/// Whether anything in the scene reflects or passes light sharply enough for caustics.
+/// Returns whether any material reflects or transmits light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
 
-/// Chooses for `settings`, rendering by `render`. `stopped`: give up; what comes back is then of no
-/// use.
+/// Chooses the transport for `settings` from small images made by `render`. Gives up if `stopped`
+/// returns true; the result is then invalid.
 TransportChoice choose_transport(const Scene& scene, const Settings& settings,
                                  const RenderTrial& render, const std::function<bool()>& stopped);
 
-// ---- for tests ----
+// Exposed for tests.
 
-/// Trials of `width` columns.
+/// Small pilot renders of `width` columns.
 struct TransportTrials {
-  std::array<TransportTrial, 2> with[kTriedShares.size()];  ///< by share, of two seeds
-  std::vector<double> variance;  ///< of a sample, of what is left to camera paths, by pixel
+  std::array<TransportTrial, 2> with[kTriedShares.size()];  ///< by ratio, two seeds each
+  std::vector<double> variance;  ///< by pixel, per sample: of light left to camera paths
   uint32_t width = 0;
   bool merges = false;
 };
 struct TransportGain {
-  double gain = 0;  ///< the best efficiency to that without
+  double gain = 0;  ///< best efficiency over a render without light paths
   LightPathShare share;
 };
-/// What trials tell of a render of `longer` as many samples.
+/// Returns the predicted gain for a render with `longer` times as many samples.
 TransportGain transport_gain(const TransportTrials& trials, double longer);
 
 }  // namespace wavecomb

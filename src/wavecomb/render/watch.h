@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Long work on a thread of its own, watched by the thread that asked for it.
+/// Work on a separate thread, supervised by the calling thread.
 #pragma once
 
 #include <atomic>
@@ -10,34 +10,37 @@
 
 namespace wavecomb {
 
-/// What the watcher may answer.
+/// Answers of the supervising thread.
 enum class Request : uint8_t {
   kGoOn,
-  kSnapshot,  ///< let the work stand still for a moment, so that it can be looked at
+  kSnapshot,  ///< pause the work to take a snapshot
   kStop,
 };
 
-/// Contract: run() once. look() and snapshot() are called on the thread that called run().
+/// Runs work on a separate thread and supervises it.
+///
+/// Contract: run() once. It calls look() and snapshot() on its own thread.
 class Watch {
  public:
-  /// `interval_s`: seconds between looks.
+  /// `interval_s`: seconds between calls of look().
   explicit Watch(double interval_s = 0.1) : interval_s_(interval_s) {}
 
-  /// Runs `work` on a thread of its own; calls `look` every interval, and `snapshot` while
-  /// the work stands still, where `look` asked for that. What any of them throws stops the work and
-  /// comes out of here.
+  /// Runs `work` on a separate thread. Calls `look` every interval, and `snapshot` with the work
+  /// paused if `look` requested one. An exception from any of them stops the work and is rethrown
+  /// here.
   void run(const std::function<void()>& work, const std::function<Request()>& look,
            const std::function<void()>& snapshot);
 
-  /// The work is to end soon. May be called by any thread.
+  /// Asks the work to end soon. Any thread may call this.
   void stop() { stopped_ = true; }
 
-  // For the work:
-  /// Whether it is to come to rest soon. May be asked by any thread.
+  // Called by the work:
+  /// Whether the work should pause or end soon. Any thread may call this.
   bool halted() const { return stopped() || halted_.load(std::memory_order_relaxed); }
-  /// Whether it is to end.
+  /// Whether the work should end.
   bool stopped() const { return stopped_.load(std::memory_order_relaxed); }
-  /// It stands still now: returns once a snapshot, if one is wanted, has been taken.
+  /// Pauses the work until a requested snapshot has been taken. Returns at once if none was
+  /// requested.
   void rest();
 
  private:

@@ -5,11 +5,11 @@
 
 namespace wavecomb {
 
-/// How waves run. None of it changes an image.
+/// Wave parameters of a render. They do not change the image.
 struct WaveSetup {
   uint32_t lanes;
   uint32_t threads;
-  uint32_t wave_size;  ///< paths of a wave
+  uint32_t wave_size;  ///< paths in a wave
 };
 
 }  // namespace wavecomb
