@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of parameters with a few rows more, for tests that such rows are found everywhere."""
+"""Adds rows to parameter tables, for tests that every consumer of a table picks up new rows."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ def add_rows(
     added: Iterable[Any],
     follow: Iterable[str] = (),
 ) -> None:
-    """Makes the table have those rows, too, as if the core had them.
+    """Adds rows to a table, as if the core had them, until the test ends.
 
     Args:
-        monkeypatch: Ends it.
-        table: As the modules that read it have it.
-        added: The rows.
-        follow: Modules that make something of the table when they are imported.
+        monkeypatch: Restores the table.
+        table: Function that returns the table, as modules import it.
+        added: The additional rows.
+        follow: Modules that derive data from the table at import.
     """
-    for name in follow:  # which others use after this test, as they are without those rows
+    for name in follow:  # import these first, so that later tests see them without the added rows
         importlib.import_module(name)
     rows = MappingProxyType({**table(), **{row.name: row for row in added}})
     for module in [one for name, one in sys.modules.items() if name.startswith("wavecomb.")]:
@@ -36,7 +36,7 @@ def add_rows(
 
 
 def made_again(name: str) -> ModuleType:
-    """A module as it is made with the table of now, beside the one that there is."""
+    """Returns a second copy of a module, executed with the current table."""
     known = importlib.util.find_spec(name)
     assert known is not None
     assert known.origin is not None
@@ -44,7 +44,7 @@ def made_again(name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = made  # where dataclasses look
+    sys.modules[spec.name] = made  # dataclasses look modules up here
     try:
         spec.loader.exec_module(made)
     finally:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Result folders made up from known times, for tests of the analysis and the report."""
+"""Generates benchmark results with known times, for tests of the analysis and the report."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ _PHASES = {
 def run_row(
     time: float, rng: np.random.Generator, noise: float, shake: float, **settings: Any
 ) -> dict[str, Any]:
-    """A row whose shading takes ``time`` times a round's shake and noise of its own."""
+    """Returns a result row whose shading time is ``time`` times ``shake`` (shared by a round) and
+    noise."""
     row = {**DEFAULTS, **settings}
     order = 0.0 if row["policy"] == "none" else 0.02
     scale = shake * float(np.exp(rng.normal(0, noise)))
@@ -89,7 +90,7 @@ def runs_of(
     seed: int = 1,
     **settings: Any,
 ) -> list[dict[str, Any]]:
-    """Rows of all combinations; ``time`` gives the expected shading time of one."""
+    """Returns rows for all combinations of ``vary``. ``time`` returns the expected shading time."""
     rng = np.random.default_rng(seed)
     rows: list[dict[str, Any]] = []
     for repetition in range(repetitions):
@@ -103,11 +104,11 @@ def runs_of(
 
 
 CASE_ERRORS = {"off": 0.02, "aimed": 0.01}
-"""relMSE of the experiment `parts`, by case."""
+"""Relative MSE of the experiment `parts`, by case."""
 
 
 def policy_rows(**more: Any) -> list[dict[str, Any]]:
-    """Two stages and two widths, all policies, with the factors of ``POLICY_FACTORS``."""
+    """Returns rows of all policies on two stages and two lane widths, with ``POLICY_FACTORS``."""
 
     def time(stage: str, lanes: int, policy: str) -> float:
         gain = POLICY_FACTORS[policy] if lanes == 16 else 1.0
@@ -118,7 +119,7 @@ def policy_rows(**more: Any) -> list[dict[str, Any]]:
 
 
 def everything() -> list[dict[str, Any]]:
-    """An experiment of each kind that the report knows, small."""
+    """Returns a small experiment of each kind that the report supports."""
     rows = policy_rows(repetitions=4)
     rows += runs_of(
         {
@@ -214,18 +215,18 @@ def _job(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _golden(row: Mapping[str, Any]) -> str:
-    """File name of the golden picture: of a stage, and of a peer its own."""
+    """Returns the file name of a golden image. Each stage has one for Wavecomb and one per peer."""
     peer = "" if row["renderer"] == "wavecomb" else f"-{row['renderer']}"
     return f"{row['stage']}{peer}-64x48-0a1b2c3d.npy"
 
 
 def has_picture(row: Mapping[str, Any]) -> bool:
-    """The first run of each policy at 16 lanes keeps its picture."""
+    """Returns whether a run saves its image: the first run of each policy at 16 lanes."""
     return row["experiment"] == "policies" and row["repetition"] == 0 and row["lanes"] == 16
 
 
 def statistics(rng: np.random.Generator) -> dict[str, Any]:
-    """Costs of twelve materials: measured is 5 + 1.1 x calibrated, with noise."""
+    """Returns costs of twelve materials. The measured cost is 5 + 1.1 x calibrated, with noise."""
     materials = []
     for k in range(12):
         calibrated = 40.0 + 15.0 * k
@@ -245,7 +246,7 @@ def statistics(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def write_pictures(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """A golden picture for each stage, and a noisy one: of cost-benefit another than the others."""
+    """Writes golden images and noisy ones. The noise is shared by all policies but cost-benefit."""
     rng = np.random.default_rng(6)
     y, x = np.mgrid[0:48, 0:64] / 48.0
     golden = np.stack([0.2 + 0.5 * x / 1.3, 0.3 + 0.4 * y, 0.5 - 0.2 * x * y], axis=2)

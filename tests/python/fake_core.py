@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A stand-in for the native module and the loader: the command line alone, in no time."""
+"""A fake native module and stage loader, to test the command line without rendering."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Finding(SimpleNamespace):
 
 
 class Fake:
-    """Knobs of the stand-in."""
+    """Behaviour and recorded calls of the fake."""
 
     def __init__(self) -> None:
         self.interrupt_at: float | None = None
@@ -185,14 +185,14 @@ class Fake:
 
 
 def install(monkeypatch: pytest.MonkeyPatch) -> Fake:
-    """Puts the stand-in where the native module and the loader are imported from."""
-    settings()  # of the core that there is, as what these make of its tables
+    """Replaces the native module and the loader by a fake."""
+    settings()  # load the tables of the real core first
     core_aovs()
     importlib.import_module("wavecomb.usd.lights.light")
     fake = Fake()
     core = ModuleType("wavecomb._core")
     usd = ModuleType("wavecomb.usd")
-    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]  # its modules are the real ones
+    usd.__path__ = [str(Path(wavecomb.__file__).parent / "usd")]  # submodules are the real ones
     for name, value in {
         "Error": Error,
         "Settings": Settings,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tests of the farm share: jobs, work in this process, comparisons of files."""
+"""Helpers for tests of the farm: jobs, rendering in this process, file comparison."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from wavecomb.farm.rendering import Renderer
 from wavecomb.picture.image import read_layers, read_metadata
 
 TIMES = ("wavecomb:render_seconds", "DateTime")
-"""Of a header: what no two renders share."""
+"""Header entries that differ between any two renders."""
 
 
 def cornell_in(folder: Path) -> Path:
-    """The Cornell box, as a file in a folder."""
+    """Writes the Cornell box to a folder and returns its path."""
     from wavecomb.scenes import write_scene
 
     path = folder / "cornell.usdc"
@@ -28,7 +28,7 @@ def cornell_in(folder: Path) -> Path:
 
 
 MACHINE = "wavecomb-test"
-"""Class of machines in tests that render in this process."""
+"""Machine class in tests that render in this process."""
 
 
 def render_all(folder: Folder, image: int = 0, looks: int = 0) -> None:
@@ -39,14 +39,14 @@ def render_all(folder: Folder, image: int = 0, looks: int = 0) -> None:
 
 
 def work(folder: Folder) -> None:
-    """Renders all images of a job in this process, and writes them."""
+    """Renders and writes all images of a job in this process."""
     for image in range(len(folder.job.images)):
         render_all(folder, image)
         assert finish_image(folder, image, MACHINE)["files"]
 
 
 def same(one: Path, two: Path, but: tuple[str, ...] = TIMES) -> None:
-    """Asserts that two EXR files hold the same bits, and headers that say the same."""
+    """Asserts that two EXR files have the same pixels bit for bit, and the same headers."""
     first, second = read_layers(one), read_layers(two)
     assert list(first) == list(second)
     for name, layer in first.items():
@@ -63,7 +63,7 @@ def same(one: Path, two: Path, but: tuple[str, ...] = TIMES) -> None:
 
 
 def processes_of(folder: Path, what: str = "") -> list[int]:
-    """Those whose command names the folder, and something else."""
+    """Returns the ids of processes whose command line contains the folder and ``what``."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:
@@ -80,7 +80,7 @@ def processes_of(folder: Path, what: str = "") -> list[int]:
 
 
 def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
-    """What a function gives as soon as that is something."""
+    """Calls a function until its result is true, and returns the result."""
     until = time.monotonic() + seconds
     while not (found := what()):
         assert time.monotonic() < until, "it never happened"
@@ -89,5 +89,5 @@ def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
 
 
 def left_behind(folder: Path) -> list[Path]:
-    """Temporary files below a folder."""
+    """Returns temporary files below a folder."""
     return [file for file in folder.rglob(".*") if ".part" in file.name]

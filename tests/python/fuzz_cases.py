@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken stages and images, each from its kind, a seed and a number alone."""
+"""Broken stages and images. Each is determined by its kind, a seed and a number."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ PRIMS = (
 
 
 def flip_bits(rng: random.Random, data: bytes) -> bytes:
-    """A few bits, anywhere."""
+    """Flips a few bits anywhere."""
     out = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 4, 8, 32))):
         out[rng.randrange(len(out))] ^= 1 << rng.randrange(8)
@@ -53,7 +53,7 @@ def flip_bits(rng: random.Random, data: bytes) -> bytes:
 
 
 def cut(rng: random.Random, data: bytes) -> bytes:
-    """The end is missing; sometimes the beginning, sometimes there is more."""
+    """Truncates the end, or sometimes removes the beginning or appends data."""
     how = rng.random()
     where = rng.randrange(len(data) + 1)
     if how < 0.8:
@@ -62,7 +62,7 @@ def cut(rng: random.Random, data: bytes) -> bytes:
 
 
 def huge_words(rng: random.Random, data: bytes) -> bytes:
-    """Words of 2, 4 or 8 bytes become counts and offsets beyond all measure."""
+    """Replaces words of 2, 4 or 8 bytes by huge counts and offsets."""
     out = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 4))):
         size = rng.choice((2, 4, 8))
@@ -77,7 +77,7 @@ def huge_words(rng: random.Random, data: bytes) -> bytes:
 
 
 def splice(rng: random.Random, data: bytes) -> bytes:
-    """A block is copied over another, cleared, taken out or doubled."""
+    """Copies a block over another one, or clears, removes or duplicates it."""
     out = bytearray(data)
     size = rng.randrange(1, max(2, len(out) // 8))
     source, target = (rng.randrange(max(1, len(out) - size)) for _ in range(2))
@@ -94,7 +94,8 @@ def splice(rng: random.Random, data: bytes) -> bytes:
 
 
 def tail_words(rng: random.Random, data: bytes) -> bytes:
-    """As ``huge_words``, near the end, where a .usdc has its sections and a .usdz its names."""
+    """As ``huge_words``, but near the end, where .usdc has its sections and .usdz its file names.
+    """
     start = len(data) * 2 // 3
     return data[:start] + huge_words(rng, data[start:])
 
@@ -123,7 +124,7 @@ def _resized(rng: random.Random, text: str) -> str:
 
 
 def change_words(rng: random.Random, data: bytes) -> bytes:
-    """Numbers, types, lists and paths of the text become others; it mostly still parses."""
+    """Replaces numbers, types, lists and paths in the text. The result usually still parses."""
     text = data.decode()
     paths = _PATH.findall(text)
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
@@ -142,7 +143,7 @@ def change_words(rng: random.Random, data: bytes) -> bytes:
 
 
 def change_lines(rng: random.Random, data: bytes) -> bytes:
-    """Lines go missing, are doubled or trade places."""
+    """Removes, duplicates or swaps lines."""
     lines = data.decode().splitlines(keepends=True)
     for _ in range(rng.choice((1, 2, 4))):
         a, b = rng.randrange(1, len(lines)), rng.randrange(1, len(lines))
@@ -157,7 +158,7 @@ def change_lines(rng: random.Random, data: bytes) -> bytes:
 
 
 def wrong_types(rng: random.Random, data: bytes) -> bytes:
-    """Attributes get values of other types and lengths, through the library, as .usdc."""
+    """Sets attributes to values of other types and lengths through the USD library, as .usdc."""
     import tempfile
 
     from pxr import Sdf
@@ -172,7 +173,7 @@ def wrong_types(rng: random.Random, data: bytes) -> bytes:
     for path in rng.sample(attributes, rng.choice((1, 2, 4, 8))):
         old = layer.GetAttributeAtPath(path)
         name = old.name
-        owner = getattr(old.owner, "primSpec", old.owner)  # of a variant
+        owner = getattr(old.owner, "primSpec", old.owner)  # of an attribute inside a variant
         donor = layer.GetAttributeAtPath(rng.choice(attributes))
         if donor is None:
             continue
@@ -221,7 +222,7 @@ KINDS = (
 
 
 def make_case(kind: str, seed: int, number: int, folder: Path) -> Path:
-    """Writes the files of a case into an empty folder; gives the stage's, or what it is about."""
+    """Writes the files of a case to an empty folder. Returns the stage or other file to read."""
     rng = random.Random(f"{seed}/{kind}/{number}")
     (folder / "other.usda").write_text(OTHER)
     if kind in INPUTS:
@@ -252,5 +253,5 @@ def make_case(kind: str, seed: int, number: int, folder: Path) -> Path:
 
 
 def plan(total: int) -> list[tuple[str, int]]:
-    """(kind, number) of cases, all kinds in turn."""
+    """Returns (kind, number) of ``total`` cases, cycling through all kinds."""
     return [(KINDS[i % len(KINDS)], i // len(KINDS)) for i in range(total)]

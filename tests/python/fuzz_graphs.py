@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages whose shape is the fault: circles, depth, and little text that means very much."""
+"""Stages that are broken by their structure: cycles, depth, and exponential expansion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BOUND = TRIANGLE.replace(
     'def Mesh "T" {',
     'def Mesh "T" (prepend apiSchemas = ["MaterialBindingAPI"]) {\nrel material:binding = </M>\n',
 )
-"""The same in the material /M."""
+"""The same mesh with the material /M."""
 
 
 def _write(folder: Path, text: str, name: str = "stage.usda") -> Path:
@@ -28,7 +28,7 @@ def _write(folder: Path, text: str, name: str = "stage.usda") -> Path:
 
 
 def circles(rng: random.Random, folder: Path) -> Path:
-    """Prims that reference, inherit, specialise or hold each other at random."""
+    """Prims that reference, inherit, specialise or contain each other at random."""
     count = rng.randint(1, 8)
     names = [f"P{i}" for i in range(count)]
     files = [f"f{i}.usda" for i in range(rng.randint(0, 2))]
@@ -70,7 +70,7 @@ def circles(rng: random.Random, folder: Path) -> Path:
 
 
 def networks(rng: random.Random, folder: Path) -> Path:
-    """Shaders, node graphs and primvars that feed each other at random."""
+    """Shaders, node graphs and primvars that connect to each other at random."""
     nodes = [f"N{i}" for i in range(rng.randint(1, 12))]
     ids = (
         "UsdPreviewSurface", "UsdUVTexture", "UsdTransform2d", "UsdPrimvarReader_float2",
@@ -108,7 +108,7 @@ def networks(rng: random.Random, folder: Path) -> Path:
 
 
 def deep(rng: random.Random, folder: Path) -> Path:
-    """One thing inside another, many times."""
+    """Deep nesting of prims, references, instancers, shaders or sublayers."""
     depth = rng.choice((10, 100, 300, 1000, 3000, 10000, 30000, 100000))
     how = rng.randrange(7)
     if how == 0:
@@ -118,13 +118,13 @@ def deep(rng: random.Random, folder: Path) -> Path:
         return _write(folder, f"(customLayerData = {{\n{inside}}}\n)\n")
     if how == 2:
         return _write(folder, 'def "A" { int[] a = ' + "[" * depth + "1" + "]" * depth + ";}")
-    if how == 3:  # a chain of references
+    if how == 3:  # chain of references
         depth = min(depth, 3000)
         text = "".join(
             f'def Xform "P{i}" (prepend references = </P{i + 1}>) {{}}\n' for i in range(depth)
         )
         return _write(folder, text + f'def Xform "P{depth}" {{ {TRIANGLE} }}')
-    if how == 4:  # instancers in instancers
+    if how == 4:  # nested instancers
         depth = min(depth, 3000)
         text = "".join(
             f'def PointInstancer "P{i}" {{ rel prototypes = </P{i + 1}>\nint[] protoIndices = [0]\n'
@@ -132,7 +132,7 @@ def deep(rng: random.Random, folder: Path) -> Path:
             for i in range(depth)
         )
         return _write(folder, text + f'def Xform "P{depth}" {{ {TRIANGLE} }}')
-    if how == 5:  # a chain of shaders
+    if how == 5:  # chain of shaders
         depth = min(depth, 3000)
         text = 'def Material "M" { token outputs:surface.connect = </M/N0.outputs:out>\n'
         for i in range(depth):
@@ -144,7 +144,7 @@ def deep(rng: random.Random, folder: Path) -> Path:
         last = 'uniform token info:id = "UsdPreviewSurface"\ntoken outputs:out;'
         text += f'def Shader "N{depth}" {{ {last} }} }}\n'
         return _write(folder, text + BOUND)
-    depth = min(depth, 1000)  # sublayers of sublayers
+    depth = min(depth, 1000)  # nested sublayers
     for i in range(depth):
         _write(folder, f"(subLayers = [@layer{i + 1}.usda@])\n", f"layer{i}.usda")
     _write(folder, TRIANGLE, f"layer{depth}.usda")
@@ -152,7 +152,7 @@ def deep(rng: random.Random, folder: Path) -> Path:
 
 
 def doubling(rng: random.Random, folder: Path) -> Path:
-    """Each prim holds the next twice or more: a few lines mean billions of prims."""
+    """Each prim contains the next one at least twice, so that a few lines expand to billions."""
     levels, width = rng.choice(((6, 2), (10, 2), (14, 2), (30, 2), (8, 8), (3, 16), (64, 2)))
     how = rng.randrange(4)
     text = ""
@@ -175,7 +175,7 @@ def doubling(rng: random.Random, folder: Path) -> Path:
 
 
 def arrays(rng: random.Random, folder: Path) -> Path:
-    """Meshes and instancers whose arrays do not fit each other."""
+    """Meshes and instancers whose arrays do not match each other."""
 
     def numbers(count: int, low: int, high: int) -> str:
         return ", ".join(str(rng.randint(low, high)) for _ in range(count))

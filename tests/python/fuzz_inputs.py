@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken inputs that are no stages or images.
+"""Broken inputs other than stages and images.
 
-Profiles of lamps, MaterialX, meshes, what renders leave behind, names of pictures. Each is made of
-a sound one by the mutations of ``fuzz_cases``; ``fuzz_worker`` and the command judge it by the
-name of its file.
+IES profiles, MaterialX, meshes, files that renders write, names of image files. Each is made from
+a valid file by the mutations of ``fuzz_cases``. ``fuzz_worker`` and the command decide by the
+file name how to read it.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def Scope "Render" {
 
 @cache
 def ply_bytes(form: str) -> bytes:
-    """A small mesh in one of PLY's three formats."""
+    """Returns a small mesh in one of the three PLY formats."""
     import struct
 
     head = PLY_HEAD.format(form=form).encode()
@@ -192,7 +192,8 @@ def ply_bytes(form: str) -> bytes:
 
 @cache
 def left_over(what: str) -> bytes:
-    """What a render of ``BALL`` leaves: "ckpt", "exr" (of seed 1 or, "exr2", 2), "json"."""
+    """Returns a file that a render of ``BALL`` writes: "ckpt", "exr" (seed 1), "exr2" (seed 2) or
+    "json"."""
     import wavecomb
     from wavecomb.run.costs import save_costs
 
@@ -242,7 +243,7 @@ def Material "Look" {
 
 @cache
 def vdb_bytes(name: str = "a.vdb", packed: str = "none", bits: str = "32") -> bytes:
-    """Two small grids, one of them with a tile."""
+    """Returns two small grids, one of them with a tile."""
     import numpy as np
 
     rng = np.random.default_rng(1)
@@ -266,9 +267,9 @@ def vdb_bytes(name: str = "a.vdb", packed: str = "none", bits: str = "32") -> by
 
 
 def _nvdb(rng: random.Random, mutate: Mutation) -> bytes:
-    """An .nvdb file that is broken: anywhere, at its heads, or at words that say something.
+    """Returns a broken .nvdb file: mutated anywhere, in its headers, or at nonzero words.
 
-    Most of such a file are zeros, which nobody reads.
+    Most of such a file is zeros that are not read.
     """
     packed, bits = rng.choice(("none", "none", "zip", "blosc")), rng.choice(("32", "8", "n"))
     data = vdb_bytes("a.nvdb", packed, bits)
@@ -298,7 +299,7 @@ STRANGE = (
 
 
 def swap_words(rng: random.Random, data: bytes) -> bytes:
-    """Words of a text become others, of it or strange ones."""
+    """Replaces words of a text by other words of it, or by unusual ones."""
     for _ in range(rng.choice((1, 1, 2, 4))):
         found = list(_WORDS.finditer(data))
         if not found:
@@ -310,7 +311,7 @@ def swap_words(rng: random.Random, data: bytes) -> bytes:
 
 
 def _checkpoint(rng: random.Random, mutate: Mutation) -> bytes:
-    """The archive is broken as a whole, or one of its members is."""
+    """Returns a checkpoint that is broken as an archive, or in one of its members."""
     data = left_over("ckpt")
     if rng.random() < 0.5:
         return mutate(rng, data)
@@ -337,7 +338,7 @@ def _costs(rng: random.Random) -> bytes:
 
 
 def _names(folder: Path) -> tuple[str, ...]:
-    """Names of pictures, many of which lead out of the folder."""
+    """Returns names of image files, many of which point outside of the folder."""
     outside = folder.parent / "outside.exr"
     return (
         "a.exr", "sub/a.exr", "../outside.exr", "../../outside.exr", str(outside), "link/a.exr",
@@ -348,7 +349,7 @@ def _names(folder: Path) -> tuple[str, ...]:
 
 
 def make_input(kind: str, rng: random.Random, folder: Path, mutations: list[Mutation]) -> Path:
-    """Writes the files of a case; gives the one that is to be judged."""
+    """Writes the files of a case. Returns the file to read."""
     mutate = rng.choice([*mutations, swap_words])
     stage = folder / "stage.usda"
     if kind == "ies":
@@ -409,11 +410,12 @@ INPUTS = (
     *(("nvdb",) if vdb.nano_version() and nvdb.writer() else ()),
 )  # fmt: skip
 BY_COMMAND = ("product names",)
-"""Kinds that only the command judges: it is what writes files."""
+"""Kinds that only the command can check, because it writes the files."""
 
 
 def words_for(case: Path) -> list[str]:
-    """Arguments of ``wavecomb`` that have it read a case; what it may write is behind ``-o``."""
+    """Returns arguments of ``wavecomb`` that make it read a case. Its output file follows ``-o``.
+    """
     out, stage = str(case.with_name("out.exr")), str(case.with_name("stage.usda"))
     small = ["--size", "8", "8", "--spp", "1", "--quiet"]
     if case.name.startswith("mesh."):

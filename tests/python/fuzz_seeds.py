@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole stages and images, from which ``fuzz_cases`` makes broken ones.
+"""Valid stages and images from which ``fuzz_cases`` makes broken ones.
 
-Small, and with one of everything that the loader reads: a mutation should land where something
-happens.
+They are small and contain one of everything that the loader reads, so that most mutations have
+an effect.
 """
 
 from __future__ import annotations
@@ -259,18 +259,18 @@ def Xform "Root" {
 """
 
 IMAGES = {"png": "uint8", "jpg": "uint8", "exr": "half", "hdr": "float"}
-"""Suffix -> type of the pixels."""
+"""Pixel type by file suffix."""
 
 
 def stage_text(texture: str = "a.png", dome: str = "a.hdr") -> str:
-    """The stage, with the files that it names."""
+    """Returns the stage as text, with the given texture and dome files."""
     text = STAGE.replace("TEXTURE", texture).replace("DOME", dome)
     return text.replace("OTHER", "other.usda")
 
 
 @cache
 def stage_bytes(suffix: str) -> bytes:
-    """The stage as .usda, .usdc or .usdz."""
+    """Returns the stage as .usda, .usdc or .usdz."""
     text = stage_text()
     if suffix == "usda":
         return text.encode()
@@ -291,7 +291,7 @@ def stage_bytes(suffix: str) -> bytes:
 
 @cache
 def image_bytes(suffix: str) -> bytes:
-    """A picture of 24 x 12 pixels."""
+    """Returns an image of 24 x 12 pixels."""
     import OpenImageIO as oiio
 
     rows, columns = np.indices((12, 24))

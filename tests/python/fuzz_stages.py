@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken stages, images and other inputs by the thousand: ``make fuzz MINUTES=10``.
+"""Fuzzes the loader and the renderer with thousands of broken inputs: ``make fuzz MINUTES=10``.
 
-Each case is made from its kind, the seed and a number (``fuzz_cases``). Workers (``fuzz_worker``)
-load and render cases in turn, with nothing around them: so we see where a library crashes. A case
-that kills its worker, or takes longer than the limit there, is then given to ``wavecomb render`` as
-a user would, which must say one clear line and end with code 2, within the limit.
+A case is determined by its kind, the seed and a number (``fuzz_cases``). Workers (``fuzz_worker``)
+load and render cases one after another, without a sandbox, so that crashes of libraries are seen.
+A case that crashes its worker or exceeds the time limit is then given to ``wavecomb render``, as a
+user would run it. The command must print one clear line and exit with code 2 within the limit.
 
     python tests/python/fuzz_stages.py                       # 2,000 cases of seed 1, a table
     python tests/python/fuzz_stages.py --minutes 10          # as many as fit, a summary for docs
@@ -39,7 +39,7 @@ from fuzz_inputs import BY_COMMAND, words_for
 from fuzz_seeds import stage_text
 
 GOOD = ("rendered", "warned", "refused", "contained")
-"""Outcomes that a user can live with; the others are faults."""
+"""Acceptable outcomes. All others are faults."""
 
 WORKER_BYTES = 3 << 30
 LIMIT_S = 10.0
@@ -47,16 +47,16 @@ LIMIT_S = 10.0
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of a case.
+    """Result of a case.
 
     Attributes:
-        kind: Of ``KINDS``.
-        number: Of the case within its kind.
-        outcome: rendered, warned, refused; contained: a library crashed, and the caller got a
-            line; wrong, hang: a fault.
-        said: The line, or what was wrong.
-        seconds: Taken by the worker, or by the command.
-        death: How the worker ended, where it did.
+        kind: One of ``KINDS``.
+        number: Number of the case within its kind.
+        outcome: rendered, warned, refused; contained (a library crashed, and the user got one line);
+            wrong or hang, which are faults.
+        said: The message, or a description of the fault.
+        seconds: Time of the worker or of the command.
+        death: How the worker ended, if it did.
     """
 
     kind: str
@@ -68,15 +68,15 @@ class Verdict:
 
     @property
     def name(self) -> str:
-        """What --case takes."""
+        """Returns the argument of --case."""
         return f"{self.kind}/{self.number}"
 
 
 class Watch:
-    """A limit to the time that a process and its children compute.
+    """Limit on the CPU time of a process and its children.
 
-    So a machine that is busy, or halts a process for a while, finds no hangs where there are none.
-    One that waits for ever is found by the clock, later.
+    A busy machine that halts processes for a while then causes no false hangs. A process that waits
+    for ever is detected by a longer limit on wall-clock time.
     """
 
     PATIENCE = 12
@@ -88,11 +88,11 @@ class Watch:
         self._busy_s = self._idle_s = 0.0
 
     def is_over(self) -> bool:
-        """Whether it took too long; asked about ten times a second."""
+        """Returns whether a limit is exceeded. Call about ten times per second."""
         now, cpu = time.monotonic(), self._cpu_s()
         passed, computed = now - self._last, max(0.0, cpu - self._cpu)
         self._busy_s += min(passed, computed)
-        # Where we were halted, it was too.
+        # A gap of a second or more means that this process was halted, and so was the other one.
         self._idle_s += passed if passed < 1.0 else 0.0
         self._last, self._cpu = now, cpu
         return self._busy_s > self._limit_s or self._idle_s > self.PATIENCE * self._limit_s
@@ -108,7 +108,7 @@ class Watch:
 
 
 class Worker:
-    """A process that judges stages, started anew when it died."""
+    """Worker process that reads cases, restarted after it ended."""
 
     def __init__(self, limit_s: float, folder: Path) -> None:
         self._folder = folder
@@ -116,7 +116,7 @@ class Worker:
         self._process: subprocess.Popen[str] | None = None
 
     def judge(self, stage: Path) -> tuple[str, str, str]:
-        """(outcome, said, death); the outcome is "died" or "hang" where there is no answer."""
+        """Returns (outcome, said, death). The outcome is "died" or "hang" if there is no answer."""
         process = self._started()
         assert process.stdin is not None
         process.stdin.write(f"{stage}\n")
@@ -133,7 +133,7 @@ class Worker:
         return "died", "", signal.Signals(-code).name if code < 0 else f"code {code}"
 
     def start(self) -> None:
-        """Starts the process where there is none."""
+        """Starts the process if it is not running."""
         self._started()
 
     def _started(self) -> subprocess.Popen[str]:
@@ -179,11 +179,11 @@ class Worker:
 
 
 PLACES = ("home", "work", "tmp")
-"""Folders of the processes that judge cases, beside those of the cases."""
+"""Folders that worker processes use in addition to those of the cases."""
 
 
 def environment(place: Path) -> dict[str, str]:
-    """Of a process whose files are all below a folder."""
+    """Returns environment variables that keep the files of a process below a folder."""
     for name in PLACES:
         (place / name).mkdir(exist_ok=True)
     own = {"HOME": "home", "XDG_CACHE_HOME": "home", "TMPDIR": "tmp"}
@@ -191,15 +191,15 @@ def environment(place: Path) -> dict[str, str]:
 
 
 def strays(place: Path, before: set[Path], case: Path) -> list[str]:
-    """Files that came to a folder beside those of the case."""
+    """Returns new files in a folder outside of the case."""
     now = {path for path in place.rglob("*") if not path.is_relative_to(case)}
     return sorted(str(path) for path in now - before if "tmp" not in path.parts[-2:])
 
 
 def command_line(case: Path, limit_s: float, *, named: bool = False) -> tuple[str, str]:
-    """(outcome, said) of ``wavecomb`` on a case, as a user would run it.
+    """Runs ``wavecomb`` on a case as a user would. Returns (outcome, said).
 
-    ``named``: the stage itself says what its pictures are called.
+    ``named``: the stage itself names its image files.
     """
     words = words_for(case)
     out = Path(words[words.index("-o") + 1])
@@ -238,7 +238,7 @@ def command_line(case: Path, limit_s: float, *, named: bool = False) -> tuple[st
 def check(
     worker: Worker, kind: str, number: int, seed: int, folder: Path, limit_s: float
 ) -> Verdict:
-    """Makes a case in an empty folder and sees what comes of it."""
+    """Makes a case in an empty folder and checks it."""
     case = make_case(kind, seed, number, folder)
     worker.start()
     before = set(folder.parent.rglob("*"))
@@ -264,7 +264,8 @@ def run(
     keep: Path | None = None,
     until: float = math.inf,
 ) -> list[Verdict]:
-    """Checks cases with some workers, until a time; faults are kept where ``keep`` says."""
+    """Checks cases with several workers until a deadline. Copies the files of faults to ``keep``.
+    """
     queue: SimpleQueue[tuple[int, tuple[str, int]]] = SimpleQueue()
     for case in enumerate(cases):
         queue.put(case)
@@ -299,7 +300,7 @@ def run(
 
 
 def table(verdicts: list[Verdict]) -> str:
-    """Outcomes by kind, as Markdown."""
+    """Returns outcomes by kind as a Markdown table."""
     columns = ("rendered", "warned", "refused", "contained", "wrong", "hang")
     lines = [
         f"| kind | cases | {' | '.join(columns)} | slowest s |",
@@ -324,7 +325,7 @@ GROUPS = {
 
 
 def summary(verdicts: list[Verdict], seed: int) -> str:
-    """The table of docs/testing.md: kinds summed up, with the commit."""
+    """Returns the table of docs/testing.md: totals by group of kinds, with the commit."""
     columns = ("rendered", "warned", "refused", "contained", "wrong", "hang")
     heads = ("read", "with warnings", "refused", "contained crash", "wrong", "hang")
     rows: dict[str, Counter[str]] = {}
@@ -346,7 +347,7 @@ def summary(verdicts: list[Verdict], seed: int) -> str:
 
 
 def main() -> int:
-    """The command; 1 where there are faults."""
+    """Runs the command. Returns 1 if there are faults."""
     parser = argparse.ArgumentParser(description="Fuzzes the loader.")
     parser.add_argument("--cases", type=int, default=2000)
     parser.add_argument("--minutes", type=float, help="as many cases as fit, instead of --cases")

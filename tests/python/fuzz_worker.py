@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loads and renders broken stages, one after the other: a process of ``fuzz_stages``.
+"""Loads and renders broken stages one after another: the worker process of ``fuzz_stages``.
 
-Reads a stage's file from each line of stdin and answers with a line of JSON: ``outcome`` (one of
-``OUTCOMES``) and ``said``. Nothing here protects it from a library that crashes.
+Reads the path of a stage from each line of stdin. Answers with a line of JSON: ``outcome`` (one of
+``OUTCOMES``) and ``said``. Crashes of libraries end the process.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import NoReturn, TextIO
 
 LOAD_LIMIT_S = 1.5
-"""Less than the default, which would make thousands of cases take hours."""
+"""Time limit for loading. The default would make thousands of cases take hours."""
 
 OUTCOMES = ("rendered", "warned", "refused", "wrong")
 
 
 def read(case: Path) -> tuple[str, str]:
-    """What comes of an input that is no stage, by its name (``fuzz_inputs``)."""
+    """Reads an input that is not a stage, as its name requires. Returns (outcome, message)."""
     import wavecomb
     from wavecomb.picture.merge import merge
     from wavecomb.run.costs import load_costs
@@ -44,7 +44,7 @@ def read(case: Path) -> tuple[str, str]:
     elif case.name == "case.exr":
         try:
             merge([case, case.with_name("good.exr")])
-        except OSError as error:  # as it says; the command makes a line of it
+        except OSError as error:  # merge() may raise it; the command prints it as one line
             line = str(error)
             return ("refused" if line and "\n" not in line else "wrong"), line
     else:
@@ -53,7 +53,7 @@ def read(case: Path) -> tuple[str, str]:
 
 
 def judge(stage: str) -> tuple[str, str]:
-    """What comes of a stage, and the line that says why."""
+    """Loads and renders a stage. Returns (outcome, message)."""
     import numpy as np
 
     import wavecomb
@@ -83,7 +83,7 @@ def judge(stage: str) -> tuple[str, str]:
 
 
 def watch_writes(inside: str) -> list[str]:
-    """The paths outside of a folder that Python writes to from now on."""
+    """Returns a list of paths outside of a folder that Python writes to from now on."""
     written: list[str] = []
     writing = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 
@@ -110,14 +110,14 @@ def watch_writes(inside: str) -> list[str]:
 
 
 def give_up(answers: TextIO, line: str) -> NoReturn:
-    """USD composes without end: only the end of the process stops it."""
+    """Answers and ends the process. USD composes without end, so nothing else stops it."""
     answer = {"outcome": "refused", "said": line, "ended": True}
     print(json.dumps(answer), file=answers, flush=True)
     os._exit(0)
 
 
 def main() -> None:
-    """Answers until stdin ends."""
+    """Answers requests until stdin ends."""
     from wavecomb.run.isolate import patience, trail
     from wavecomb.run.isolate.supervisor import CHATTER
 
@@ -129,7 +129,7 @@ def main() -> None:
     trail.follow(trail.new_page())
     patience.limit_s = LOAD_LIMIT_S
     patience.on_end = functools.partial(give_up, answers)
-    judge(sys.argv[2])  # all is imported, and no case pays for it
+    judge(sys.argv[2])  # imports everything, so that the first case takes no longer
     with tempfile.TemporaryFile() as spilt:
         written = watch_writes(os.path.realpath(os.path.dirname(sys.argv[2])))
         os.dup2(spilt.fileno(), 1)
@@ -144,7 +144,7 @@ def main() -> None:
             sys.stderr.flush()
             if os.fstat(1).st_size:
                 words = os.pread(1, 4096, 0).decode(errors="replace")
-                # The supervisor keeps these off the terminal: the command's own test.
+                # The supervisor filters these lines. Here, they are no fault.
                 if not all(text.startswith(CHATTER) for text in words.splitlines()):
                     outcome, said = "wrong", f"spilt: {words}"
                 os.ftruncate(1, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value graphs in NumPy, double precision: written from the definitions, apart from the core."""
+"""Value graphs in NumPy with double precision, implemented from the definitions alone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def rotl(x, k):
 
 
 def jenkins(*words):
-    """lookup3 of 1 to 4 words."""
+    """Jenkins' lookup3 hash of 1 to 4 words."""
     with np.errstate(over="ignore"):
         a = np.full(words[0].shape, 0xDEADBEEF + 4 * len(words) + 13, np.uint64).astype(np.uint32)
         b, c = a.copy(), a.copy()
@@ -32,7 +32,7 @@ def jenkins(*words):
                 a = (a - c) ^ rotl(c, k)
                 c = c + b
                 a, b, c = b, c, a
-            # Six turns of three names: they are back in their places.
+            # After six rotations, the three names are in their original order.
             a = a + words[3]
         c = (c ^ b) - rotl(b, 14)
         a = (a ^ c) - rotl(c, 11)
@@ -53,7 +53,7 @@ def words_of(cells):
 
 
 def gradient(h, d):
-    """The product of a hash's direction with d."""
+    """Returns the dot product of d and the gradient that hash h selects."""
     if len(d) == 2:
         h = h & U32(7)
         u, v = np.where(h < 4, d[0], d[1]), 2 * np.where(h < 4, d[1], d[0])
@@ -65,7 +65,7 @@ def gradient(h, d):
 
 
 def perlin(p, width):
-    """Gradient noise at points p: a list of axes; 1 or 3 values."""
+    """Returns gradient noise at points p (one array per axis), with 1 or 3 channels."""
     n = len(p)
     cells, parts = zip(*(lattice(axis) for axis in p), strict=True)
     fade = [t * t * t * (t * (t * 6 - 15) + 10) for t in parts]
@@ -183,11 +183,11 @@ FORMULAS = {
     "cos": np.cos,
     "acos": lambda a: np.arccos(np.clip(a, -1, 1)),
 }
-"""What works component by component."""
+"""Functions that work component by component."""
 
 
 def evaluate(value, points):
-    """A value (of ``usd.graphs``) at points (n, 30), textures white."""
+    """Evaluates a value (of ``usd.graphs``) at points (n, 30). Textures are white."""
     points = np.asarray(points, np.float64)
     results = {}
 

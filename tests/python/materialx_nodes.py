@@ -21,7 +21,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 class Textures:
-    """Every file is there, of four channels; the uses are told apart."""
+    """Fake texture loader: every file exists and has four channels. Records distinct uses."""
 
     working = "rec709"
     origin = (0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ class Textures:
 
 
 class Node:
-    """A node of a definition; ``report``: what is said of it."""
+    """A shader node of a MaterialX definition. ``report`` collects the warnings."""
 
     def __init__(self, identifier):
         self.stage = Usd.Stage.CreateInMemory()
@@ -59,14 +59,14 @@ class Node:
         self.networks = Networks(self.material, Usd.TimeCode.Default(), self.textures, self.report)
 
     def give(self, **values):
-        """Constants: text as MaterialX writes it."""
+        """Sets inputs to constants, given as text in MaterialX syntax."""
         for name, text in values.items():
             kind = self.definition.getActiveInput(name).getType()
             self.shader.CreateInput(name, usd_type(kind)).Set(usd_value(str(text), kind))
         return self
 
     def feed(self, name, identifier, output="out", **values):
-        """Lets another node feed an input."""
+        """Connects an input to a new node."""
         source = UsdShade.Shader.Define(self.stage, f"/M/{name}")
         source.CreateIdAttr(identifier)
         definition = library().getNodeDef(identifier)
@@ -79,7 +79,7 @@ class Node:
         return self
 
     def feed_at_random(self):
-        """Numbers, and noise of several scales, for all inputs that are not settings."""
+        """Sets inputs to random numbers or connects them to noise, except for settings."""
         chance = random.Random(zlib.crc32(self.definition.getName().encode()))
         for item in self.definition.getActiveInputs():
             kind, name = item.getType(), item.getName()
@@ -98,11 +98,11 @@ class Node:
         return self
 
     def value(self, output="out", kind="number"):
-        """What an output is compiled to."""
+        """Returns the compiled value of an output."""
         return self.networks.node(self.shader, output, kind)
 
     def call(self, output, kind="number"):
-        """The call of the node, as ``Networks`` would make it."""
+        """Returns the node call that ``Networks`` would make."""
         call = self.networks._call(self.shader, output, kind)
         assert isinstance(call, NodeCall)
         width = next(
@@ -112,17 +112,17 @@ class Node:
         return call
 
     def run(self, points, output="out", kind="number"):
-        """What it comes to at points."""
+        """Evaluates an output at points."""
         return run(self.value(output, kind), points)
 
 
 def run(value, points):
-    """A value at points (n, components), and how many operations it takes."""
+    """Evaluates a value at points. Returns components (n, components) and the operation count."""
     return assemble(dict(enumerate(fit(value, len(value))))).run(points)
 
 
 def points(n=200):
-    """Points at random: uv in 0..1, places in -1.5..1.5, unit directions."""
+    """Returns random points: uv in 0..1, positions in -1.5..1.5, unit directions."""
     chance = np.random.default_rng(3)
     table = chance.uniform(-1.5, 1.5, (n, POINT_SIZE)).astype(np.float32)
     table[:, :2] = chance.uniform(0, 1, (n, 2))
@@ -134,7 +134,7 @@ def points(n=200):
 
 @functools.cache
 def patterns():
-    """Definitions of the library whose outputs are numbers, by name, with those outputs."""
+    """Returns the definitions of the library with numeric outputs, by name, with those outputs."""
     found = {}
     for definition in library().getNodeDefs():
         outputs = [o.getName() for o in definition.getActiveOutputs() if o.getType() in WIDTHS]

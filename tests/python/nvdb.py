@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-""".nvdb files for tests, written by NanoVDB's own code (tests/nanovdb)."""
+"""Test files in .nvdb format, written by NanoVDB (tests/nanovdb)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @functools.cache
 def writer() -> Path | None:
-    """The program that writes them; None: it is not built."""
+    """Returns the program that writes them, or None if it is not built."""
     found = sorted(ROOT.glob("build/*/tests/nanovdb/wavecomb_nvdb_writer"))
     return found[0] if found else None
 
 
 def needs_nvdb() -> pytest.MarkDecorator:
-    """Marks tests that read .nvdb files; those of a build without NanoVDB may skip them."""
+    """Returns a mark for tests that read .nvdb files, skipped in builds without NanoVDB."""
     from parts import NOT_HERE
 
     if not vdb.nano_version():
@@ -35,12 +35,12 @@ def needs_nvdb() -> pytest.MarkDecorator:
 
 
 def write(path: str | Path, grids: Sequence[Mapping[str, Any]], packed: str = "none") -> None:
-    """Writes grids as ``vdb.write`` takes them; the same grids give the same bytes.
+    """Writes grids given as for ``vdb.write``. Equal grids give equal bytes.
 
     Args:
-        path: Of the file.
-        grids: With ``bits`` ("4", "8", "16", "n") numbers are quantised by leaf. There are no
-            halves.
+        path: Output file.
+        grids: With ``bits`` ("4", "8", "16", "n"), values are quantised by leaf. There are no
+            half-precision grids.
         packed: "none", "zip" or "blosc".
     """
     program = writer()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders that are stopped on their way."""
+"""Renders that are stopped before their end."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 
 
 class StopAt:
-    """Stops a render after so many snapshots, and keeps the state of the last."""
+    """Stops a render after a number of snapshots and keeps the last state."""
 
     def __init__(self, snapshots: int) -> None:
         self._left = snapshots
         self.state: dict[str, Any] = {}
 
     def progress(self, status: dict[str, Any]) -> str:
-        """Asks for a snapshot, or for the end."""
+        """Requests a snapshot, or stops the render."""
         return "snapshot" if self._left > 0 else "stop"
 
     def snapshot(self, snapshot: Any) -> None:
-        """Keeps copies of what it holds."""
+        """Copies the state of the render."""
         self._left -= 1
         self.state = {
             name: value.copy() if hasattr(value, "copy") else value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adaptive and timed renders: exact, no more than asked for, and on time."""
+"""Adaptive and timed renders: exact sample counts, no excess samples, and time limits."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_one_picture_whatever_the_schedule(cornell: Any, ending: dict[str, float
 
 @pytest.mark.slow
 def test_samples_of_a_pixel_are_those_of_a_plain_render(cornell: Any) -> None:
-    """A pixel with n samples is the pixel of a render with n for all: nothing is left out."""
+    """A pixel with n samples equals the pixel of a render with n samples per pixel."""
     picture = render(cornell, noise=0.06)
     for count in np.unique(picture.samples):
         plain = render(cornell, spp=int(count), error=True)
@@ -85,7 +85,7 @@ def test_noise_target_is_met(cornell: Any) -> None:
         picture = render(cornell, spp=4096, noise=target, seed=6)
         assert picture.stats["error"] <= target
         true = np.abs(picture.beauty - reference).sum() / reference.sum()
-        # Sobol's samples are better than the halves, taken as independent, can tell.
+        # The half buffers count as independent and overestimate the error of Sobol samples.
         assert 0.4 * target < true < 1.1 * target
 
 
@@ -108,7 +108,7 @@ def test_error_and_variance_of_a_plain_render(cornell: Any) -> None:
     independent = [
         render(cornell, spp=64, sampler="independent", seed=k, error=True) for k in range(24)
     ]
-    here = plain.beauty.max(axis=2) < 1.0  # not the lamp's edge, where few samples decide
+    here = plain.beauty.max(axis=2) < 1.0  # not the edge of the light, where few samples decide
     measured = np.var([p.beauty[here] for p in independent], axis=0, ddof=1).mean()
     told = np.mean([p.variance[here] for p in independent])
     assert told == pytest.approx(measured, rel=0.1), "independent samples: Welford is right"
@@ -140,7 +140,7 @@ def test_time_limit(cornell: Any) -> None:
 
 
 def test_time_limit_with_little_time(cornell: Any) -> None:
-    """Less than a sample takes: each pixel has one all the same."""
+    """Even with too little time for one sample per pixel, each pixel has one."""
     picture = render(cornell, size=128, time_limit=1e-4)
     assert (picture.samples == 1).all()
 
@@ -155,7 +155,7 @@ def test_time_limit_is_no_reason_to_go_on(cornell: Any) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("limit", [5.0, 12.0])
 def test_time_limit_is_kept_within_five_percent(cornell: Any, limit: float) -> None:
-    """Of limits that are long; ``test_time_limit`` has a short one."""
+    """Long limits. ``test_time_limit`` checks a short one."""
     for settings in ({}, {"noise": 0.001}):
         picture = render(cornell, size=256, spp=1 << 20, time_limit=limit, **settings)
         assert picture.stats["seconds"]["render"] == pytest.approx(limit, rel=0.05)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Samples that are allotted to pixels: one picture, the budget, resuming, what is refused."""
+"""Allotted samples: schedules, budget, resuming, refused settings."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_too_few_samples_are_even(cornell: Any) -> None:
 
 
 def test_is_unbiased(cornell: Any) -> None:
-    """Means of many pictures of few samples meet that of even ones."""
+    """The mean of many low-sample images equals that of images with even sampling."""
 
     def means(way: str, first: int) -> Any:
         return np.array(
@@ -92,7 +92,7 @@ def test_is_unbiased(cornell: Any) -> None:
 
 
 class _StopAfter:
-    """Stops a render once it has so many samples, and keeps its state."""
+    """Stops a render after a number of samples and keeps its state."""
 
     def __init__(self, samples: int) -> None:
         self._samples = samples

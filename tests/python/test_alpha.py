@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures that go over others: no dome to the camera, an alpha channel in every file."""
+"""Images for compositing: a dome hidden from the camera, and an alpha channel in every file."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_it_is_the_picture_without_what_is_behind(stage: Path) -> None:
     full = alpha == 1
     assert full.sum() > 20 and np.array_equal(clear.beauty[full], whole.beauty[full])
     assert (clear.beauty <= whole.beauty + 1e-6).all()
-    # What was taken away is the light of the dome and of the sun's disc.
+    # The difference is the light of the dome and of the sun's disc.
     edge = (alpha > 0) & (alpha < 1)
     assert edge.any() and (clear.beauty[edge] < whole.beauty[edge]).all()
 

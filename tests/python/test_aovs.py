@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AOVs from stage to file: what may be asked for, what comes out, what it is called."""
+"""AOVs from stage to file: allowed names, values, layer names."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_names_are_expanded() -> None:
 
 
 def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> None:
-    """A row whose value no path finds would be a layer of nothing."""
+    """Every AOV of the table gets a value. An AOV without one would be an empty layer."""
     layers = {**picture.layers(), **picture.aovs}
     elsewhere = {
         "guided_share": "test_guiding.py", "by_light_paths": "test_techniques.py",
@@ -124,7 +124,7 @@ def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> No
         if name in elsewhere:
             assert not layers[name].any(), elsewhere[name]
             continue
-        if name == "transmittance":  # of volumes: test_volume_aovs.py
+        if name == "transmittance":  # for volumes: test_volume_aovs.py
             assert (layers[name] == 1).all()
             continue
         kept = [n for n in layers if n.startswith("light_")] if row.kind == "groups" else [name]
@@ -132,7 +132,7 @@ def test_every_row_of_the_table_finds_its_value(picture: wavecomb.Picture) -> No
             layer = layers[one]
             if row.channels:
                 assert layer.shape[2:] == ((row.channels,) if row.channels > 1 else ()), one
-            # Ids of a Cryptomatte are bits.
+            # The ids of a Cryptomatte layer are bit patterns.
             values = layer.view(np.uint32) if row.kind == "coverage" else layer
             assert values.max() > values.min(), one
 
@@ -200,7 +200,7 @@ def test_positions_lie_where_the_matrices_say(picture: wavecomb.Picture) -> None
     clip = points @ picture.metadata["worldToNDC"]
     ndc = clip[:, :2] / clip[:, 3:]
     place = np.column_stack([(ndc[:, 0] + 1) * 32 - 0.5 - x, (1 - ndc[:, 1]) * 24 - 0.5 - y])
-    # Of sixteen samples under the filter, the nearest to the centre is well within the pixel.
+    # The nearest of sixteen samples is well within the pixel.
     assert np.abs(place).max() < 1.0
     assert np.sqrt((place**2).sum(axis=1)).mean() < 0.3
     camera = points @ picture.metadata["worldToCamera"]
@@ -248,7 +248,7 @@ def test_cryptomatte_in_a_file(picture: wavecomb.Picture, tmp_path: Path) -> Non
     assert ball.max() == 1
     assert 0 < ((ball > 0) & (ball < 1)).mean() < 0.2, "edges are shared"
     assert (np.diff(pairs[:, :, 1::2], axis=2) <= 0).all(), "most coverage first"
-    # Ids and counts are exact in a file of halves, colours are not.
+    # With half precision, ids and counts are exact and colours are not.
     assert layers["samples"].min() == 16
     assert layers["position"].tobytes() == picture.aovs["position"].tobytes()
     assert layers["direct"].tobytes() != picture.aovs["direct"].tobytes()
@@ -272,7 +272,7 @@ def test_one_file_each(picture: wavecomb.Picture, tmp_path: Path) -> None:
     files = picture.save(tmp_path / "a.exr", split=True, compression="dwaa", half=True)
     assert {file.name for file in files} == {file.name for file in tmp_path.iterdir()}
     assert {"a.exr", "a.crypto_object.exr", "a.light_key.exr"} < {file.name for file in files}
-    # Ids come through, whatever the compression.
+    # Ids survive every compression.
     crypto = tmp_path / "a.crypto_object.exr"
     assert read_metadata(crypto)["compression"] == "zip"
     assert read_metadata(tmp_path / "a.exr")["compression"].startswith("dwaa")
@@ -348,7 +348,7 @@ def test_objects_are_named_by_their_instances(tmp_path: Path) -> None:
 
 
 def test_light_groups_that_cannot_be_told_apart(tmp_path: Path) -> None:
-    """Names that become one, and more groups than there is room for, are said; no mesh goes."""
+    """Duplicate and excess light groups are reported, and no mesh is lost."""
     glow = """
     def Material "Glow" {
         token outputs:surface.connect = </World/Glow/S.outputs:surface>

@@ -192,7 +192,7 @@ def test_scene_builder_for_real(tmp_path: Path) -> None:
     builder.set_camera(np.eye(4), window=(-0.5, 0.5, -0.5, 0.5))
     scene = builder.build()
     picture = wavecomb.render(scene, size=(16, 8), spp=64, filter="box", filter_width=1)
-    # A flat wall under an even sky: albedo times radiance, whatever the sampler does.
+    # A flat wall under an even sky has the radiance albedo times sky, for any sampler.
     assert picture.beauty.mean() == pytest.approx(0.5, rel=0.02)
     assert picture.albedo == pytest.approx(0.5)
     assert picture.depth == pytest.approx(2.0)
@@ -210,7 +210,7 @@ def test_scene_builder_for_real(tmp_path: Path) -> None:
 
 
 def test_each_filter_has_its_own_width() -> None:
-    """A box is the pixel itself unless another width is asked for."""
+    """The default width of a box filter is one pixel; other filters have other defaults."""
     core = pytest.importorskip("wavecomb._core")
     widths = {"box": 1.0, "gaussian": 3.0, "blackman-harris": 3.0}
     for name, width in widths.items():

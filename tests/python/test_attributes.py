@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Primvars that vary and drive materials: interpolated at hits, in every interpolation."""
+"""Primvars that drive materials, in every interpolation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _core = pytest.importorskip("wavecomb._core")
 
 POINTS = [(x, y, 0.0) for y in range(3) for x in range(3)]
 FACES = [(0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (3, 4, 7), (3, 7, 6), (4, 5, 8), (4, 8, 7)]
-"""Triangles over [0, 2]^2, so that faces and triangles are one."""
+"""Triangles over [0, 2]^2. Each face is one triangle."""
 
 CAMERA = """def Camera "Cam" {
     token projection = "orthographic"
@@ -66,7 +66,7 @@ def picture(tmp_path, text, aovs=("albedo", "position"), spp=1, size=(40, 40), *
 
 
 def interpolated(where, values, kind):
-    """Values at places (n, 2) on the grid, by NumPy."""
+    """Returns interpolated values at positions (n, 2) on the grid, computed with NumPy."""
     values = np.asarray(values, np.float64)
     out = np.full((len(where), values.shape[1]), np.nan)
     points = np.array(POINTS)[:, :2]
@@ -102,13 +102,13 @@ def test_interpolation_is_numpys(tmp_path, kind, mirrored):
     expected = interpolated(where, values, kind)
     assert np.isfinite(expected).all()
     seen = made.albedo.reshape(-1, 3)
-    # On edges between faces that differ either may be right.
+    # On an edge between different faces, either value is right.
     wrong = np.abs(seen - expected).max(axis=1) > 1e-4
     assert wrong.mean() < (0.01 if kind in ("uniform", "faceVarying") else 1e-9)
 
 
 def test_numbers_of_a_material_and_its_fallback(tmp_path):
-    """A roughness by a primvar, with the reader's fallback on the mesh that has none."""
+    """A primvar drives roughness. A mesh without the primvar uses the fallback of the reader."""
     reader = READER.format(kind="float", name="rough", fallback="0.75")
     text = material("float inputs:roughness.connect = </Mat/P.outputs:result>", reader)
     values = np.linspace(0, 1, 9)[:, None]
@@ -132,7 +132,7 @@ def test_numbers_of_a_material_and_its_fallback(tmp_path):
 
 
 def test_nodes_of_networks_read_primvars(tmp_path):
-    """geompropvalue: a constant folds, what varies is read, and a second uv set is a primvar."""
+    """A constant geompropvalue folds, a varying one is read, and a second uv set is a primvar."""
     nodes = """def Shader "G" { uniform token info:id = "ND_geompropvalue_float"
             string inputs:geomprop = "wear"
             float inputs:default = 0.5
@@ -174,7 +174,7 @@ def test_nodes_of_networks_read_primvars(tmp_path):
     assert set(whole.names) == {"displayColor", "st1"}
     assert set(scene.mesh("A")["attributes"]) == {"displayColor", "st1"}
     assert scene.mesh("A")["uvs"].shape == (9, 2) and "several sets" not in said(loaded)
-    # In B nothing varies, and without st1 the product is 0.
+    # B has no varying input, and without st1 the product is 0.
     assert scene.mesh("B")["attributes"] == {}
     assert scene.material_of("/B")["base_color"] == pytest.approx((0.5, 0.5, 0.5))
     rest_of_it = scene.graphs[scene.material_of("/B")["graph"]]
@@ -222,7 +222,7 @@ def test_what_does_not_fit_is_said_once(tmp_path, rest, warning):
 
 
 def test_opacity_by_a_primvar_cuts_out(tmp_path):
-    """displayOpacity is how much of each face rays meet."""
+    """displayOpacity is the fraction of rays that each face intercepts."""
     opacity = np.array([1, 0, 0.5, 1, 0, 0.5, 1, 0], float)[:, None]
     text = grid(
         primvar(np.full((1, 3), 0.5), "constant")
@@ -253,7 +253,7 @@ def test_an_opacity_threshold_cuts_along_a_level_line(tmp_path):
 
 
 def lamp(tmp_path, n, kind):
-    """A floor lit from the side by n x n quads that shine as 3 y."""
+    """Returns a floor lit from the side by n x n quads with the emission 3 y."""
     reader = READER.format(kind="float3", name="glow", fallback="(0, 0, 0)")
     text = material(
         "color3f inputs:emissiveColor.connect = </Mat/P.outputs:result>\n"
@@ -280,7 +280,7 @@ def lamp(tmp_path, n, kind):
 
 
 def test_emission_by_a_primvar_is_aimed_at(tmp_path):
-    """A ramp over two triangles lights as steps over many do, met and aimed at alike."""
+    """Emission that varies over two triangles lights the floor as many constant quads do."""
     ramp, steps = lamp(tmp_path, 1, "vertex"), lamp(tmp_path, 12, "uniform")
     assert ramp.min() > 0.005 and ramp[0, :, 0].mean() > 1.4 * ramp[-1, :, 0].mean()
     assert ramp == pytest.approx(steps, rel=0.12)
@@ -288,7 +288,7 @@ def test_emission_by_a_primvar_is_aimed_at(tmp_path):
 
 
 def everything():
-    """Cut-outs, corners, instances, a subdivision surface and a lamp, all by primvars."""
+    """A stage with cut-outs, all interpolations, instances, a subdivision surface and emission."""
     random = np.random.default_rng(11)
     reader = READER.format(kind="float", name="there", fallback="1")
     cut = material("float inputs:opacity.connect = </Mat/P.outputs:result>\n"

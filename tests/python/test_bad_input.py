@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever is wrong ends in one line that says so: no traceback, no crash, no file left."""
+"""Bad input ends in one clear line: no traceback, no crash, no partial file."""
 
 from __future__ import annotations
 
@@ -76,7 +76,8 @@ def render(stage: Path, out: Path, *options: object) -> subprocess.CompletedProc
 
 
 def refused(done: subprocess.CompletedProcess[str], folder: Path, *names: str) -> str:
-    """Exit code 2, one error line that has all the names, and no picture."""
+    """Asserts exit code 2, one error line with all ``names``, and no image file. Returns the line.
+    """
     assert done.returncode == 2, done.stderr
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1, done.stderr
@@ -88,7 +89,7 @@ def refused(done: subprocess.CompletedProcess[str], folder: Path, *names: str) -
 
 
 def rendered(done: subprocess.CompletedProcess[str], out: Path, *names: str) -> np.ndarray:
-    """Exit code 0, a warning that has all the names, a finite picture with light in it."""
+    """Asserts exit code 0 and a warning with all ``names``. Returns the finite, nonblack image."""
     assert done.returncode == 0, done.stderr
     warnings = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
     assert len(warnings) == len(done.stderr.splitlines())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points that are not finite: what uses them is left out with a warning, and the rest is drawn."""
+"""Points that are not finite: faces that use them are left out with a warning."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ NAN = float("nan")
 
 
 def grid(n, bad, kind="none", extra="", faces=4):
-    """A grid of n x n faces in [0, n]^2 whose point ``bad`` is not finite."""
+    """Returns n x n faces in [0, n]^2 whose point ``bad`` is not finite."""
     points = [(x, y, 0) for y in range(n + 1) for x in range(n + 1)]
     if bad is not None:
         points[bad] = ("nan", 0, 0)
@@ -45,7 +45,7 @@ def test_faces_that_use_a_bad_point_are_left_out(tmp_path, faces, lost, whole):
 
 
 def test_points_far_away_once_they_are_placed(tmp_path):
-    """The transform counts; what is near enough stays."""
+    """Points that a transform moves too far away are left out, others stay."""
     text = grid(3, 5).replace("nan", "1e17")
     order = 'uniform token[] xformOpOrder = ["xformOp:scale"]'
     scale = f"double3 xformOp:scale = (100, 100, 100)\n{order}"
@@ -77,7 +77,7 @@ def test_values_of_faces_stay_with_them(tmp_path):
     scene, _ = load(tmp_path, grid(3, 5, extra=extra + "\nint[] holeIndices = [8]"))
     mesh = scene.mesh("M")
     rate, values = mesh["attributes"]["displayColor"]
-    # Faces 0, 1, 3 and 4 are about point 5, and 8 is a hole.
+    # Faces 0, 1, 3 and 4 use point 5, and face 8 is a hole.
     assert rate == "primitive"
     assert values[::2, 0] == pytest.approx([0.2, 0.5, 0.6, 0.7], abs=1e-6)
 
@@ -88,7 +88,7 @@ def test_subdivision_leaves_them_out_too(tmp_path):
     mesh = scene.mesh("M")
     used = mesh["positions"][mesh["indices"].ravel()]
     assert len(mesh["indices"]) == 5 * 16 * 2
-    # The point that stands in for it lies among its neighbours, so that the grid stays flat.
+    # The point that replaces the bad one lies among its neighbours, so the grid stays flat.
     assert np.abs(used[:, 2]).max() == 0 and used.min() > -0.1 and used.max() < 3.1
     assert not ((used[:, :2] < 1.6).all(axis=1)).any()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures that are cropped, and those that are rendered and written in bands of rows."""
+"""Cropped images, and images rendered and written in bands of rows."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(stage: Path) -> Path:
-    """The picture in one piece."""
+    """The image rendered in one piece."""
     file = stage.with_name("whole.exr")
     done = forks.wavecomb(
         "render", str(stage), "-o", str(file), "--png", str(file.with_suffix(".png")),
@@ -42,7 +42,7 @@ def whole(stage: Path) -> Path:
 
 
 def same(a: Path, b: Path) -> bool:
-    """All layers, bit for bit."""
+    """Returns whether all layers are equal bit for bit."""
     left, right = read_layers(a), read_layers(b)
     return left.keys() == right.keys() and all(
         np.array_equal(left[name], right[name]) for name in left
@@ -71,7 +71,7 @@ def test_bands_are_the_whole_picture(stage: Path, tmp_path: Path, words: tuple[s
 
 
 def test_files_beside_it(stage: Path, whole: Path, tmp_path: Path) -> None:
-    """PNG, a file for each AOV, statistics: as of the whole picture."""
+    """PNG, AOV files and statistics equal those of a render in one piece."""
     file, png, stats = (tmp_path / name for name in ("a.exr", "a.png", "a.json"))
     done = forks.wavecomb(
         "render", str(stage), "-o", str(file), "--png", str(png), "--stats", str(stats), *WORDS,
@@ -111,7 +111,7 @@ def test_a_cropped_picture_says_where_it_lies(stage: Path, whole: Path, tmp_path
 
 
 def test_a_cropped_picture_in_memory(stage: Path) -> None:
-    """From Python, adaptive too: errors beside its edges are those of a region."""
+    """Cropped and adaptive from Python: errors near the edges are those of a region."""
     region = (30, 20, 110, 180)
     for more in ({}, {"noise": 0.2, "spp": 64}):
         options = {"size": SIZE, "spp": 4, "region": region, **more}
@@ -156,7 +156,7 @@ def test_sequences_in_bands(stage: Path, whole: Path, tmp_path: Path) -> None:
 
 
 def grows(folder: Path) -> bool:
-    """Whether a first band is in the command's own folder beside its output."""
+    """Returns whether the command has written a first band to its temporary folder."""
     with contextlib.suppress(FileNotFoundError):
         return any(one.suffix == ".exr" and one.stat().st_size for one in folder.rglob("*"))
     return False
@@ -165,7 +165,8 @@ def grows(folder: Path) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("frames", [False, True])
 def test_a_stopped_picture(stage: Path, tmp_path: Path, frames: bool) -> None:
-    """What is done is written, of a frame of a sequence nothing; the other rows are empty."""
+    """A stopped render writes its finished bands and leaves other rows empty. A frame is not
+    written."""
     file = tmp_path / ("a.1.exr" if frames else "a.exr")
     name = str(tmp_path / "a.#.exr") if frames else str(file)
     words = ["--frames", "1-2"] if frames else []
@@ -179,7 +180,7 @@ def test_a_stopped_picture(stage: Path, tmp_path: Path, frames: bool) -> None:
     while not grows(tmp_path) and process.poll() is None:
         assert time.monotonic() < end
         time.sleep(0.02)
-    # The first band is written, and the others take ten times as long.
+    # The first band is written. The others take ten times as long.
     process.send_signal(signal.SIGINT)
     assert process.wait(60) == 130
     if frames:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The benchmark's suites, plan, runner and data."""
+"""Suites, plan, runner and data of the benchmark."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def test_stages_of_a_folder(tmp_path: Path) -> None:
     suite = load_suite(find_suite("scenes"))
     (tmp_path / "mine.usda").write_text("#usda 1.0\n")
     assert "mine" in {c.stage for c in configurations(with_folder(suite, tmp_path), LIMITS)}
-    # The suite's text names the folder, so results can be resumed and read without the option.
+    # The suite's text names the folder, so results can be resumed without the option.
     kept = tmp_path / "suite.toml"
     kept.write_text(naming_folder(suite, tmp_path).text)
     assert load_suite(kept).stages["mine"].file == (tmp_path / "mine.usda").resolve()
@@ -264,7 +264,7 @@ def test_estimates_follow_what_was_measured() -> None:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The tiny suite, run to its end."""
+    """Results of the complete tiny suite."""
     folder = tmp_path_factory.mktemp("bench")
     result = bench("run", written(folder, TINY), "-o", folder / "out")
     assert result.exit_code == 0, result.stderr
@@ -289,7 +289,7 @@ def test_a_suite_from_end_to_end(results: Path) -> None:
         assert sum(row["hits_per_material"].values()) == row["records"] > 0
         assert row["efficiency"] == pytest.approx(1 / (row["rel_mse"] * row["render_s"]), rel=1e-6)
         assert 0.0 < row["render_s"] < row["wall_s"] and row["spin_s"] > 0.0
-    # Order changes no picture, and another repetition is another picture.
+    # The order does not change the image; another repetition has other noise.
     pictures = {(row["repetition"], row["picture_sha256"]) for row in rows}
     assert len(pictures) == 2 == len({digest for _, digest in pictures})
 
@@ -308,7 +308,7 @@ def test_everything_is_kept(results: Path) -> None:
     costs = json.loads(profile.read_text())["materials"]
     assert len(costs) > 1 and all(ns > 0.0 for ns in costs.values())
     oracle = next(e for e in entries if e["row"]["policy"] == "oracle")
-    # The true costs stay what they are while it renders.
+    # The true costs do not change during the render.
     for name, ns in oracle["costs"]["materials"].items():
         assert ns == pytest.approx(costs[name], rel=1e-4)
     machine = json.loads((results / "machine.json").read_text())
@@ -350,7 +350,7 @@ def test_dry_run_does_nothing_and_estimates(results: Path, tmp_path: Path) -> No
 def test_stopped_and_resumed(tmp_path: Path, how: signal.Signals) -> None:
     text = TINY.replace("golden = true", "").replace('"oracle"', '"program"')
     suite, out = written(tmp_path, text), tmp_path / "out"
-    # Ctrl-C counts even where this test runs in the background of a shell, which ignores it there.
+    # A shell makes its background processes ignore SIGINT, so install Python's handler.
     start = (
         "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
         "runpy.run_module('wavecomb', run_name='__main__', alter_sys=True)"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The analysis on made-up runs with known answers."""
+"""The analysis on generated runs with known answers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def results(tmp_path: Path, rows: list) -> Results:
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [3, 7, 8, 16])
 def test_intervals_cover_as_often_as_they_say(n: int) -> None:
-    """Ratio of means of skewed times that a round shakes together: 0.9 in truth."""
+    """Coverage of intervals for the ratio of skewed times with shared drift; the true ratio is 0.9.
+    """
     rng = np.random.default_rng(8)
     covered = 0
     for _ in range(200):
@@ -169,13 +170,13 @@ def test_share_between_placebo_and_oracle(tmp_path: Path) -> None:
     assert wide.loc["random-runs"].share == pytest.approx(0.0)
     assert wide.loc["oracle"].share == pytest.approx(1.0)
     assert wide.loc["oracle"].verdict == "bound"
-    scalar = table.loc[1]  # nothing is won there, so there is no share to speak of
+    scalar = table.loc[1]  # order gains nothing there, so it has no share
     assert not scalar["gap_shown"].any()
     assert scalar["share"].isna().all()
 
 
 def test_order_is_apart_from_roulette(tmp_path: Path) -> None:
-    """Roulette halves the work; the effect of order must not hold it."""
+    """Roulette halves the work, which must not count as an effect of order."""
     runs = results(
         tmp_path,
         runs_of(
@@ -261,8 +262,8 @@ def test_incomplete_factorials_use_matched_pairs(tmp_path: Path) -> None:
 
 
 def test_interactions_do_not_take_in_what_differs_besides(tmp_path: Path) -> None:
-    # Large waves at one lane too, small ones at 16 only: an order pays at 16 lanes, whatever the
-    # wave, so waves and order do not interact.
+    # Large waves at both widths, small ones at 16 lanes only. Order helps at 16 lanes for either
+    # size, so wave size and order do not interact.
     def time(wave_size: int, lanes: int, policy: str) -> float:
         gain = 0.5 if policy == "material" and lanes == 16 else 1.0
         return gain * 16 / lanes * (1.2 if wave_size == 65536 else 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report and its figures, from made-up results of every kind."""
+"""The report and its figures, from generated results of every kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HTML = "{http://www.w3.org/1999/xhtml}"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with its report, and beside it docs/made-up.md."""
+    """A result folder with its report, and docs/made-up.md beside it."""
     path = write_folder(tmp_path_factory.mktemp("bench") / "made up", everything(), pictures=True)
     assert build(path, path.parent / "docs" / "made-up.md") == path / "report.html"
     return path
@@ -38,7 +38,7 @@ def page(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def tree(page: str) -> ElementTree.Element:
-    """The page, parsed strictly: any error of its HTML fails."""
+    """The page, parsed strictly: any HTML error fails the test."""
     return html5lib.HTMLParser(strict=True).parse(page)
 
 
@@ -103,7 +103,7 @@ def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
 
 @pytest.mark.slow
 def test_cases_are_compared_with_off(folder: Path) -> None:
-    """By error, time and efficiency, at the same limit of time."""
+    """Cases with equal time limits are compared by error, time and efficiency."""
     text = (folder.parent / "docs" / "made-up.md").read_text(encoding="utf-8")
     rows = [line.split("|") for line in text.splitlines() if re.search(r"\| aimed +\|", line)]
     found = [[float(cell.split()[0]) for cell in row[3:6]] for row in rows if "more" in row[-2]]
@@ -116,7 +116,7 @@ def test_viewers(tree: ElementTree.Element) -> None:
     assert len(viewers) == 2
     for viewer in viewers:
         pictures = list(viewer.iter(HTML + "img"))
-        assert len(pictures) == 3  # cost-benefit, all others together, golden
+        assert len(pictures) == 3  # cost-benefit, all other policies, golden
         for select in viewer.iter(HTML + "select"):
             assert len(list(select)) == len(pictures)
     named = "".join(viewers[0].itertext())
@@ -139,7 +139,7 @@ def test_figures_open_and_are_not_blank(folder: Path) -> None:
         assert pixels.shape[1] > 800
         ink = (np.abs(pixels - 1.0) > 0.1).any(axis=2)
         assert 0.003 < ink.mean() < 0.95, name
-        # Ink in three quarters; the last panel of a row of two may be missing.
+        # Three quarters are not blank; the last panel of a row of two may be missing.
         half_y, half_x = ink.shape[0] // 2, ink.shape[1] // 2
         for quarter in (ink[:half_y, :half_x], ink[:half_y, half_x:], ink[half_y:, :half_x]):
             assert quarter.any(), name
@@ -162,7 +162,7 @@ def test_markdown_page(folder: Path) -> None:
     for path in target.with_suffix("").iterdir():
         limit = LARGEST_SVG if path.suffix == ".svg" else LARGEST_PNG
         assert 0 < path.stat().st_size <= limit, path.name
-    # Tables are whole: every row has as many cells as its head, and a head of several rows is told.
+    # Each row of a table has as many cells as its head.
     tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
     assert len(tables) > 5
     for lines in tables:
@@ -173,9 +173,9 @@ def test_markdown_page(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_markdown_says_what_the_page_says(folder: Path, tree: ElementTree.Element) -> None:
-    """Headings, findings, captions of figures, and tables that are not folded."""
+    """The Markdown has the page's headings, findings, captions and unfolded tables."""
     text = " ".join((folder.parent / "docs" / "made-up.md").read_text(encoding="utf-8").split())
-    silent = ("Read the figures with care", "Words")  # the second holds folded parts only
+    silent = ("Read the figures with care", "Words")  # the second contains folded parts only
     for heading in texts(tree, "h2"):
         assert heading in silent or f"## {heading}" in text
     viewers = [e for e in tree.iter(HTML + "div") if e.get("class") == "viewer"]
@@ -191,7 +191,7 @@ def test_markdown_says_what_the_page_says(folder: Path, tree: ElementTree.Elemen
 
 @pytest.mark.slow
 def test_frames_of_one_stage_are_told_apart(tmp_path: Path) -> None:
-    """Each renderer has a golden picture, a viewer and a map of its own."""
+    """Each renderer of a stage has its own golden image, viewer and difference map."""
     vary = {"renderer": ["wavecomb", "cycles"]}
     rows = runs_of(vary, lambda renderer: 1.0, repetitions=1, lanes=16)
     folder = write_folder(tmp_path / "r", rows, pictures=True)
@@ -221,7 +221,7 @@ def test_one_run_makes_a_report(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_text_of_results_cannot_be_markup(tmp_path: Path) -> None:
-    """Names and messages come from files; in no place are they HTML or a new table cell."""
+    """Names and messages from result files never become HTML or table cells."""
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
     evil = "<b>|x<i> & 'y' \"z\""
     for row in rows:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from the core's table of cameras; a row that is added is found everywhere."""
+"""The core's table of camera parameters: every consumer picks up new rows."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ADDED = (
 
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table with a few rows more, as if the core had them."""
+    """Adds rows to the table, as if the core had them."""
     add_rows(monkeypatch, camera_parameters, ADDED)
 
 
@@ -47,12 +47,12 @@ OTHER: dict[str, Any] = {
     "four": (-2.0, 2.0, -1.0, 1.0),
     "planes": [[0.0, 0.0, 1.0, 2.0]],
 }
-"""A value that is no default, by kind."""
+"""A value other than the default, by kind."""
 OF_NAME: dict[str, Any] = {
     "aperture_blades": 5.0,
     "lens_map": [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 1.0, 1.0]],
 }
-"""Of those that take fewer."""
+"""The same for parameters with a smaller range of values."""
 
 
 def _other(row: CameraParameter) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras as UsdGeomCamera defines them, from the stage to the picture."""
+"""UsdGeomCamera, from the stage to the image."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_clipping_planes(tmp_path):
 
 
 def test_exposure_multiplies_light_and_nothing_else(tmp_path):
-    """In both integrators, light groups, parts and errors; power of two, so exactly."""
+    """Exposure by a power of two scales light exactly, in both integrators and all light layers."""
     text = SKY + BALL + f'def Camera "Cam" {{ {back(5)} float exposure = EV }}'
     aovs = ["albedo", "normal", "depth", "direct", "indirect", "emission", "light_groups"]
     for integrator in ("wavefront", "reference"):
@@ -114,7 +114,7 @@ def test_exposure_multiplies_light_and_nothing_else(tmp_path):
             factor = 4.0 if name == "beauty" else 1.0
             np.testing.assert_array_equal(getattr(lit, name), factor * getattr(plain, name))
         np.testing.assert_array_equal(lit.variance, 16 * plain.variance)
-        # Differences over the square root of light (docs/render.md).
+        # The error is a difference over the square root of light (docs/render.md).
         np.testing.assert_allclose(lit.error, 2 * plain.error, rtol=1e-6)
         for name, layer in plain.aovs.items():
             if layer.shape[2:] == (3,):
@@ -123,7 +123,7 @@ def test_exposure_multiplies_light_and_nothing_else(tmp_path):
 
 
 def test_orthographic_picture_is_a_closed_form(tmp_path):
-    """The silhouette and depth of a sphere, which distance does not change."""
+    """Silhouette and depth of a sphere in orthographic projection, independent of distance."""
     text = SKY + BALL + 'def Camera "Cam" { token projection = "orthographic"\n'
     text += "float horizontalAperture = 40\nfloat verticalAperture = 40\nPLACE }"
     size = 32
@@ -140,13 +140,13 @@ def test_orthographic_picture_is_a_closed_form(tmp_path):
         depth = picture.depth
         inside, outside = radius2 < 0.9, radius2 > 1.05
         assert np.isinf(depth[outside]).all() and np.isfinite(depth[inside]).all()
-        # The sphere is drawn as triangles: some per cent of its radius.
+        # Tessellation changes the radius by up to a few per cent.
         expected = distance - np.sqrt(np.maximum(1 - radius2, 0))
         np.testing.assert_allclose(depth[inside], expected[inside], atol=0.04)
 
 
 def test_every_scheduling_gives_the_same_bits(tmp_path):
-    """Rays that start side by side, in all directions, and through a lens."""
+    """Parallel rays, rays in all directions, and rays through a lens."""
     text = SKY + BALL + 'def Sphere "Far" { double radius = 4\n' + back(-9) + "}\n"
     text += f'def Camera "Cam" {{ {back(5)} float fStop = 1\nfloat focusDistance = 4\nCLIP }}'
     clip = "float4[] clippingPlanes = [(0.1, 0.1, -1, -4.2)]"
@@ -188,7 +188,7 @@ def test_projection_matrices_lead_points_to_their_pixels(tmp_path):
     ],
 )
 def test_windows_conform(conform, policy):
-    """A window of 4 x 4 in a picture of 3 : 1, as UsdRender's words mean."""
+    """A window of 4 x 4 in an image of 3 : 1, by the definitions of UsdRender."""
     window = fitted_window((-1, 3, -2, 2), 300, 100, conform)
     expected = {
         "MatchVertically": (-5, 7, -2, 2),

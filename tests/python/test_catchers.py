@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shadow catchers: the shadow as alpha, against what light with and without the rest says."""
+"""Shadow catchers: their alpha against renders with and without the other objects."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_only_the_shadow_shows(caught: wavecomb.Picture, tmp_path: Path) -> None
     alone = _render(stage, max_depth=1, mask=["/Floor", "/Sun", "/Cam"])
     clear = ball == 0
     assert not caught.beauty[clear].any()
-    # The sun is all the light: what is lit by it is bright, and what is not is black.
+    # The sun is the only light, so lit points are bright and others are black.
     dark = 1 - whole.beauty.sum(axis=2) / np.maximum(alone.beauty.sum(axis=2), 1e-9)
     floor = clear & (alone.aovs["alpha"] == 1)
     alpha = caught.aovs["alpha"]
@@ -82,7 +82,7 @@ def test_what_is_not_a_catcher_looks_as_ever(caught: wavecomb.Picture, tmp_path:
     whole = _render(_stage(tmp_path))
     ball = _render(_stage(tmp_path), holdouts=["/Floor"]).aovs["alpha"] == 1
     assert ball.any()
-    # Light from the floor on it, too.
+    # This includes light from the floor.
     np.testing.assert_array_equal(caught.beauty[ball], whole.beauty[ball])
 
 

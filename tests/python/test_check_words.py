@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/check_words: what it refuses, what it leaves alone, and that it is quick."""
+"""Checks of tools/check_words: what it finds, what it permits, and its speed."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints: whatever stops a render, it goes on as if nothing had."""
+"""Checkpoints: a render that was stopped in any way resumes with the same result."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_resumed_is_uninterrupted(cornell: Any, ending: dict[str, Any]) -> None:
         assert getattr(result, layer).tobytes() == getattr(whole, layer).tobytes(), layer
     assert len(whole.aovs) >= 12
     for name, aov in whole.aovs.items():
-        if name != "cost":  # is a time
+        if name != "cost":  # a measured time
             assert result.aovs[name].tobytes() == aov.tobytes(), name
     assert result.stats["resumed_samples"] > 0
 
@@ -108,7 +108,8 @@ def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
 
 @pytest.mark.slow
 def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
-    """What was begun without a limit is a pass of 2^14 samples: it is cut, or taken in steps."""
+    """A render without a time limit began a pass of 2^14 samples; a resumed one with a limit ends
+    it."""
     settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15}
     begun = StopAt(0)
     _core.render(cornell.scene, _core.Settings(**settings), watcher=begun)
@@ -117,7 +118,7 @@ def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
     assert begun.state["pass.target"] == 1 << 14 and done.max() > 0
     limited = _core.Settings(**settings, time_limit=0.5)
     state, least = begun.state, done.min()
-    for _ in range(2):  # from pixels that have no samples yet; from pixels that all have
+    for _ in range(2):  # first when some pixels have no samples yet, then when all have
         ended = StopAt(1000)
         result = _core.render(cornell.scene, limited, watcher=ended, state=state)
         assert result.stats["seconds"]["render"] < 2
@@ -129,7 +130,7 @@ def test_more_is_to_come_when_a_render_goes_on(cornell: Any) -> None:
     settings = _core.Settings(width=48, height=40, noise=0.0001, spp=1 << 16)
     begun = StopAt(2)
     _core.render(cornell.scene, settings, watcher=begun)
-    begun.state["pass.target"] = 1 << 14  # as later on in a long render
+    begun.state["pass.target"] = 1 << 14  # as later in a long render
 
     class First:
         def __init__(self) -> None:
@@ -171,12 +172,12 @@ def test_checkpoint_and_resume_from_python(cornell: Any, tmp_path: Path) -> None
     settings: dict[str, Any] = {"size": (24, 24), "error": True}
     half = wavecomb.render(cornell, spp=64, checkpoint=file, **settings)
     assert file.exists()
-    # A render that is not adaptive may go on to more samples.
+    # A render that is not adaptive can be resumed with more samples.
     more = wavecomb.render(cornell, spp=128, resume=file, **settings)
     whole = wavecomb.render(cornell, spp=128, **settings)
     assert more.beauty.tobytes() == whole.beauty.tobytes()
     assert more.stats["resumed_samples"] == half.samples.sum()
-    # What is done is done.
+    # Resuming a finished render adds no samples.
     again = wavecomb.render(cornell, spp=64, resume=file, **settings)
     assert again.beauty.tobytes() == half.beauty.tobytes()
     assert again.stats["counts"]["samples"] == 0
@@ -288,7 +289,7 @@ def run(*words: Any) -> subprocess.CompletedProcess[str]:
 
 
 def invoke(*words: Any, code: int = 0) -> Result:
-    """As ``run``, in this process."""
+    """Runs the command in this process, with the interface of ``run``."""
     result = CliRunner().invoke(main, command(*words)[3:])
     assert result.exit_code == code, result.output
     return result
@@ -348,7 +349,7 @@ def test_resumed_files_have_the_same_layers(stage: Path, tmp_path: Path) -> None
         invoke(stage, "-o", two, "--resume", file)
         assert list(read_layers(one)) == list(read_layers(two))
     more = ["--compression", "dwaa", "--spp", 1 << 20]
-    refused = invoke(stage, "-o", two, "--resume", file, *more, code=2)  # before the render
+    refused = invoke(stage, "-o", two, "--resume", file, *more, code=2)  # refused before the render
     assert "compression dwaa would spoil CryptoObject00" in refused.stderr
 
 

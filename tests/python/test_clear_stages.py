@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages of light through water and glass: their shapes, and where their light comes together."""
+"""Stages with caustics of water and glass: shapes, and positions of the focused light."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wavecomb.scenes.mesh import face_areas, signed_volume
 def test_the_lens_is_two_caps_that_face_outwards() -> None:
     mesh = lens(12)
     assert face_areas(mesh.points, mesh.faces).min() >= 0.0
-    # Two caps of height h of spheres of radius r: pi h^2 (3 r - h) / 3 each.
+    # Two spherical caps of height h and radius r have the volume pi h^2 (3 r - h) / 3 each.
     r = LENS_FOCUS
     h = r - np.sqrt(r * r - 0.9**2)
     assert signed_volume(mesh.points, mesh.faces) == pytest.approx(
@@ -39,14 +39,13 @@ def test_normals_of_the_water_are_those_of_its_facets() -> None:
 
 
 def test_the_lens_shows_the_lamp_where_optics_says(tmp_path: Path) -> None:
-    """At twice the focus on either side, as large as it is: most of the light of the wall's shadow
-    of the lens is there."""
+    """The lens images the light at twice its focal length, at the same size."""
     path = tmp_path / "lens.usdc"
     write_scene("lens", path, teapot_level=12)
     from pxr import Gf, Usd, UsdGeom
 
     stage = Usd.Stage.Open(str(path))
-    # From above the axis at the wall, so that it sees the wall alone, without the lens before it.
+    # The camera is above the axis at the wall, with no lens between them.
     camera = UsdGeom.Camera.Get(stage, "/World/Camera")
     view = Gf.Matrix4d().SetLookAt(Gf.Vec3d(1.5, 1.4, 0), Gf.Vec3d(4, 1.4, 0), Gf.Vec3d(0, 1, 0))
     camera.GetPrim().GetAttribute("xformOp:transform").Set(view.GetInverse())
@@ -55,7 +54,7 @@ def test_the_lens_shows_the_lamp_where_optics_says(tmp_path: Path) -> None:
     camera.CreateVerticalApertureAttr(35.0 * 2.4 / 2.5)
     straight = tmp_path / "straight.usdc"
     stage.Export(str(straight))
-    # 2.4 units of the wall in 48 pixels.
+    # 48 pixels cover 2.4 units of the wall.
     picture = wavecomb.render(straight, size=(48, 48), spp=64, transport="light", max_depth=4)
     light = picture.beauty.sum(axis=2)
     y, x = (np.indices(light.shape) - 23.5) * (2.4 / 48)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colour spaces of colour values: of networks, primvars, lights and MaterialX files."""
+"""Colour spaces of colours in networks, primvars, lights and MaterialX files."""
 
 import pytest
 from parts import needs
@@ -8,7 +8,7 @@ from usd_recorder import QUAD, load, said
 pytestmark = needs("MaterialX")
 
 LINEAR = ((0.5 + 0.055) / 1.055) ** 2.4
-"""0.5 in sRGB."""
+"""Linear value of 0.5 in sRGB."""
 
 SPACE = '(\ncolorSpace = "srgb_texture"\n)'
 GREY = f"= (0.5, 0.5, 0.5) {SPACE}"
@@ -72,7 +72,7 @@ def test_colours_of_networks_are_read_in_their_spaces(tmp_path, stage):
 
 
 def test_layers_and_numbers_of_a_shader(tmp_path):
-    """Colours beside the textured ones are converted; numbers and vectors are not."""
+    """Colours beside textures are converted, numbers and vectors are not."""
     scene, _ = load(
         tmp_path,
         material(
@@ -160,7 +160,7 @@ _SRGB = ' colorspace="srgb_texture"'
         (_SRGB, ' colorspace="none"', "", 0.5),
         (' colorspace="lin_rec709"', "", "", 0.5),
         ("", "", "", 0.5),
-        # A space in the document goes before that of the prims which reference it.
+        # A colour space in the document overrides that of prims that reference it.
         ("", ' colorspace="lin_rec709"', NAME, 0.5),
     ],
 )

@@ -146,8 +146,8 @@ def test_heat_map(tmp_path: Path) -> None:
     assert heat[20, 20] == pytest.approx(colours[0])
     assert heat[30, 30].tolist() == [0, 1, 1]
     assert heat[0, 0].tolist() == [0, 0, 0]
-    assert (heat[44:58] == 1).all(axis=2).any()  # the title
-    assert (heat[82:] == 1).all(axis=2).any()  # the numbers
+    assert (heat[44:58] == 1).all(axis=2).any()  # title
+    assert (heat[82:] == 1).all(axis=2).any()  # numbers
     write_heat_map(tmp_path / "h.png", a, b)
     assert read_image(tmp_path / "h.png").shape == heat.shape
 
@@ -160,7 +160,7 @@ def test_signed_heat_map() -> None:
     assert heat[1, 1] == pytest.approx(colours[-1])
     assert heat[2, 2] == pytest.approx(colours[0])
     assert heat[3, 3].max() < 0.02
-    assert heat[1, 1, 0] > heat[1, 1, 2]  # brighter is orange
+    assert heat[1, 1, 0] > heat[1, 1, 2]  # brighter pixels are orange
     assert heat[2, 2, 0] < heat[2, 2, 2]
 
 

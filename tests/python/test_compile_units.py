@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which units of the library a change in one program compiles, as the build has written it down."""
+"""Compilation units that depend on each shading program, from the dependencies of the build."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ VARIANTS = ROOT / "src" / "wavecomb" / "scene" / "material_parts.h"
 
 @pytest.fixture(scope="module")
 def units_with(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
-    """Objects of the library and the module by each source of the core that they include."""
+    """Object files by the source files of the core that they include."""
     ninja = Path(sys.executable).with_name("ninja")
     if not ninja.exists() or not (BUILD / ".ninja_deps").exists():
         not_here("the library was not built by make build")
-    # Ninja repairs logs that it opens, and another one may be at work: make test builds the C++
-    # tests meanwhile.
+    # Use a copy of the logs: Ninja repairs logs that it opens, and another Ninja may be building
+    # the C++ tests at the same time.
     folder = tmp_path_factory.mktemp("build")
     for entry in BUILD.iterdir():
         if entry.name.startswith(".ninja_"):
@@ -51,7 +51,7 @@ def units_with(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
 
 @pytest.fixture(scope="module")
 def units_of(units_with: dict[str, set[str]]) -> dict[str, set[str]]:
-    """The same by each program."""
+    """Object files by the shading program that they include."""
     folder = "material/programs/"
     return {
         name.removeprefix(folder).removesuffix(".h"): units
@@ -61,7 +61,7 @@ def units_of(units_with: dict[str, set[str]]) -> dict[str, set[str]]:
 
 
 def kernel_rows() -> list[tuple[str, str, str, str]]:
-    """Rows of WAVECOMB_KERNELS: kind, set, widths, widths of sanitized builds."""
+    """Returns the rows of WAVECOMB_KERNELS: kind, set, widths, widths of sanitized builds."""
     text = MATRIX.read_text("utf-8")
     rows = re.findall(r"^ *X\((\w+), (\w+), (\w+), (\w+), \"", text, re.MULTILINE)
     assert {row[0] for row in rows} == {"program", "light", "plain"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a shell completes, asked of the shells themselves; and a first run without arguments."""
+"""Completion in real shells, and a first run without arguments."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def script(shell: str, folder: Path) -> Path:
 
 
 def bash(command: Path, folder: Path, *words: str) -> list[str]:
-    """What bash offers for the last word."""
+    """Returns the completions that bash offers for the last word."""
     typed = " ".join(f"'{word}'" for word in ("wavecomb", *words))
     text = BASH.format(script=script("bash", folder), words=typed, at=len(words))
     path = f"{command}{os.pathsep}{os.environ['PATH']}"
@@ -66,7 +66,7 @@ def test_bash_completes_commands_options_and_values(command: Path, tmp_path: Pat
 
 @needs("bin:bash", "wavecomb._core")
 def test_bash_knows_the_tables(command: Path, tmp_path: Path) -> None:
-    """Settings of the core, AOVs, scenes, commands of a group."""
+    """Bash completes settings of the core, AOVs, scenes and commands of a group."""
     assert "--wave-size" in bash(command, tmp_path, "render", "--wave")
     assert bash(command, tmp_path, "render", "--policy", "texture-") == ["texture-locality"]
     assert bash(command, tmp_path, "render", "--aov", "crypto_o") == ["crypto_object"]

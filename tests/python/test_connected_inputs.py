@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of textures that primvar readers, interfaces and nodes give: one value for each object."""
+"""Texture inputs connected to primvar readers, interfaces and nodes: one value per object."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -136,7 +136,7 @@ def test_transforms_by_primvars_and_interfaces(tmp_path):
 
 
 def test_names_of_primvars_by_a_primvar(tmp_path):
-    """The mesh's coordinates are those of the set that its own primvar names."""
+    """A primvar of the mesh names its set of texture coordinates."""
     nodes = reader("string", "set", '"st"')
     meshes = {"Q": 'string primvars:set = "map"', "Bare": ""}
     text = stage("", nodes, meshes=meshes, varname=f"string inputs:varname{FROM_P}")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vertices of camera paths connected to those of paths from lights: one picture for all schedules,
-parts of it, and the beauty by who found it."""
+"""Connections between camera paths and light paths: equal images for all schedules and crops, and
+the beauty by technique."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIZE, SPP = 32, 3
 
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A stage with materials of all kinds, loaded."""
+    """A loaded stage with materials of all kinds."""
     path = tmp_path_factory.mktemp("connections") / "mixed.usdc"
     write_scene("mixed", path, triangles=12_000, teapot_level=6, texture_size=64)
     return wavecomb.load(path)

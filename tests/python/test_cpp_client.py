@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A C++ program that uses the core as README says: installed, found, compiled, run."""
+"""A C++ program uses the installed core as the README describes: find, compile, run."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deep pictures: what they add up to, and what OpenImageIO makes of their files."""
+"""Deep images: they flatten to the beauty, and OpenImageIO reads their files."""
 
 from __future__ import annotations
 
@@ -112,13 +112,13 @@ def _render(stage: Path, **options: Any) -> wavecomb.Picture:
 
 
 def _flat_of(picture: wavecomb.Picture) -> np.ndarray[Any, Any]:
-    """Beauty without the background, and alpha."""
+    """Returns beauty without the background, and alpha."""
     colours = picture.beauty - picture.aovs.get("lpe_background", 0)
     return np.concatenate([colours, picture.aovs["alpha"][:, :, None]], axis=2)
 
 
 def _flattened(deep: oiio.ImageBuf) -> np.ndarray[Any, Any]:
-    """R, G, B and A as OpenImageIO flattens them."""
+    """Returns R, G, B and A as OpenImageIO flattens them."""
     flat = oiio.ImageBufAlgo.flatten(deep)
     assert not flat.has_error, flat.geterror()
     names = list(flat.spec().channelnames)
@@ -126,7 +126,7 @@ def _flattened(deep: oiio.ImageBuf) -> np.ndarray[Any, Any]:
 
 
 def _check(picture: wavecomb.Picture, folder: Path) -> None:
-    """A deep picture and its file flatten to beauty and alpha."""
+    """Asserts that a deep image and its file flatten to beauty and alpha."""
     assert picture.deep is not None
     wanted = _flat_of(picture)
     scale = np.maximum(1.0, wanted)
@@ -210,7 +210,7 @@ def test_a_volume_has_thickness(tmp_path: Path) -> None:
 
 
 def test_two_halves_merge_to_the_whole(tmp_path: Path) -> None:
-    """Two cards in front of each other that glow; neither lights the other."""
+    """Deep renders of two emissive cards merge to the render of both."""
     cards = GLOWING.format(
         name="A", points="(-2, -1, 1), (1, -1, 1), (1, 1.2, 1), (-2, 1, 1)", color="(0.9, 0.2, 0.1)"
     ) + GLOWING.format(
@@ -224,7 +224,7 @@ def test_two_halves_merge_to_the_whole(tmp_path: Path) -> None:
     merged = oiio.ImageBufAlgo.deep_merge(*map(oiio.ImageBuf, files))
     assert not merged.has_error, merged.geterror()
     found, wanted = _flattened(merged), _flat_of(whole)
-    # Where two edges meet in a pixel nobody knows how they overlap.
+    # A pixel with edges of both cards does not determine how they overlap.
     partial = [(h.aovs["alpha"] > 0) & (h.aovs["alpha"] < 1) for h in halves]
     two_edges = partial[0] & partial[1]
     overlap = (halves[0].aovs["alpha"] > 0) & (halves[1].aovs["alpha"] > 0)
@@ -274,7 +274,7 @@ def test_what_cannot_be_is_refused(options: list[str], says: str, tmp_path: Path
 
 
 def test_it_goes_on_from_a_checkpoint(tmp_path: Path) -> None:
-    """Stopped a few times, with other threads and waves: the same bits as in one go."""
+    """Resuming with other threads and wave sizes gives the same bits as one run."""
     scene = wavecomb.load(write(tmp_path, CAMERA + LIT + _hair())).scene
     settings: dict[str, Any] = {
         **{"width": 48, "height": 40, "spp": 400, "aovs": ["alpha", "deep"], "deep_samples": 5}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages without lights: a soft dome is added unless emissive meshes light what is drawn."""
+"""Stages without lights: a soft dome is added unless emissive meshes light visible objects."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -74,7 +74,7 @@ def test_a_light_of_intensity_0_keeps_it_off(tmp_path):
 
 
 def test_sizes_are_those_of_the_world(tmp_path):
-    """A panel scaled up, and a thousand small ones by instances."""
+    """Emissive area counts in world space: a scaled panel, and many small instances."""
     text = PANEL.format(name="Panel", half=0.01)
     big = f"""def Xform "Big" {{ float3 xformOp:scale = (100, 1, 100)
         uniform token[] xformOpOrder = ["xformOp:scale"]
@@ -94,7 +94,7 @@ def test_sizes_are_those_of_the_world(tmp_path):
 
 @pytest.mark.parametrize(("bright", "lit"), [(1.0, True), (0.001, False)])
 def test_emissive_textures_count_by_their_means(tmp_path, bright, lit):
-    """A map of a large mesh that is black but for a small detail."""
+    """An emissive texture counts by its mean, here of a map that may be mostly black."""
     side = 64
     pixels = np.zeros((side, side, 3), np.float32)
     pixels[: max(int(side * bright), 1), : max(int(side * bright), 1)] = 5.0
@@ -107,7 +107,7 @@ def test_emissive_textures_count_by_their_means(tmp_path, bright, lit):
 
 
 def test_unlit_assets_stay_as_they_are(tmp_path):
-    """All that is drawn emits: a dome would change its colours."""
+    """If all visible meshes emit, a dome would change their colours, so none is added."""
     text = room(1, 0, " ").split("def Mesh")[0]
     ball = """def Sphere "{0}" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
         rel material:binding = </M> }}"""

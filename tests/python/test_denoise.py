@@ -18,7 +18,7 @@ from wavecomb.picture.image import read_image, read_layers
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Noisy and clean pictures of one stage."""
+    """A noisy and a clean image of one stage."""
     pytest.importorskip("wavecomb._core")
     pytest.importorskip("pyoidn")
     from wavecomb.scenes import write_scene
@@ -30,7 +30,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def rmse(a: Any, b: Any) -> float:
-    """Of what a display shows."""
+    """Returns the RMS error after clipping to the range of a display."""
     return float(np.sqrt(((np.minimum(a, 1) - np.minimum(b, 1)) ** 2).mean()))
 
 
@@ -48,7 +48,7 @@ def test_denoised_is_nearer_to_the_truth(pictures: Any) -> None:
 
 @pytest.mark.slow
 def test_guides_keep_detail(pictures: Any) -> None:
-    """A pattern that only the albedo shows comes through."""
+    """Denoising keeps a pattern that only the albedo guide resolves."""
     from wavecomb.picture.denoise import denoise
 
     rng = np.random.default_rng(1)
@@ -64,7 +64,7 @@ def test_guides_keep_detail(pictures: Any) -> None:
 
 
 def looking_at(program: str, z: float, wall_z: float, **material: Any) -> wavecomb.Picture:
-    """A camera before a surface, and a wall of albedo (0.2, 0.6, 0.4) at `wall_z`."""
+    """Renders a surface at z before a camera, and a wall of albedo (0.2, 0.6, 0.4) at `wall_z`."""
     builder = wavecomb.SceneBuilder()
 
     def add(at: float, faces_camera: bool, material: int) -> None:
@@ -90,12 +90,12 @@ WALL = np.array([0.2, 0.6, 0.4])
 @pytest.mark.parametrize(
     ("program", "wall_z", "material", "albedo", "normal_z"),
     [
-        # The mirror shows the wall behind the camera, in its own tint.
+        # The guides of a mirror are those of the wall behind the camera, times the mirror's colour.
         ("metal", 2.0, {"roughness": 0.0, "base_color": (0.9, 0.5, 0.8)}, (0.18, 0.3, 0.32), -1.0),
-        # A rough one guides by itself, and so does paint.
+        # Rough metal and diffuse surfaces have their own albedo as guide.
         ("metal", 2.0, {"roughness": 0.4, "base_color": (0.9, 0.5, 0.8)}, (0.9, 0.5, 0.8), 1.0),
         ("diffuse", 2.0, {"base_color": (0.1, 0.2, 0.3)}, (0.1, 0.2, 0.3), 1.0),
-        # 4 % of glass reflects the sky, and guides by itself there.
+        # Glass reflects 4 % of the sky, which counts with the albedo of glass.
         ("dielectric", -3.0, {"roughness": 0.0}, 0.96 * WALL + 0.04, 1.0),
     ],
 )

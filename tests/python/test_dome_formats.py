@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dome images that are not latlong: where their pixels look, and how much light they hold."""
+"""Dome textures in formats other than latlong: directions of pixels, and irradiance."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -12,7 +12,7 @@ SIZE = 256
 
 
 def sky(d):
-    """Smooth, without any symmetry."""
+    """Returns a smooth radiance without any symmetry."""
     x, y, z = np.moveaxis(d, -1, 0)
     return np.stack(
         [np.exp(0.8 * x + 0.5 * y + 0.33 * z), 1 + 0.4 * z + 0.2 * x, 2 + y - x * z], -1
@@ -24,13 +24,13 @@ def unit(v):
 
 
 def plane(n):
-    """x to the right and y up over an image, in [-1, 1]."""
+    """Returns x to the right and y up over an image, in [-1, 1]."""
     at = (np.arange(n) + 0.5) / n * 2 - 1
     return np.meshgrid(at, -at)
 
 
 def angular():
-    """Directions of the pixels, and the solid angle of each: sin(t) dt dphi, t = pi r."""
+    """Returns directions and solid angles of the pixels: sin(t) dt dphi, t = pi r."""
     x, y = plane(SIZE)
     r = np.hypot(x, y)
     t = np.pi * r
@@ -39,7 +39,7 @@ def angular():
 
 
 def mirrored_ball():
-    """By the law of reflection, seen from +z by parallel rays: 4 times the ball's own area."""
+    """Returns directions by the law of reflection, seen from +z, and solid angles (4 dA)."""
     x, y = plane(SIZE)
     z2 = 1 - x * x - y * y
     n = np.stack([x, y, np.sqrt(np.maximum(z2, 0))], -1)
@@ -47,7 +47,7 @@ def mirrored_ball():
     return d, np.where(z2 > 0, 4 * (2 / SIZE) ** 2, 0)
 
 
-FACES = {  # column, row: ahead, right, up
+FACES = {  # column, row: forward, right, up
     (1, 1): ((0, 0, 1), (-1, 0, 0), (0, 1, 0)),
     (1, 0): ((0, 1, 0), (-1, 0, 0), (0, 0, -1)),
     (1, 2): ((0, -1, 0), (-1, 0, 0), (0, 0, 1)),
@@ -73,7 +73,7 @@ IMAGES = {"angular": angular, "mirroredBall": mirrored_ball, "cubeMapVerticalCro
 
 
 def latlong(rows):
-    """Directions of a latlong image as OpenEXR says, and solid angles."""
+    """Returns directions and solid angles of a latlong image in OpenEXR's convention."""
     lat = np.pi / 2 - (np.arange(rows) + 0.5) * np.pi / rows
     lon = np.pi - (np.arange(2 * rows) + 0.5) * np.pi / rows
     lat, lon = np.meshgrid(lat, lon, indexing="ij")
@@ -89,11 +89,11 @@ def test_what_is_seen_and_how_much_light_it_gives(form):
     made = to_latlong(image, form)
     d, weight = latlong(len(made))
     exact = sky(d)
-    # The edge of a ball is one direction, -z: there a pixel covers a wide angle.
+    # The edge of a mirrored ball is a single direction, -z; pixels near it cover wide angles.
     ahead = d[..., 2] > -0.8 if form == "mirroredBall" else np.full(d.shape[:2], True)
     ahead &= d[..., 2] > -0.98
     assert np.abs(made / exact - 1)[ahead].max() < 0.02
-    # Irradiance on surfaces that face many ways, by the image's own pixels and by those made.
+    # Irradiance on surfaces of several orientations, from the original and the converted image.
     for normal in unit(np.array([(0, 1, 0), (1, 0, 0), (0, 0, 1), (-1, -1, 1), (0.2, -1, 0.5)])):
         cosine = np.maximum(d @ normal, 0) * weight
         found = (made * cosine[..., None]).sum((0, 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Units of emission: the radiance of MaterialX's own graphs, beside UsdLux, where 1 is 1 nit."""
+"""Units of emission: MaterialX's own graphs, and UsdLux, where intensity 1 is 1 nit."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def surface(shader: str) -> str:
 
 @pytest.mark.parametrize("shader", SURFACES)
 def test_emission_is_radiance(tmp_path: Path, shader: str) -> None:
-    """Luminance, or strength, times colour, as the graph of each model in MaterialX's library."""
+    """Emission is luminance (or strength) times colour, as in MaterialX's graph of each model."""
     assert np.allclose(mean(tmp_path, surface(shader) + SQUARE), (250, 125, 50), rtol=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["Rect", "Disk", "Sphere", "Cylinder"])
 def test_area_lights_are_of_the_same_unit(tmp_path: Path, kind: str) -> None:
-    """UsdLux: a light of intensity 1 has a luminance of 1 nit."""
+    """A UsdLux light of intensity 1 has a luminance of 1 nit."""
     sizes = {
         "Rect": "float inputs:width = 2\nfloat inputs:height = 2",
         "Disk": "float inputs:radius = 2",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first promise: one picture, bit for bit, whatever the schedule."""
+"""One image, bit for bit, for every schedule."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OPTIONS: dict[str, list[Any]] = {
     "costs": ["auto", "model"],
     "aovs": [None, ("all",), ("uv", "crypto_asset", "indirect", "light_groups")],
 }
-"""What must not show in the picture."""
+"""Settings that must not change the image."""
 
 SCENES = ("mixed", "cornell", "textures")
 ROULETTES = ("off", "throughput", "cost-aware")
@@ -36,7 +36,8 @@ _plain: dict[Any, wavecomb.Picture] = {}
 
 
 def texture_scene() -> Any:
-    """24 textured tiles of four programs, each texture on two of them, before a mirror."""
+    """Returns 24 textured tiles with four programs before a mirror. Two tiles share each texture.
+    """
     rng = np.random.default_rng(7)
     builder = wavecomb.SceneBuilder()
     textures = [
@@ -65,7 +66,7 @@ def texture_scene() -> Any:
     mirror = builder.add_material("metal", name="Mirror", roughness=0.0, base_color=(0.9, 0.9, 0.9))
     tile(-10.0, -10.0, 2.5, 20.0, 1.0, mirror)
     behind = np.eye(4)
-    behind[3, :3] = (1.0, 2.5, 2.0)  # of the camera; it shines at the tiles
+    behind[3, :3] = (1.0, 2.5, 2.0)  # behind the camera, facing the tiles
     builder.add_light("rect", behind, color=(9, 8, 7), width=2, height=2, name="Lamp")
     builder.add_light("dome", np.eye(4), color=(0.3, 0.4, 0.5), name="Sky")
     builder.set_camera(np.eye(4), window=(-1.5, 1.5, -1.0, 1.0))
@@ -121,11 +122,11 @@ OPENPBR_LOBES: dict[str, dict[str, Any]] = {
         },
     },
 }
-"""Materials by name: each lobe of OpenPBR, and all of them."""
+"""Materials by name: each lobe of OpenPBR, and all lobes together."""
 
 
 def openpbr_scene() -> Any:
-    """Closed boxes of each of ``OPENPBR_LOBES``, side by side before a wall."""
+    """Returns a closed box with each of ``OPENPBR_LOBES``, side by side before a wall."""
     builder = wavecomb.SceneBuilder()
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)), np.float32)
     faces = [
@@ -155,7 +156,7 @@ def openpbr_scene() -> Any:
 
 
 def graph_scene() -> Any:
-    """Tiles whose parameters graphs drive, the same one or others side by side; one shines."""
+    """Returns tiles with parameters driven by the same or different graphs; one tile emits."""
     from wavecomb.usd.graphs.expressions import Expressions
     from wavecomb.usd.graphs.node import PARAMETERS, numbers
     from wavecomb.usd.graphs.program import assemble
@@ -239,7 +240,7 @@ def render(scene: Any, size: tuple[int, int], spp: int, **settings: Any) -> wave
 
 def expect_equal(a: wavecomb.Picture, b: wavecomb.Picture, what: Any) -> None:
     layers_a, layers_b = a.layers(), b.layers()
-    common = [name for name in layers_a if name in layers_b and name != "cost"]  # it is a time
+    common = [name for name in layers_a if name in layers_b and name != "cost"]  # a measured time
     assert len(common) == min(len(layers_a), len(layers_b)) - ("cost" in {*layers_a} & {*layers_b})
     for layer in common:
         same = layers_a[layer].tobytes() == layers_b[layer].tobytes()
@@ -251,7 +252,7 @@ def expect_equal(a: wavecomb.Picture, b: wavecomb.Picture, what: Any) -> None:
 def plain(
     scene_of: Any, scene: str, roulette: str, size: tuple[int, int], spp: int
 ) -> wavecomb.Picture:
-    """Arrival order, one thread, all AOVs: what all others must equal."""
+    """Renders the reference image: arrival order, one thread, all AOVs."""
     key = (scene, roulette, size, spp)
     if key not in _plain:
         _plain[key] = render(
@@ -262,7 +263,7 @@ def plain(
 
 
 def covering_rows(options: dict[str, list[Any]], seed: int = 1) -> list[dict[str, Any]]:
-    """Few choices of options in which every pair of values of two options occurs."""
+    """Returns few combinations of options that cover every pair of values of two options."""
     rng = random.Random(seed)
     names = list(options)
     left = {
@@ -317,7 +318,7 @@ def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
-    """Waves of eight and of nine depths look alike, whichever queues are measured."""
+    """Coherence is measured at all depths, so one more depth hardly changes it."""
     settings: dict[str, Any] = {
         "policy": "material",
         "threads": 1,
@@ -362,7 +363,7 @@ LARGE = (32, 24), OPTIONS["wave_size"]
 def test_every_choice(
     scene: str, roulette: str, size: tuple[int, int], waves: list[int], scene_of: Any
 ) -> None:
-    """The whole product: of many waves, of two, and one that holds all that a thread gets here."""
+    """All combinations of options, with many waves, two waves, and one wave per thread."""
     spp = 8
     expected = plain(scene_of, scene, roulette, size, spp)
     names = ("policy", "materialize", "wave_size", "threads", "ray_order")
@@ -375,7 +376,7 @@ def test_every_choice(
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
-    """Hierarchy and shares of lights: of one thread or many, of other settings before, or new."""
+    """A loaded stage reuses its BVH and light calibration. They equal those of a new render."""
     stage = scene_of(scene)
     alone = getattr(stage, "scene", stage)
     for threads in (1, 2, 5):
@@ -414,7 +415,7 @@ def test_full_waves_of_64_k(scene: str, scene_of: Any) -> None:
 
 
 class Shuffled(wavecomb.SchedulingPolicy):
-    """Keys that mean nothing."""
+    """A policy with random keys."""
 
     name = "shuffled"
 
@@ -469,7 +470,7 @@ def test_roulettes_are_different_estimates(scene_of: Any) -> None:
 
 
 def test_cost_aware_from_one_profile_is_reproducible(scene_of: Any) -> None:
-    """Measured costs vary; frozen in a profile they do not."""
+    """Measured costs vary between runs, but not in a profile."""
     scene = scene_of("mixed")
     costs = render(scene, (48, 32), 8, policy="adaptive").costs
     settings = {"roulette": "cost-aware", "costs": costs}

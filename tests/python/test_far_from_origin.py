@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages far from the world's origin: the images that they give near to it."""
+"""Stages far from the world origin give the same images as near to it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = needs("wavecomb._core")
 
 FAR = (5e8, 0.0, -5e8)
 EXACT = (300 * CELL, 0.0, -50 * CELL)
-"""A multiple of the cells that origins lie on: not a bit may change."""
+"""A multiple of the cell size of render origins, for which the image is equal bit for bit."""
 
 PARTS = """
 def Camera "Camera" {
@@ -149,7 +149,7 @@ def Cube "Reset" {{
 
 
 def stage(folder: Path, place: tuple[float, float, float], body: str = PARTS) -> Path:
-    """The stage with all of its prims moved."""
+    """Writes the stage with all of its prims moved."""
     path = folder / f"{len(list(folder.glob('*.usda')))}.usda"
     x, y, z = place
     path.write_text(f"""#usda 1.0
@@ -188,7 +188,7 @@ def test_the_image_is_the_same(tmp_path: Path) -> None:
         hit = near.aovs["position"].any(axis=2)
         moved = far.aovs["position"][hit] - near.aovs["position"][hit]
         assert moved == pytest.approx(np.broadcast_to(place, moved.shape), abs=33.0)
-        # What was not hit stays 0, as near the origin.
+        # Pixels without a hit stay 0, as near the origin.
         assert (far.aovs["position"].any(axis=2) == hit).all()
 
 
@@ -210,7 +210,7 @@ def test_without_a_camera(tmp_path: Path) -> None:
 
 
 def test_the_middle_of_what_is_drawn(tmp_path: Path) -> None:
-    """Extents that are authored count; hidden purposes, lights and broken extents do not."""
+    """Authored extents count. Hidden purposes, lights and invalid extents do not."""
     box = """def Cube "{}" {{
         {}
         double3 xformOp:translate = ({}, 0, 0)
@@ -238,7 +238,7 @@ def test_parts_of_an_image(tmp_path: Path) -> None:
 
 
 def test_frames_are_what_they_are_alone(tmp_path: Path) -> None:
-    """A camera that flies: its stage is read again where it is built around another origin."""
+    """If the camera moves far, the stage is read again with another origin."""
     flight = f"0: ({CELL * 6}, 2, 9), 1: ({CELL * 6 + 1}, 2, 9), 2: ({CELL * 8}, 2, 9)"
     still = "{ 0: (0, 2, 9), 1: (0.5, 2, 9) }"
     assert still in PARTS
@@ -265,7 +265,7 @@ def test_frames_are_what_they_are_alone(tmp_path: Path) -> None:
     "seed", [*range(4), *(pytest.param(s, marks=pytest.mark.long) for s in range(4, 60))]
 )
 def test_random_stages(seed: int, tmp_path: Path) -> None:
-    """Stages of the naive integrator's suite, moved by a random number of cells."""
+    """Random stages of the naive integrator's suite, moved by a random number of cells."""
     sys.path.append(str(Path(__file__).resolve().parents[1] / "statistics"))
     from random_scenes import make_scene
 
@@ -284,7 +284,7 @@ def test_random_stages(seed: int, tmp_path: Path) -> None:
         loaded = wavecomb.load(path, **scene.load)
         images.append(wavecomb.render(loaded, size=(16, 16), **settings).beauty)
     assert loaded.origin == move
-    # Doubles hold the moved transforms to 2^-24: a few floats are rounded otherwise.
+    # The moved transforms have a precision of 2^-24 in doubles, so a few floats round differently.
     error = np.abs(images[0] - images[1]).mean() / max(images[0].mean(), 1e-6)
     assert error < 5e-3
 
@@ -298,7 +298,7 @@ def test_random_stages(seed: int, tmp_path: Path) -> None:
     ],
 )
 def test_volumes_splats_and_subsurface(name: str, options: dict[str, Any], tmp_path: Path) -> None:
-    """Generated scenes that a moved prim references."""
+    """Generated scenes, referenced by a moved prim."""
     from pxr import UsdGeom
 
     from wavecomb.scenes import write_scene
@@ -350,7 +350,7 @@ def test_origins(x: float) -> None:
 
 
 def test_world_positions_of_graphs(tmp_path: Path) -> None:
-    """A gradient over world x: as bright as the coordinate says."""
+    """A gradient over world x has the brightness of its coordinate."""
     body = """
     def Camera "Camera" {
         token projection = "orthographic"
@@ -466,8 +466,13 @@ def test_what_floats_cannot_hold_is_said(
 
 
 def test_cameras_and_positions_of_the_window() -> None:
+<<<<<<< HEAD
     """Poses are of the scene; what is shown of them is of the world."""
     from wavecomb.gui.viewport.navigate import Pose
+=======
+    """Camera poses of the window are in scene space; it shows world space."""
+    from wavecomb.gui.viewport.orbit import Pose
+>>>>>>> 1cf48fcb (Word the comments of tests/python plainly)
     from wavecomb.gui.viewport.scene_lookup import camera_pose
 
     usd = open_text(f"""def Camera "C" {{

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A job in its parts: tiles, keys, part files, assembled images, jobs that are damaged."""
+"""Farm jobs: tiles, keys, part files, assembled images, damaged jobs."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_a_layout_has_as_many_tiles_as_asked_for(count: int) -> None:
 
 
 def test_a_border_is_good_for_all_looks(stage: Path) -> None:
-    """An adaptive render whose pixels never end looks as often as is expected."""
+    """An adaptive render that never converges checks its error as often as the border allows."""
     settings = {"spp": 200, "min_spp": 16}
     picture = wavecomb.render(stage, size=(8, 8), adaptive=1e-6, **settings)
     assert looks(settings) < picture.stats["passes"] <= most_looks(settings)
@@ -249,7 +249,7 @@ def test_a_tile_holds_its_own_pixels(stage: Path, tmp_path: Path) -> None:
 
 
 def damages(good: bytes, other: bytes) -> dict[str, bytes | None]:
-    """What may have become of a part's file."""
+    """Returns damaged versions of a part's file."""
     middle = len(good) // 2
     return {
         "missing": None,
@@ -288,7 +288,7 @@ def test_a_part_counts_only_if_it_is_right(stage: Path, tmp_path: Path) -> None:
 
 
 def test_bits_of_a_part_that_flip_anywhere_are_found(stage: Path, tmp_path: Path) -> None:
-    """Or they are in bytes that no reader looks at, and the pixels are right."""
+    """A flipped bit is detected, unless it is in unused bytes and the pixels are correct."""
     folder = job(stage, tmp_path, size=(8, 8), spp=1, tiles="1x1")
     render_all(folder)
     file = folder.part(Task(0, 0))
@@ -312,7 +312,7 @@ def test_bits_of_a_part_that_flip_anywhere_are_found(stage: Path, tmp_path: Path
 # ---- images --------------------------------------------------------------------------------------
 
 ALL = [*(name for name in names() if name != "cost"), "light_groups"]
-"""Costs are of the clock."""
+"""All AOVs but measured costs."""
 KINDS: dict[str, dict[str, Any]] = {
     "plain": {},
     "all layers": {"aovs": ALL, "spp": 16},
@@ -329,7 +329,7 @@ KINDS: dict[str, dict[str, Any]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_tiles_are_the_image(stage: Path, tmp_path: Path, kind: str) -> None:
-    """Bit for bit, with all that the header says."""
+    """The assembled image equals the whole image in all bits and header entries."""
     options = {"size": (40, 24), "spp": 4, **KINDS[kind]}
     folder = job(stage, tmp_path, **options, file={"half": False, "compression": "zip"})
     work(folder)
@@ -345,7 +345,7 @@ def test_tiles_are_the_image(stage: Path, tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.slow
 def test_a_border_that_was_too_narrow(stage: Path, tmp_path: Path) -> None:
-    """Is found out, and made wider."""
+    """A border that was too narrow is detected and widened."""
     options = {"size": (64, 48), "spp": 48, "adaptive": 0.03}
     folder = job(stage, tmp_path, **options)
     render_all(folder, looks=1)
@@ -375,7 +375,7 @@ def test_an_image_is_denoised_when_it_is_whole(stage: Path, tmp_path: Path) -> N
 
 
 def test_an_image_counts_only_with_the_bytes_that_were_written(stage: Path, tmp_path: Path) -> None:
-    """A truncated, zeroed or replaced file of an image is found, whatever kind it is."""
+    """A truncated, zeroed or replaced output file of any kind is detected."""
     files = {"png": str(tmp_path / "a.png"), "stats": str(tmp_path / "a.json")}
     folder = job(stage, tmp_path, file={"split": True}, aovs=["depth", "normal"], **files)
     work(folder)

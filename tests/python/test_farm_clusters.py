@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs on Dask clusters, with and without TLS, and by Slurm."""
+"""Jobs on Dask clusters with and without TLS, and on Slurm."""
 
 from __future__ import annotations
 
@@ -93,9 +93,9 @@ class Cluster:
     """A scheduler and workers on loopback.
 
     Attributes:
-        address: The scheduler's.
-        scheduler: Its process.
-        workers: Theirs.
+        address: Address of the scheduler.
+        scheduler: Process of the scheduler.
+        workers: Processes of the workers.
     """
 
     def __init__(self, place: Path, words: list[str], environment: dict[str, str]) -> None:
@@ -145,7 +145,7 @@ def cluster(
 
 @pytest.mark.slow
 def test_by_dask(stage: Path, tmp_path: Path) -> None:
-    """The bits of one process. A stage that changes is read anew by workers that had it open."""
+    """Equals the render in one process. Workers read a changed stage again."""
     here = tmp_path / "s.usda"
     here.write_text(f"#usda 1.0\n( subLayers = [@{stage}@] )\n")
     folder = made(here, tmp_path)
@@ -169,7 +169,7 @@ def test_by_dask(stage: Path, tmp_path: Path) -> None:
 
 
 def certificates(place: Path) -> dict[str, str]:
-    """Variables of Dask's own configuration that name new certificates."""
+    """Writes new certificates. Returns environment variables for Dask that name them."""
     from distributed import Security
 
     place.mkdir()
@@ -186,7 +186,7 @@ def certificates(place: Path) -> dict[str, str]:
 
 @pytest.mark.slow
 def test_by_dask_with_its_own_tls(stage: Path, tmp_path: Path) -> None:
-    """Who has other certificates does not get in. Ctrl-C stops what workers render."""
+    """A client with other certificates is refused. Ctrl-C stops the rendering workers."""
     mine, others = certificates(tmp_path / "tls"), certificates(tmp_path / "others")
     folder = made(stage, tmp_path, 20_000)
     with cluster(tmp_path, 1, ["--protocol", "tls"], **mine) as dask:
@@ -229,7 +229,7 @@ print(max(client.run(cpu).values()))
 
 
 def idle(address: str, variables: dict[str, str]) -> bool:
-    """Whether no worker computes."""
+    """Returns whether all workers are idle."""
     done = subprocess.run(
         [sys.executable, "-c", IDLE, address], env={**os.environ, **variables},
         capture_output=True, text=True, timeout=60,
@@ -239,7 +239,7 @@ def idle(address: str, variables: dict[str, str]) -> bool:
 
 @pytest.mark.slow
 def test_a_scheduler_that_ends(stage: Path, tmp_path: Path) -> None:
-    """One line, and the job is continued elsewhere."""
+    """The client ends with one line, and the job can be resumed elsewhere."""
     folder = made(stage, tmp_path, 8000)
     with cluster(tmp_path, 1) as dask:
         words = ["farm", "resume", str(folder.path), "--quiet", "--on", f"dask:{dask.address}"]
@@ -276,7 +276,7 @@ def test_a_cluster_without_workers(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_one_image_is_of_one_class(stage: Path, tmp_path: Path) -> None:
-    """A worker of another class gets no task; one whose class has parts is preferred."""
+    """A worker of another machine class gets no task. The class that has parts is preferred."""
     folder = made(stage, tmp_path)
     other = "import wavecomb.farm.machine_class as m; m.probe_hash = lambda: 'other'"
     (tmp_path / "other.py").write_text(other)
@@ -296,7 +296,7 @@ def test_one_image_is_of_one_class(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
-    """It gets no more tasks, and the other one renders all."""
+    """A worker with a full disk gets no more tasks, and the other one renders all."""
     folder = made(stage, tmp_path)
     limit = "import resource\ndef dask_setup(worker):\n"
     limit += "    resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
@@ -345,7 +345,7 @@ exit 0
 
 @pytest.fixture
 def slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Programs that stand for Slurm's: sbatch runs its script as an array."""
+    """Fake Slurm programs: sbatch runs its script as an array."""
     programs = tmp_path / "bin"
     programs.mkdir()
     for name, text in (("sbatch", SBATCH), ("squeue", SQUEUE), ("scancel", SCANCEL)):
@@ -358,7 +358,7 @@ def slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
-    """From a folder whose name is a script; workers whose time is over are replaced."""
+    """The folder name contains shell code. Workers whose time is over are replaced."""
     place = tmp_path / "a\n#SBATCH --x\ntouch RAN; $(touch RAN)"
     place.mkdir()
     folder = made(stage, place, 20_000)
@@ -374,7 +374,7 @@ def test_by_slurm(stage: Path, tmp_path: Path, slurm: Path) -> None:
         assert stat.S_IMODE((secrets / "tls.json").stat().st_mode) == 0o600
         for number in (tmp_path / "pids").read_text().split():
             with contextlib.suppress(ProcessLookupError):
-                os.killpg(int(number), signal.SIGTERM)  # as at the end of their time
+                os.killpg(int(number), signal.SIGTERM)  # as at the end of their time limit
         _, said = client.communicate(timeout=200)
     finally:
         client.kill()
@@ -407,7 +407,7 @@ def dask_setup(worker):
 def test_a_worker_that_ends_with_a_result(
     stage: Path, tmp_path: Path, slurm: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The client does not wait for a result that only a new worker could compute again."""
+    """The client does not wait for a lost result that only a new worker could compute again."""
     (tmp_path / "ends.py").write_text(ENDS_WITH_RESULT)
     monkeypatch.setenv("DASK_DISTRIBUTED__WORKER__PRELOAD", str(tmp_path / "ends.py"))
     folder = made(stage, tmp_path)

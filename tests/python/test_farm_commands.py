@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb farm` from end to end: the bits of one process, resuming, tiles by other queues."""
+"""`wavecomb farm` from end to end: equal images, resuming, tiles by other schedulers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    """The command, and how it ends."""
+    """Runs the command and returns its exit code and output."""
     return forks.wavecomb(*words, timeout=200)
 
 
@@ -63,7 +63,7 @@ def test_one_image_by_two_workers(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_frames_where_one_fails(stage: Path, tmp_path: Path) -> None:
-    """The others are written; resume renders what is missing or damaged, and nothing else."""
+    """The other frames are written. Resuming renders only missing or damaged files."""
     names, job = tmp_path / "a.##.exr", tmp_path / "job"
     words = ("--frames", "1-3", *SMALL, "--stats", tmp_path / "a.##.json")
     made = run("farm", "submit", stage, "-o", names, *words, "--job", job, "--on", "none")
@@ -113,7 +113,7 @@ def test_a_stage_that_changed_is_rendered_again(stage: Path, tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_tiles_by_another_queue(stage: Path, tmp_path: Path) -> None:
-    """One `render --tile` for each tile, in any order, and `farm assemble`."""
+    """One `render --tile` per tile, in any order, then `farm assemble`."""
     words = (*SMALL, "--aov", "crypto", "--png", tmp_path / "a.##.png", "--frames", "1-2")
     names = ("render", stage, "-o", tmp_path / "a.##.exr", *words)
     for tile in ("3/3", "1/3"):
@@ -221,7 +221,7 @@ PLANTED = 'from pathlib import Path\nPath(__file__).with_name("RAN").touch()\nra
 
 @pytest.mark.slow
 def test_modules_in_the_working_folder_never_run(stage: Path, tmp_path: Path) -> None:
-    """Dask starts its workers with the working folder in front of what they import, by itself."""
+    """Dask puts the working folder first on the module path of its workers; Wavecomb must not."""
     place = tmp_path / "cwd"
     place.mkdir()
     for name in ("json", "signal", "struct", "yaml", "distributed", "wavecomb", "numpy", "pxr"):
@@ -240,7 +240,7 @@ def test_modules_in_the_working_folder_never_run(stage: Path, tmp_path: Path) ->
 @needs("openjd.cli")
 @pytest.mark.parametrize("name", ["plain", "with {{Param.Job}} and `touch RAN`; $(touch RAN)"])
 def test_open_job_description(stage: Path, tmp_path: Path, name: str) -> None:
-    """`openjd run` renders a task for each tile, and the images at the end."""
+    """`openjd run` renders a task for each tile and assembles the images at the end."""
     place = tmp_path / name
     place.mkdir()
     words = ("--frames", "1-2", *SMALL, "--tiles", "2x1", "--on", "none")
@@ -281,7 +281,7 @@ def test_names_with_line_breaks(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_path_maps(stage: Path, tmp_path: Path) -> None:
-    """The same share under another name: the stage, all that it names, and the images."""
+    """Path maps apply to the stage, all files that it names, and the images."""
     first, other = tmp_path / "here", tmp_path / "elsewhere"
     (first / "out").mkdir(parents=True)
     shutil.copy(stage, first / "box.usdc")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Workers, schedulers and clients that are killed or hang, full disks, two clients on one job.
+"""Workers, schedulers and clients that are killed or hang, full disks, concurrent clients.
 
-The image equals the undisturbed one bit for bit, or the command ends with one line and a resume
+The image equals the undisturbed one bit for bit, or the command ends with one line and resuming
 gives that image.
 """
 
@@ -52,7 +52,7 @@ def one_process(stage: Path, place: Path, spp: int) -> Path:
 
 
 def client_of(folder: Folder, *words: str) -> subprocess.Popen[str]:
-    """`farm resume` with two workers."""
+    """Starts `farm resume` with two workers."""
     return subprocess.Popen(
         [*WAVECOMB, "farm", "resume", str(folder.path), "--quiet", "--on", "local:2", *words],
         stderr=subprocess.PIPE, text=True,
@@ -60,7 +60,7 @@ def client_of(folder: Folder, *words: str) -> subprocess.Popen[str]:
 
 
 def descendants(pid: int) -> list[int]:
-    """Processes that a process started, and theirs."""
+    """Returns the ids of all descendants of a process."""
     parents = {}
     for entry in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError, ValueError):
@@ -84,7 +84,8 @@ def parts_of(folder: Folder) -> list[Path]:
 
 
 def disturb(stage: Path, place: Path, spp: int, count: int) -> None:
-    """Kills or stops workers, their hosts and clients, whose process has the scheduler, too."""
+    """Kills or halts random workers, their nannies and clients (whose process has the scheduler).
+    """
     folder, chance, done = made(stage, place, spp), random.Random(7), 0
     client = client_of(folder)
     try:
@@ -134,7 +135,7 @@ def test_twenty_kills_and_stops(stage: Path, tmp_path: Path) -> None:
 
 
 def test_a_stage_that_kills_its_workers(stage: Path, tmp_path: Path) -> None:
-    """Is named in one line after its tries; nothing waits for ever."""
+    """After its retries, the image is named in one line, and nothing waits for ever."""
     folder = made(stage, tmp_path, 400_000, tiles="1x1", tries=2)
     client = client_of(folder)
     killed: set[int] = set()
@@ -156,7 +157,7 @@ def test_a_stage_that_kills_its_workers(stage: Path, tmp_path: Path) -> None:
 
 
 def test_a_worker_that_hangs(stage: Path, tmp_path: Path) -> None:
-    """It is restarted, and its task is rendered by another."""
+    """The worker is restarted, and another one renders its task."""
     folder = made(stage, tmp_path, 2000, hang_s=8.0)
     client = client_of(folder)
     try:
@@ -173,7 +174,7 @@ def test_a_worker_that_hangs(stage: Path, tmp_path: Path) -> None:
 
 
 def is_worker(pid: int) -> bool:
-    """Whether a process is of a nanny and has loaded USD: it renders."""
+    """Returns whether a process was started by a nanny and has loaded USD, so that it renders."""
     with contextlib.suppress(OSError):
         place = Path("/proc") / str(pid)
         spawned = b"spawn_main" in (place / "cmdline").read_bytes()
@@ -182,7 +183,7 @@ def is_worker(pid: int) -> bool:
 
 
 def test_a_render_that_makes_no_progress(stage: Path, tmp_path: Path) -> None:
-    """Its own watchdog ends the worker, whose event loop is alive."""
+    """The watchdog ends a worker whose render makes no progress although its event loop runs."""
     folder = made(stage, tmp_path, 4)
     code = (
         "import os, sys, time; from wavecomb.farm.tasks import FarmPlugin, progress\n"
@@ -258,7 +259,7 @@ cp a.exr "$OUT"
 
 
 def test_a_disk_that_is_full(stage: Path, tmp_path: Path) -> None:
-    """One line names the file; nothing is torn; a resume with room gives the image."""
+    """One line names the file, no file is partial, and resuming with space gives the image."""
     disk, out = tmp_path / "disk", tmp_path / "out.exr"
     disk.mkdir()
     try:
@@ -277,7 +278,7 @@ def test_a_disk_that_is_full(stage: Path, tmp_path: Path) -> None:
 
 
 class _Future:
-    """What a client sees of a task that ended."""
+    """A fake future of a finished task."""
 
     def __init__(self, result: dict[str, object]) -> None:
         self.status, self.key, self._result = "finished", "x", result
@@ -287,7 +288,7 @@ class _Future:
 
 
 class _Client:
-    """A scheduler with two workers, of which one has no room to write."""
+    """A fake client of a scheduler with two workers, one of which has a full disk."""
 
     status = "running"
 
@@ -306,7 +307,7 @@ class _Client:
 
 
 def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
-    """Its tile goes to another worker; where there is none, the command says why."""
+    """The tile goes to another worker. If there is none, the command names the reason."""
     folder, client = made(stage, tmp_path, 1), _Client()
     run = Run(
         folder, Cluster(client, "--on x"), Outcome(16, 1), show=lambda out: None,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that a stage needs: layers, textures, tiles, profiles, images inside MaterialX files."""
+"""Files that a stage needs: layers, textures, tiles, profiles, images in MaterialX files."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_all_files_are_listed(folder: Path) -> None:
 
 
 def test_files_of_other_stages_are_not_listed(folder: Path) -> None:
-    """A process keeps what it translated: each stage has its own of it."""
+    """A process caches translated MaterialX files, but lists them per stage."""
     (folder / "other.mtlx").write_text(LOOK.replace("b.png", "a.png"))
     (folder / "one.usda").write_text(
         '#usda 1.0\ndef "Looks" (references = @other.mtlx@</MaterialX>) {}\n'
@@ -123,7 +123,7 @@ def test_variants_decide_what_is_missing(folder: Path) -> None:
 
 
 def test_files_that_differ(tmp_path: Path) -> None:
-    """By their bytes; those with the same size and time are not read."""
+    """Files are compared by content, unless size and time are equal."""
     for name in ("a.png", "b.png"):
         write_image(tmp_path / name, np.zeros((4, 4, 3), np.uint8))
     stage = tmp_path / "s.usda"
@@ -143,7 +143,7 @@ def test_files_that_differ(tmp_path: Path) -> None:
 
 
 def test_a_texture_that_goes_while_a_job_runs(tmp_path: Path) -> None:
-    """Fails its images by name: no checker in its place."""
+    """The images fail with the name of the texture. No placeholder is drawn."""
     write_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
     stage = tmp_path / "s.usda"
     stage.write_text("#usda 1.0\n" + textured("M", "a.png", 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are not regular are refused in one line, and nothing waits for them."""
+"""Special files, such as FIFOs, are refused in one line, and nothing waits for them."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ OTHERS = {
 
 @pytest.mark.parametrize("kind", OTHERS)
 def test_other_files_of_a_stage(tmp_path: Path, fifo: Any, kind: str) -> None:
-    """The image is drawn without the file, and a warning says so; or the stage is refused."""
+    """The image is drawn without the file and with a warning, or the stage is refused."""
     name, body = OTHERS[kind]
     fifo(name)
     done = run("render", stage(tmp_path, body), "-o", "a.exr", *SMALL, folder=tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fireflies reweighted: what is taken, what is kept, and that no schedule has a say in it."""
+"""Firefly reweighting: what it removes and keeps, and equal images for all schedules."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A forked process is what a fresh one is, as far as those who start it can tell."""
+"""A forked process behaves as a fresh one for its caller."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ENDS = ["0", "None", "3", "'why'", "1 / 0", "beside.join() or os.kill(os.getpid(
 
 
 def both(words: list[str], **options: object) -> list[tuple[int, str, str]]:
-    """(code, stdout, stderr) of a fresh process, and of a forked one."""
+    """Returns (code, stdout, stderr) of a fresh process and of a forked one."""
     found = []
     for kind in (subprocess.Popen, forks.Popen):
         process = kind(
@@ -52,7 +52,7 @@ def test_code(end: str, tmp_path: Path) -> None:
     environment = {**os.environ, "HOME": str(tmp_path)}
     words = ["-c", CODE.replace("{end}", end), "a", "--b"]
     fresh, forked = both(words, cwd=tmp_path, env=environment, start_new_session=end == "0")
-    # A traceback has one frame more, that of who ran the code.
+    # A traceback of the forked process has an additional frame.
     assert forked[:2] == fresh[:2]
     assert forked[2].splitlines()[-1:] == fresh[2].splitlines()[-1:]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The frame in names of files of a single image, as usdrecord and husk fill it in."""
+"""Frame numbers in the file name of a single image, formatted as usdrecord and husk do."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sequences: frames as text, and frames that are what they are alone."""
+"""Sequences: frame numbers in text, and frames that equal single renders."""
 
 import json
 import os
@@ -92,7 +92,7 @@ def cube(stage, path, x, colour):
 
 @pytest.fixture
 def shot(tmp_path):
-    """Three squares and a camera; what varies is up to the test."""
+    """Three squares and a camera. Tests add the animation."""
     path = tmp_path / "shot.usda"
     stage = Usd.Stage.CreateNew(str(path))
     for i, colour in enumerate([(1, 0, 0), (0, 1, 0), (0, 0, 1)]):
@@ -117,7 +117,7 @@ def vary_camera(stage):
 
 
 def vary_lens(stage):
-    """One frame's camera is no good; the next has no depth of field, as another has."""
+    """One frame's camera is invalid, and the next one has no depth of field."""
     camera = UsdGeom.Camera.Get(stage, "/World/Rig/Camera")
     ramp(camera.CreateFocalLengthAttr(), [50, 0, 50, 50])
     ramp(camera.CreateFStopAttr(), [0.5, 0.5, 0, 2])
@@ -158,7 +158,7 @@ def vary_light(stage):
 
 
 def subdivide(stage):
-    """Two of the squares become surfaces, one of them in several colours."""
+    """Turns two of the squares into subdivision surfaces, one of them with several colours."""
     for i in (0, 2):
         UsdGeom.Mesh.Get(stage, f"/World/Q{i}").GetSubdivisionSchemeAttr().Set("catmullClark")
     colours = UsdGeom.Mesh.Get(stage, "/World/Q2").GetDisplayColorPrimvar()
@@ -167,7 +167,7 @@ def subdivide(stage):
 
 
 def vary_near_surfaces(stage):
-    """The camera goes from where surfaces are a few pixels large to where they are many."""
+    """Moves the camera from where surfaces are a few pixels large to where they are many."""
     subdivide(stage)
     ramp(
         UsdGeom.Xformable.Get(stage, "/World/Rig/Camera")
@@ -274,7 +274,7 @@ def test_scene_and_hierarchy_stay_where_the_camera_moves(shot):
 
 
 def test_levels_of_surfaces_follow_the_camera(shot):
-    """The scene is made anew where a surface is refined more, and only there."""
+    """The scene is rebuilt in frames where a surface is refined further, and only there."""
     vary_near_surfaces(shot)
     shot.Save()
     frames = Frames(shot.GetRootLayer().realPath, size=(100, 100))
@@ -303,12 +303,12 @@ def test_refined_surfaces_are_shared_beside_what_moves(shot):
 
     for frame in (1, 2):
         load_stage(stage, frame=frame, cache=cache, subdivision=2, builder_factory=Counts)
-    # The one with a colour for each point is refined with its colours.
+    # The surface with vertex colours is refined again with its colours.
     assert made == [2, 1]
 
 
 def test_value_clips(tmp_path):
-    """Points that come from a clip for each two frames."""
+    """Points from value clips, each of which covers two frames."""
     for number, height in ((1, 1.0), (2, 3.0)):
         clip = Usd.Stage.CreateNew(str(tmp_path / f"clip{number}.usda"))
         points = UsdGeom.Mesh.Define(clip, "/Clip").CreatePointsAttr()

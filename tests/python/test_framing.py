@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages without a camera: what is seen fills the picture, whatever the shapes of both."""
+"""Stages without a camera: the visible objects fill the image, for any shape and aspect ratio."""
 
 import tracemalloc
 
@@ -37,7 +37,7 @@ def floor(stage):
 
 
 def corner(stage):
-    """A tetrahedron, far from its box's corners, with a point that no face uses."""
+    """A tetrahedron that fills little of its bounding box, with an unused point."""
     mesh = UsdGeom.Mesh.Define(stage, "/A")
     mesh.GetPointsAttr().Set([(0, 0, 0), (2, 0, 0), (0, 2, 0), (0, 0, 2), (90, 90, 90)])
     mesh.GetFaceVertexCountsAttr().Set([3, 3, 3, 3])
@@ -46,7 +46,7 @@ def corner(stage):
 
 
 def rounded(stage):
-    """A cube that is subdivided is nearly a ball, and much smaller than its cage."""
+    """A subdivided cube is nearly a ball, and much smaller than its control mesh."""
     mesh = UsdGeom.Mesh.Define(stage, "/A")
     at = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     mesh.GetPointsAttr().Set(at)
@@ -56,7 +56,7 @@ def rounded(stage):
 
 
 def crowd(stage):
-    """Many instances of a ball, in instances that are turned."""
+    """Many instances of a ball in two rotated point instancers."""
     at = [Gf.Vec3f(4.0 * np.cos(k), 0.0, 4.0 * np.sin(k)) for k in range(900)]
     for name, turn in (("/P", 0.0), ("/Q", 70.0)):
         cloud = UsdGeom.PointInstancer.Define(stage, name)
@@ -83,13 +83,13 @@ SHAPES = [sphere, cube, pole, floor, corner, rounded, crowd, drops, z_up]
 
 
 def spans(path, size, **options):
-    """How much of width and height is covered by what is seen."""
+    """Returns the covered fractions of width and height, and how far they are off centre."""
     picture = wavecomb.render(path, size=size, spp=1, aovs=["depth"], filter="box", **options)
     depth = np.asarray(picture.depth).reshape(size[1], size[0])
     seen = np.isfinite(depth) & (depth > 0) & (depth < 1e9)
     assert not seen.all()
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
-    # Of the pixels at both ends half is covered, on average.
+    # The pixels at either end are covered by half on average.
     wide, high = columns[-1] - columns[0], rows[-1] - rows[0]
     middle = abs(columns[-1] + columns[0] + 1 - size[0]), abs(rows[-1] + rows[0] + 1 - size[1])
     return (wide / size[0], high / size[1]), middle
@@ -97,7 +97,7 @@ def spans(path, size, **options):
 
 @pytest.mark.parametrize("number", range(len(SHAPES)))
 def test_what_is_seen_fills_the_picture(number, tmp_path):
-    """80 to 92 % of the dimension that is filled first, and in the middle of it."""
+    """The shapes cover 80 to 92 % of the limiting dimension and are centred in it."""
     shape, size = SHAPES[number], SIZES[number % len(SIZES)]
     stage = Usd.Stage.CreateInMemory()
     shape(stage)
@@ -110,7 +110,7 @@ def test_what_is_seen_fills_the_picture(number, tmp_path):
 
 
 def within(view, points, size):
-    """The least and greatest place of points in the picture, -1 to 1 across it."""
+    """Returns the least and greatest image coordinates of points, in [-1, 1]."""
     local = np.c_[points, np.ones(len(points))] @ np.linalg.inv(view.transform)
     x0, x1, y0, y1 = camera_window(view.options, *size)
     flat = view.options.get("projection") == "orthographic"
@@ -132,7 +132,7 @@ def test_points_touch_a_margin_on_both_sides(projection, conform, size):
         low, high = within(view, points, size)
         assert high.max() <= framing.FILLED + 1e-6 and low.min() >= -framing.FILLED - 1e-6
         axis = int(np.argmax(high - low))
-        # Two opposite planes are touched; in perspective by what is near and what is far.
+        # In perspective, different depths may limit the two sides.
         assert high[axis] == pytest.approx(framing.FILLED) or low[axis] == pytest.approx(
             -framing.FILLED
         )
@@ -148,7 +148,7 @@ def test_an_outline_is_what_matters():
     for direction in rng.normal(size=(200, 3)):
         direction /= np.linalg.norm(direction)
         assert (kept @ direction).max() >= 0.98 * (ball @ direction).max()
-    # The same points in an order that has neighbours near each other: most are not looked at.
+    # The same points sorted by position: whole blocks of points are skipped.
     ball = ball[np.lexsort((ball[:, 0], np.round(8 * ball[:, 1]), np.round(8 * ball[:, 2])))]
     directions = framing.DIRECTIONS.astype(np.float32)
     near = framing._near_the_outside(ball.astype(np.float32), None, directions[:6])
@@ -164,7 +164,7 @@ def test_an_outline_is_what_matters():
     box = np.array([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]])
     assert len(framing.outline(framing.corners(box))) == 8
     assert len(framing.outline(np.repeat(framing.corners(box), 99, axis=0))) == 8
-    # Of many placements, those that reach farthest.
+    # Of many instances, only those that reach farthest are kept.
     places = np.tile(np.eye(4), (5000, 1, 1))
     places[:, 3, :3] = 10.0 * rng.normal(size=(5000, 3))
     every = (kept[None] + places[:, 3:, :3]).reshape(-1, 3)
@@ -192,7 +192,7 @@ def test_a_group_of_many_things_keeps_few_points():
     [(10_000, 1 << 12, 20e6), pytest.param(100_000, 1 << 15, 150e6, marks=pytest.mark.long)],
 )
 def test_millions_of_places_are_looked_at_in_parts(monkeypatch, count, block, most):
-    """All distances at once were 4 kB for each instance."""
+    """Distances are computed in blocks; all at once would need 4 kB per instance."""
     monkeypatch.setattr(framing, "_BLOCK", block)
     chance = np.random.default_rng(5)
     transforms = np.tile(np.eye(4), (count, 1, 1))

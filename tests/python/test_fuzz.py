@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A few broken stages of each kind; ``fuzz_stages.py`` checks them by the thousand."""
+"""A few broken stages of each kind. ``fuzz_stages.py`` checks thousands."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_broken_stages_end_in_a_line() -> None:
     faults = [f"{v.name}: {v.outcome} {v.said}" for v in verdicts if v.outcome not in GOOD]
     assert not faults
     assert {v.kind for v in verdicts} == set(KINDS)
-    # Cases that break nothing would test nothing.
+    # The cases must break something, or nothing is tested.
     outcomes = [v.outcome for v in verdicts]
     assert outcomes.count("refused") > 5 and outcomes.count("warned") > 5
     assert all(v.said for v in verdicts if v.outcome != "rendered")
@@ -48,7 +48,7 @@ MENDED = (
 
 @pytest.fixture(scope="module")
 def mended() -> dict[str, Verdict]:
-    """What became of each: one process after another takes them, as of all cases."""
+    """Results of cases that once failed, run in one batch."""
     cases = [case.split("/") for case in MENDED]
     verdicts = run([(kind, int(number)) for kind, number in cases], seed=1)
     return {verdict.name: verdict for verdict in verdicts}

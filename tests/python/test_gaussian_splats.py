@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaussian splats: what is read, pictures in closed form, one picture for all schedules."""
+"""Gaussian splats: reading, images in closed form, equal images for all schedules."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def tuples(values: Any) -> str:
 
 
 def particles(name: str = "S", **values: Any) -> str:
-    """A prim with these attributes: positions, scales, orientations (w first), opacities, harmonics
-    (n, k, 3), ``more``."""
+    """Returns a prim with positions, scales, orientations (w first), opacities, harmonics (n, k, 3)
+    and the text ``more``."""
     harmonics = np.asarray(values["harmonics"], float)
     n = len(values["positions"])
     lines = [
@@ -61,7 +61,7 @@ def stage(folder: Path, *prims: str) -> Path:
 
 
 def camera(distance: float = 5.0, aperture: float = 0.01) -> str:
-    """It looks along -z from there, and sees about aperture / 50 of the distance."""
+    """Returns a camera that looks along -z and sees about aperture / 50 times the distance."""
     return f"""def Camera "Camera" {{
         float focalLength = 50
         float horizontalAperture = {aperture}
@@ -72,13 +72,13 @@ def camera(distance: float = 5.0, aperture: float = 0.01) -> str:
 
 
 def recorded(path: Path) -> tuple[Any, str]:
-    """What a stage gives the core, and what was said but that it has no lights or camera."""
+    """Returns the recorded scene of a stage, and its messages about splats."""
     loaded = load_stage(path, builder_factory=Recorder)  # type: ignore[arg-type]
     return loaded.scene, "\n".join(line for line in said(loaded).splitlines() if "splat" in line)
 
 
 def read(folder: Path, *lines: str) -> tuple[Any, str]:
-    """What becomes of a prim with these lines, and what was said."""
+    """Returns the recorded splats of a prim with these lines, or None, and the messages."""
     body = "\n".join(lines)
     path = stage(folder, f'def ParticleField3DGaussianSplat "S" {{\n{body}\n}}')
     scene, told = recorded(path)
@@ -179,7 +179,7 @@ def write_ply(path: Path, columns: dict[str, Any]) -> Path:
 
 
 def test_a_capture_becomes_a_stage(tmp_path: Path) -> None:
-    """Logarithms, logits and coefficients by channel are what UsdVol has in their place."""
+    """Logarithmic scales, logits and channel order of a capture are converted to UsdVol's."""
     rng = np.random.default_rng(1)
     names = [*"xyz", "opacity", *(f"scale_{k}" for k in range(3)), *(f"rot_{k}" for k in range(4))]
     names += [f"f_dc_{k}" for k in range(3)] + [f"f_rest_{k}" for k in range(9)]
@@ -213,7 +213,7 @@ def test_a_capture_becomes_a_stage(tmp_path: Path) -> None:
 
 
 def test_colours_of_captures_are_decoded() -> None:
-    """In each direction what is seen is that of sRGB; exactly where there is one colour."""
+    """Colours are converted from sRGB in every direction, exactly if the colour is constant."""
     rng = np.random.default_rng(2)
     views = rng.normal(size=(64, 3))
     views /= np.linalg.norm(views, axis=1, keepdims=True)
@@ -234,14 +234,15 @@ def test_colours_of_captures_are_decoded() -> None:
 
 
 def sidak(tests: int, level: float = 1e-4) -> float:
-    """Deviations that none of so many means exceeds but with that probability."""
+    """Returns the number of deviations that any of ``tests`` means exceeds with that probability.
+    """
     from scipy.stats import norm
 
     return float(norm.isf(0.5 * (1.0 - (1.0 - level) ** (1.0 / tests))))
 
 
 def test_a_stack_is_composited_front_to_back(tmp_path: Path) -> None:
-    """Mean colour: sum c_i alpha_i prod (1 - alpha_j) before a black sky, in order of response."""
+    """The mean is sum c_i alpha_i prod (1 - alpha_j) before a black sky, in depth order."""
     rng = np.random.default_rng(8)
     n = 6
     places = np.stack([rng.uniform(-0.6, 0.6, n), rng.uniform(-0.6, 0.6, n), -np.arange(n)], axis=1)
@@ -286,7 +287,7 @@ def test_a_stack_is_composited_front_to_back(tmp_path: Path) -> None:
 
 
 def test_colours_are_those_of_scipys_harmonics(tmp_path: Path) -> None:
-    """Of one wide splat, seen along its axis from many sides."""
+    """The colours of one wide splat, seen from many sides, equal SciPy's harmonics."""
     special = pytest.importorskip("scipy.special")
     rng = np.random.default_rng(5)
     harmonics = rng.normal(size=(1, 16, 3)) * 0.08
@@ -323,7 +324,7 @@ def test_colours_are_those_of_scipys_harmonics(tmp_path: Path) -> None:
 
 
 def test_they_cast_shadows(tmp_path: Path) -> None:
-    """What comes through one before the sun is 1 - alpha of the light."""
+    """A splat before the sun transmits 1 - alpha of the light."""
     opacity, off = 0.8, 0.7
     alpha = opacity * math.exp(-0.5 * off**2)
     floor = """def Mesh "Floor" {
@@ -351,7 +352,7 @@ def test_they_cast_shadows(tmp_path: Path) -> None:
 
 
 def scenery(folder: Path) -> Path:
-    """Splats turned, stretched, moved and instanced, over a floor and in a mirror."""
+    """Returns rotated, scaled, moving and instanced splats over a floor and in a mirror."""
     path = folder / "scenery.usda"
     write_scene("splats", path, splats=1500, triangles=12_000)
     text = path.read_text()
@@ -385,7 +386,7 @@ def test_one_picture_for_all_schedules(tmp_path: Path) -> None:
 
 
 def test_layers_know_them(tmp_path: Path) -> None:
-    """They have a depth, a normal that faces who looks, and are all emission."""
+    """Splats have a depth and a normal towards the camera, and count as emission."""
     path = stage(
         tmp_path, camera(aperture=2.0),
         particles(positions=[(0, 0, 0)], harmonics=np.ones((1, 1, 3)), opacities=[0.9]),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each scene of tests/scenes, rendered by the wave, against its reference picture."""
+"""Scenes of tests/scenes, rendered by the wavefront integrator, against reference images."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_reference_is_whole_and_small(name: str) -> None:
 
 
 def test_a_small_bias_is_found() -> None:
-    """One percent more light, or one pixel of a shift, does not pass."""
+    """One per cent more light, or a shift by one pixel, fails the comparison."""
     scene = read_golden("Lights")
     made = scene.batches(TEST_BATCHES, 0, scene.spp, threads=2)
     mean, variance = scene.reference()

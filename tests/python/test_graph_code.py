@@ -32,7 +32,7 @@ def run(value, at, lanes=1):
 
 
 def check(value, at, rtol=2e-4, atol=2e-4, part=1.0):
-    """A value against NumPy, and a packet against a scalar, bit by bit."""
+    """Compares a value with NumPy, and a packet with a scalar bit by bit."""
     scalar, packet = run(value, at, 1), run(value, at, 16)
     assert scalar.tobytes() == packet.tobytes()
     expected = evaluate(value, at)
@@ -47,7 +47,7 @@ def test_operations_by_component(code):
     at = points(997)
     if code == "equal":
         at[::2, 9:12] = at[::2, 3:6]
-    # A jump may fall to the other side in single precision.
+    # Single precision may fall on the other side of a discontinuity.
     check(make.op(code, *operands), at, part=0.999 if code in JUMPS else 1.0)
 
 
@@ -90,7 +90,7 @@ def test_noise(code, place, widths, number, rest):
         value = make.op(
             code, make.input(place), *(numbers(*v) for v in rest), number=number, width=width
         )
-        # Points on the edge of a cell may be of the one beside it.
+        # Points on the edge of a cell may belong to its neighbour.
         check(value, at, rtol=1e-3, atol=1e-3, part=0.995)
         assert run(value, at).std() > 0.05
 
@@ -113,7 +113,7 @@ def test_vectors_and_colours():
 
 
 def random_value(rng, make, leaves, size, codes):
-    """A graph of `size` operations on vectors of all widths, with swizzles in between."""
+    """Returns a graph of `size` operations on vectors of all widths, with swizzles."""
     values = list(leaves)
     for _ in range(size):
         code = rng.choice(codes)
@@ -124,7 +124,7 @@ def random_value(rng, make, leaves, size, codes):
             for v in operands
         ]
         value = make.op(code, *mixed)
-        # Kept small, so that no sum of rounding decides.
+        # Small values keep rounding errors small.
         values.append(make.op("clamp", value, numbers(-4.0), numbers(4.0)))
     return values[-1] + values[-2][:1]
 
@@ -145,7 +145,7 @@ def test_random_graphs_are_what_numpy_says(seed):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_what_is_folded_is_what_would_be_computed(seed):
-    """The same graph with constants, and with inputs that hold them: the same bits."""
+    """A graph with constants folds to the same bits as with inputs of these values."""
     rng = random.Random(1000 + seed)
     at = points(1, seed)
     folding, computing = Expressions(), Expressions()
@@ -171,7 +171,7 @@ def test_what_needs_no_operation_has_none():
     assert make.op("mix", p, make.input("normal"), zero) == p
     assert make.op("select", one, p, zero) == p
     assert make.op("power", p, one) == p == make.op("divide", p, one)
-    # Of a vector the components that are known are known.
+    # Known components of a vector are folded.
     value = make.op("multiply", p, numbers(2.0, 0.0, 1.0))
     assert value[1] == 0.0 and value[2] == p[2]
     assert is_constant(make.op("add", numbers(1.0, 2.0), numbers(3.0)))
@@ -179,7 +179,7 @@ def test_what_needs_no_operation_has_none():
 
 
 def test_sums_that_fork_and_meet_are_short():
-    """A sum of a sum of itself, 60 times: 2^60 ways through it, and one answer."""
+    """A value added to itself 60 times has 2^60 paths, but is evaluated once."""
     make = Expressions()
     uv = make.input("uv")
     value = uv
@@ -199,7 +199,7 @@ def test_equal_operations_are_one_and_dead_ones_none():
     p = make.input("position")
     a = make.op("sin", make.op("add", p, numbers(1.0)))
     b = make.op("sin", make.op("add", p, numbers(1.0)))
-    make.op("noise3", p, width=3)  # asked for by nobody
+    make.op("noise3", p, width=3)  # its result is not used
     graph = assemble(dict(enumerate(make.op("add", a, b))))
     assert graph.count == 4  # input, add, sin, add
 
@@ -210,7 +210,7 @@ def test_registers_are_used_again():
     for i in range(400):
         value = make.op("sin", make.op("add", value, numbers(0.1 * i)))
     graph = assemble(dict(enumerate(value)))
-    assert graph.count == 800  # the first sum is of 0
+    assert graph.count == 800  # the first addition, of 0, is dropped
     top = np.frombuffer(graph.ops, program._OP)["to"].max()
     assert top < 12
 

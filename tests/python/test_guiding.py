@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounces that are guided by a learned field: one picture, no bias, parts, what is said of it."""
+"""Path guiding: equal images for all schedules, no bias, crops, statistics."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _core = pytest.importorskip("wavecomb._core")
 
 SIZE = 64
 SPP = 32
-"""The fewest samples of which an eighth teaches a field."""
+"""The fewest samples of which an eighth suffices to train a field."""
 WAYS: list[dict[str, Any]] = [
     {"guiding": "on"},
     {"guiding": "on", "roulette": "efficient"},
@@ -65,7 +65,7 @@ def test_one_picture_whatever_the_schedule(
     learned = plain.stats["guiding"]
     assert learned["paths"] >= 12000
     assert learned["regions"] > 0
-    # So few paths do not show on Mixed that guiding pays.
+    # So few paths do not show a gain on Mixed.
     if name == "cornell":
         assert (learned["guided_share"] > 0) == (way["guiding"] == "on")
         assert not np.array_equal(plain.beauty, render(scene).beauty)
@@ -93,7 +93,7 @@ def test_parts_are_those_of_the_whole(cornell: Any, way: dict[str, Any]) -> None
     assert np.array_equal(part.beauty[y0:y1, x0:x1], whole.beauty[y0:y1, x0:x1])
     crop = render(cornell, region=box, crop=True, **way)
     assert np.array_equal(crop.beauty, whole.beauty[y0:y1, x0:x1])
-    # Other samples are guided by the same field.
+    # A render with other seeds uses the same field.
     other = render(cornell, seed=5, **way).stats["guiding"]
     assert other["guided_share"] == whole.stats["guiding"]["guided_share"]
 
@@ -120,7 +120,7 @@ def as_settings(**values: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def stopped(cornell: Any) -> dict[str, Any]:
-    """The state of a guided render that was stopped on its way."""
+    """The state of a guided render that was stopped."""
     stop = StopAt(1)
     settings = as_settings(guiding="on", spp=128)
     _core.render(cornell, settings, watcher=stop, interval=0.01)
@@ -129,7 +129,7 @@ def stopped(cornell: Any) -> dict[str, Any]:
 
 
 def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str, Any]) -> None:
-    """Stopped anywhere, with other threads and lanes, and with nothing learned twice."""
+    """A resumed render with other threads and lanes uses the stored field and does not train."""
     way = {"guiding": "on", "spp": 128}
     whole = _core.render(cornell, as_settings(**way))
     again = _core.render(
@@ -143,14 +143,14 @@ def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str,
             assert told[fact] == before[fact], fact
     field = before["field_bytes"]
     assert field <= stopped["learned.field"].size <= field + 4096
-    # A checkpoint of an older version has no field: it is learned again.
+    # A checkpoint of an older version has no field, so training runs again.
     older = {name: value for name, value in stopped.items() if name != "learned.field"}
     again = _core.render(cornell, as_settings(**way), state=older)
     assert np.array_equal(again.beauty, whole.beauty) and not again.stats["guiding"]["kept"]
 
 
 def test_more_samples_are_guided_as_those_before(cornell: Any, stopped: dict[str, Any]) -> None:
-    """The longer render would have learned another field; this one goes on with what it has."""
+    """A render resumed with more samples keeps the field of the shorter one."""
     more = _core.render(cornell, as_settings(guiding="on", spp=160), state=stopped)
     learned = more.stats["guiding"]
     assert learned["kept"] and learned["paths"] == pytest.approx(SIZE * SIZE * 128 / 8, rel=0.08)
@@ -203,7 +203,7 @@ def test_a_damaged_field_is_refused(cornell: Any, stopped: dict[str, Any]) -> No
 
 @pytest.mark.parametrize("name", ["cornell", "mixed"])
 def test_is_unbiased(request: pytest.FixtureRequest, name: str) -> None:
-    """Means of pictures of many seeds meet those without, all over and by tiles of the picture."""
+    """Means over many seeds agree with those of unguided renders, for each tile of the image."""
     scene = request.getfixturevalue(name)
     seeds = 12
 
@@ -219,7 +219,7 @@ def test_is_unbiased(request: pytest.FixtureRequest, name: str) -> None:
         guided = tiles(way, 1000 * (number + 1))
         variance = (plain.var(0, ddof=1) + guided.var(0, ddof=1)) / seeds
         z = (guided.mean(0) - plain.mean(0)) / np.sqrt(np.maximum(variance, 1e-12))
-        # Student's t of some 20 degrees of freedom, 16 tiles, three ways and two stages: 1 %.
+        # Student's t with about 20 degrees of freedom, 16 tiles, three settings, two stages: 1 %.
         assert np.abs(z).max() < 5.2, (way, z)
 
 
@@ -261,7 +261,7 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
-    """Where light comes through a door it pays; the reference integrator finds that, too."""
+    """Guiding helps where light enters through a door; the reference integrator also finds that."""
     write_scene("room", tmp_path / "room.usdc", plain=True)
     scene = wavecomb.load(tmp_path / "room.usdc").scene
     part: dict[str, Any] = {
@@ -269,7 +269,7 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
     }
     first = wavecomb.render(scene, **part)
     assert first.stats["guiding"]["used"]
-    # A hundredth of the samples finds that out; then as many teach as without asking.
+    # After a hundredth of the samples shows a gain, training continues as with "on".
     assert first.stats["guiding"]["paths"] > 1.5 * 480 * 320 * 132 / 100
     ways: list[dict[str, Any]] = [{"threads": 1, "lanes": 1, "wave_size": 64, "policy": "none"}]
     if is_long():
@@ -281,7 +281,7 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
 
 
 def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
-    """Under an even dome every direction brings as much as the material thinks."""
+    """Under an even dome, all directions contribute as the material expects."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)
@@ -290,7 +290,7 @@ def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
     builder.add_light("dome", np.eye(4), color=(1, 1, 1), name="Sky")
     builder.set_camera(np.eye(4), window=(-1.0, 1.0, -1.0, 1.0))
     scene = builder.build()
-    # Training is of the whole picture, the render of a part of it.
+    # Training covers the whole image, the render a part of it.
     part: dict[str, Any] = {"spp": 5000, "region": (20, 40, 28, 44)}
     automatic = render(scene, guiding="auto", **part)
     assert not automatic.stats["guiding"]["used"]
@@ -298,7 +298,7 @@ def test_auto_leaves_a_stage_alone_where_it_does_not_pay() -> None:
 
 
 def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
-    """Of samples, and of seconds where those are the measure: 5 of them are too few to find out."""
+    """Training takes a small fraction of the samples, or of the time; 5 s are too few."""
     part: dict[str, Any] = {"guiding": "auto", "region": (0, 0, 1, 1)}
     assert render(cornell, spp=4800, **part).stats["guiding"] is None
     learned = render(cornell, spp=4900, **part).stats["guiding"]
@@ -307,16 +307,16 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     limited = {**part, "spp": 2**20, "threads": 2}
     assert render(cornell, time_limit=5.0, **limited).stats["guiding"] is None
     learned = render(cornell, time_limit=60.0, **limited).stats["guiding"]
-    # A machine that has other things to do gives up.
+    # Training gives up on a busy machine.
     assert 30_000 < learned["paths"] <= 240_000 and learned["seconds"] < 4
 
 
 def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> None:
-    """The first round is sized by a guess of how fast paths teach, the others by what it took."""
+    """The first round assumes a training speed; the others use the measured one."""
     way: dict[str, Any] = {"spp": 2**20, "threads": 2, "guiding": "on", "region": (0, 0, 1, 1)}
     learned = render(cornell, time_limit=3.0, **way).stats["guiding"]
     assert learned["rounds"] == 3
-    # The guess is several times too low here; a machine that has other things to do teaches less.
+    # The assumption is several times too low here, but a busy machine trains fewer paths.
     assert learned["paths"] > 3 * 2 * 50_000 / 8 or learned["seconds"] > 0.2
     assert learned["seconds"] < 1.5
 
@@ -331,7 +331,7 @@ def test_layers_say_what_became_of_bounces(cornell: Any) -> None:
     way: dict[str, Any] = {"guiding": "on", "roulette": "efficient", "aovs": LEARNED_AOVS}
     both = render(cornell, **way)
     share, survival = (both.aovs[name] for name in LEARNED_AOVS)
-    # A region leaves a quarter of its bounces to the material at least.
+    # In each region, the material samples at least a quarter of the bounces.
     assert 0.1 < share.mean() < share.max() <= 0.75
     assert 0.1 <= survival.min() < survival.mean() < survival.max() <= 1
     assert np.array_equal(both.beauty, render(cornell, **{**way, "aovs": ()}).beauty)
@@ -347,7 +347,7 @@ def test_layers_say_what_became_of_bounces(cornell: Any) -> None:
 
 
 def floor(albedo: float) -> Any:
-    """A floor below the horizon, under an even sky: a path has one bounce, or none."""
+    """Returns a floor below the horizon under an even sky: paths have at most one bounce."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)
@@ -359,7 +359,7 @@ def floor(albedo: float) -> Any:
 
 
 def test_survival_is_the_probability_of_roulette() -> None:
-    """After a bounce off an albedo of 0.2 it is min(3 x 0.2, 1); where nothing is hit, 1."""
+    """After a bounce off an albedo of 0.2 it is min(3 x 0.2, 1); for rays that miss, 1."""
     picture = render(
         floor(0.2), spp=4, filter="box", aovs=("survival",), roulette="throughput", roulette_depth=1
     )
@@ -376,10 +376,10 @@ def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
     learned = renderer.learned(*place)
     density = learned["density"]
     assert density.shape == (32, 32) and density.min() > 0
-    # Middles of bins as they are from here: some of the region's bins have two, others none.
+    # A bin of the region may contain the centres of two output bins, or none.
     assert density.mean() * 4 * np.pi == pytest.approx(1, rel=2e-2)
     assert 0 <= learned["guided_share"] <= 0.75
-    # Light comes from the side that the surface faces.
+    # Light comes from the hemisphere of the normal.
     up, ahead = np.eye(3)[1], np.eye(3)[2]
     vectors, _ = map_directions(up, ahead, 64)
     values, _ = density_map(density, up, ahead, 64)
@@ -396,7 +396,7 @@ def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
 
 @pytest.mark.parametrize("weights", ["power", "calibrated"])
 def test_shares_of_lights_are_those_of_the_render(mixed: Any, weights: str) -> None:
-    """By power, shares are the same for all places, and the statistics have them."""
+    """Selection probabilities by power are the same everywhere, and in the statistics."""
     renderer = _core.Renderer(mixed)
     settings = _core.Settings(
         width=SIZE, height=SIZE, spp=1, light_selection="power", light_weights=weights

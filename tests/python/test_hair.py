@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair: MaterialX's nodes to the program's parameters, pictures over schedules, closed forms."""
+"""Hair: parameters from MaterialX nodes, equal images for all schedules, closed forms."""
 
 from __future__ import annotations
 
@@ -35,9 +35,11 @@ def BasisCurves "C" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {
 
 
 def read(folder: Path, more: str = "", mesh: bool = False, **inputs: Any) -> tuple[Any, str]:
-    """What a strand wears, and what was said.
+    """Returns the material of a strand, and the messages of loading.
 
-    ``inputs``: of the hair; "roughness", "absorption" and "of" are of the nodes before it.
+    ``inputs`` are those of the hair node. "roughness" and "absorption" choose the nodes that feed
+    it, and
+    "of" sets the inputs of the absorption node.
     """
     text = STRAND.replace("MORE", more)
     if mesh:
@@ -102,7 +104,7 @@ def test_a_colour_of_another_roughness_keeps_its_absorption(tmp_path: Path) -> N
 
 
 def test_melanin(tmp_path: Path) -> None:
-    """By the formula of MaterialX's shader code."""
+    """Absorption from melanin, by the formula of MaterialX's shader code."""
     of = {"melanin_concentration": ("float", 0.6), "melanin_redness": ("float", 0.3)}
     scene, _ = read(tmp_path, of=of)
     amount = -math.log(0.4)
@@ -116,7 +118,7 @@ def test_melanin(tmp_path: Path) -> None:
 
 
 def test_plain_values(tmp_path: Path) -> None:
-    """Variances, scales and absorption without any helper."""
+    """Variances, scales and absorption set directly, without helper nodes."""
     scene, told = read(
         tmp_path, roughness_R=(variance(0.35), scale(0.45)),
         roughness_TT=(0.16 * variance(0.35), scale(0.45)),
@@ -179,7 +181,8 @@ def test_one_picture_for_all_schedules(tmp_path: Path) -> None:
 def strands(
     kind: str, count: int, material: dict[str, Any], lamps: Sequence[tuple[Any, ...]] = ()
 ) -> Any:
-    """A bundle of hair before the camera, under a white sky or (place, radius, colour) of lamps."""
+    """A bundle of hair before the camera, under a white sky or (position, radius, colour) of
+    lights."""
     builder = wavecomb.SceneBuilder()
     hair = builder.add_material("hair", **{"base_color": (1, 1, 1), "ior": 1.55, **material})
     rng = np.random.default_rng(5)
@@ -211,7 +214,7 @@ def strands(
 
 @pytest.mark.parametrize("kind", ["linear-tube", "cubic-tube", "cubic-ribbon"])
 def test_white_hair_under_a_white_sky_is_white(kind: str) -> None:
-    """Whatever goes through, round and between: no light is lost or made."""
+    """A furnace test of round and flat curves: no energy is lost or gained."""
     material = {"roughness": 0.3, "azimuthal_roughness": 0.3, "cuticle_tilt": 3.0}
     scene = strands(kind, 12, material)
     picture = wavecomb.render(
@@ -224,7 +227,7 @@ def test_white_hair_under_a_white_sky_is_white(kind: str) -> None:
 
 
 def test_lamps_are_what_each_brings_alone() -> None:
-    """Of several lamps a vertex asks for one out of three; of one there is nothing to choose."""
+    """With several lights, a vertex samples one of three; a single light needs no selection."""
     lamps = [
         ((1.5, 1, 2), 0.3, (9, 6, 3)),
         ((-2, 0, -2), 0.5, (2, 4, 9)),
@@ -246,7 +249,7 @@ def test_lamps_are_what_each_brings_alone() -> None:
     error = np.sqrt((together.var(0, ddof=1) + alone.var(0, ddof=1)) / 24)
     z = (together.mean(0) - alone.mean(0)) / error
     assert together.mean() > 0.01
-    # 48 of them, with 46 degrees of freedom: 1 in 10,000 by chance.
+    # 48 values with 46 degrees of freedom: exceeded by chance in 1 of 10,000 runs.
     assert np.abs(z).max() < 5.5
     assert error.mean() < 0.1 * together.mean()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's hextiledimage and hextilednormalmap, against a second implementation of its code."""
+"""MaterialX's hextiledimage and hextilednormalmap against a second implementation."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from wavecomb.usd.materialx.nodes import hextiles
 
 
 def reference(uv, tiling, rotation, scales, offsets):
-    """Coordinates (3, n, 2), turns (3, n) and weights (3, n): mx_hextile_coord in NumPy."""
+    """mx_hextile_coord in NumPy: coordinates (3, n, 2), rotations (3, n) and weights (3, n)."""
     coord = uv * tiling
     st = coord * 2 * np.sqrt(3)
     skewed = np.stack([st[:, 0] - 0.57735027 * st[:, 1], 1.15470054 * st[:, 1]], 1)
@@ -51,7 +51,7 @@ def test_copies_are_where_materialx_has_them():
         at[:, :2].astype(np.float64), (3, 2), 90, (0.5, 1.5), (0.1, 0.7)
     )
     copies = grid.copies()
-    # The hash is a fraction of what is large: digits of floats are lost, and some wrap round.
+    # The hash is the fraction of a large number. Floats lose digits, and some values wrap round.
     for k, copy in enumerate(copies):
         assert np.quantile(np.abs(run(copy.turn, at)[:, 0] - turns[k]), 0.95) < 1e-2
         assert np.quantile(np.abs(run(copy.uv, at) - where[k]), 0.95) < 1e-2
@@ -80,11 +80,11 @@ def test_copies_of_what_is_even_are_that():
 
 
 def test_normals_turn_with_their_copies():
-    """Of a map of one slope, each copy leans the other way round by its turn."""
+    """With a map of constant slope, each tile is rotated back by its own angle."""
     at = points()
     node = Node("ND_hextilednormalmap_vector3").give(
         file="a.png", strength="0.5", rotationrange="90,90", rotation="0"
     )
     got = node.run(at, kind="normal")
-    # White is the slope (1, 1); turned by -90 degrees (1, -1).
+    # White is the slope (1, 1), which a rotation by -90 degrees turns into (1, -1).
     assert got == pytest.approx(np.tile((0.5, -0.5, 1.0), (len(at), 1)), abs=1e-5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints, pictures, profiles and documents that lie: one line each, and soon."""
+"""Malicious checkpoints, images, profiles and documents: one line each, within a short time."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DEEP = 20_000
 
 
 def invoke(*words: object) -> tuple[int, str]:
-    """Exit code and stderr of a command, which took not long."""
+    """Runs a command within a time limit. Returns its exit code and stderr."""
     start = time.process_time()
     result = CliRunner().invoke(main, [*map(str, words), "--isolate", "off"])
     assert time.process_time() - start < SOON_S
@@ -73,7 +73,7 @@ def npy(array: np.ndarray) -> bytes:
 
 
 def lying_npy(shape: str, values: bytes = b"") -> bytes:
-    """An array whose header says more than there is."""
+    """Returns an array whose header claims more data than there is."""
     text = f"{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}".encode()
     text += b" " * (-(len(text) + 11) % 64) + b"\n"
     return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + values
@@ -117,7 +117,7 @@ def test_archives_that_are_no_checkpoints(stage: Path, tmp_path: Path, kind: str
 @pytest.mark.parametrize(
     ("parts", "method", "words"),
     [
-        # It would unpack to 128 MB, and then be a sound archive.
+        # It would decompress to 128 MB, and otherwise be a valid archive.
         ({"header": text("{}"), "a": npy(np.zeros(1 << 24))}, zipfile.ZIP_DEFLATED, "compressed"),
         ({"header": text("{}"), "a": lying_npy("(1000,)")}, zipfile.ZIP_STORED, "holds more than"),
         ({"header": text("{}"), "a": lying_npy("(-1,)", b"1")}, zipfile.ZIP_STORED, "holds more"),
@@ -140,7 +140,8 @@ def test_archives_are_looked_at_before_they_are_read(
 
 
 def test_parts_that_overlap(whole: Path, tmp_path: Path) -> None:
-    """Each entry of the directory names the same bytes: more than the file has."""
+    """All entries of the directory refer to the same bytes, so they add up to more than the file.
+    """
     with zipfile.ZipFile(whole) as source:
         info, data = source.infolist()[0], source.read(source.infolist()[0])
     file = tmp_path / "a.ckpt"
@@ -266,7 +267,7 @@ def test_manifests_and_matrices_that_lie(tmp_path: Path) -> None:
 
 
 def test_a_layer_is_no_path(tmp_path: Path) -> None:
-    """Layers become files with --split-aovs."""
+    """A layer name cannot lead out of the folder when --split-aovs makes it a file name."""
     a, b = tmp_path / "a.exr", tmp_path / "bb.exr"
     layers = {"beauty": (4, 4, 3), "samples": (4, 4, 1), "../../evil": (4, 4, 1)}
     exr(a, layers)
@@ -276,7 +277,7 @@ def test_a_layer_is_no_path(tmp_path: Path) -> None:
 
 
 def test_a_picture_that_no_machine_holds(tmp_path: Path) -> None:
-    """The header says 500,000 x 500,000; the file ends behind it."""
+    """The header claims 500,000 x 500,000 pixels, and the file ends after it."""
     path = tmp_path / "a.exr"
     exr(path)
     data = bytearray(path.read_bytes())
@@ -322,7 +323,7 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
 
 
 def chain(folder: Path, links: int, each: int = 1) -> Path:
-    """Documents of which each includes the next one, ``each`` times."""
+    """Returns documents each of which includes the next one, ``each`` times."""
     for i in range(links):
         lines = f'<xi:include href="d{i + 1}.mtlx"/>\n' * each
         write(
@@ -383,7 +384,7 @@ def test_meshes_whose_counts_lie(tmp_path: Path, style: str, vertices: str, face
     start = time.process_time()
     file = tmp_path / "a.ply"
     file.write_bytes((PLY + FACES).format(style, vertices, faces).encode() + b"0 0 0 1 1 1")
-    # Refused by what the header says, before anything is read by it.
+    # The header alone is refused, before any array is read.
     words = "it cannot hold" if len(vertices + faces) < 20 and vertices != "many" else ""
     with pytest.raises(WavecombError, match=rf"a\.ply: not a usable mesh.*{words}"):
         load_dragon(file)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images: what decoding takes counts, none is left behind, and no name of a package is trusted."""
+"""Images: limits on decoding memory, temporary files, names inside packages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def write(path: Path, kind: str, channels: int = 3, tile: int = 0) -> np.ndarray
 
 
 def package(path: Path, inner: str, data: bytes) -> str:
-    """A .usdz with one more file in it; the path of that."""
+    """Writes a .usdz package with one more file. Returns the asset path of that file."""
     with zipfile.ZipFile(path, "w") as file:
         for name, content in (("s.usda", b"#usda 1.0\n"), (inner, data)):
             info = zipfile.ZipInfo(name)
@@ -47,11 +47,11 @@ def package(path: Path, inner: str, data: bytes) -> str:
 @pytest.mark.parametrize(
     ("name", "kind", "channels", "tile", "bytes_"),
     [
-        ("a.png", "uint8", 3, 0, 6),  # the library's and ours
+        ("a.png", "uint8", 3, 0, 6),  # the buffer of the library and ours
         ("a.exr", "half", 4, 0, 16),
-        ("a.exr", "half", 9, 0, 18 + 8),  # it decodes all nine
+        ("a.exr", "half", 9, 0, 18 + 8),  # the library decodes all nine channels
         ("a.tif", "uint16", 3, 0, 6 + 6),  # a band of floats does not count
-        ("a.tif", "uint16", 3, 16, 6 + 12 + 6),  # read at once, as floats, and made half
+        ("a.tif", "uint16", 3, 16, 6 + 12 + 6),  # read at once as floats, then converted to half
         ("a.exr", "float", 3, 0, 24),
     ],
 )
@@ -89,7 +89,7 @@ def test_the_package_names_no_file_of_ours(
 
 
 def test_jpeg_2000_has_an_ending_of_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """OpenImageIO tells its kinds by the name; others are in memory."""
+    """OpenImageIO detects JPEG 2000 by the file name, so it needs a file; others stay in memory."""
     file = tmp_path / "a.jp2"
     write(file, "uint8")
     endings: list[str] = []

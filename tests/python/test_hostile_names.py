@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names that a stage gives its pictures stay below the folder that the user chose."""
+"""Names of image files in a stage cannot lead out of the folder that the user chose."""
 
 import os
 from pathlib import Path
@@ -36,7 +36,7 @@ def render(stage: Path, *more: object) -> tuple[int, str]:
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
-    """A folder to work in beside one that holds a picture of the user's."""
+    """A working folder beside a folder with an image of the user."""
     work, mine = tmp_path / "work", tmp_path / "mine"
     work.mkdir()
     mine.mkdir()
@@ -78,11 +78,11 @@ def test_what_stays_below_is_written(place):
     stage = stage_named(place, "pictures/../pictures/one.exr")
     assert render(stage) == (0, "")
     assert (place / "work/pictures/one.exr").stat().st_size > 100
-    # An absolute name is good where the user says so.
+    # An absolute name is allowed below --output-dir.
     stage = stage_named(place, str(place / "mine/two.exr"))
     assert render(stage, "--output-dir", place) == (0, "")
     assert (place / "mine/two.exr").stat().st_size > 100
-    # What the user names goes anywhere.
+    # A name given by the user may be anywhere.
     stage = stage_named(place, "../mine/best.exr")
     assert render(stage, "-o", place / "mine/three.exr") == (0, "")
     assert (place / "mine/three.exr").stat().st_size > 100

@@ -45,7 +45,7 @@ def test_exr_float_is_exact(tmp_path: Path, layers: dict[str, np.ndarray]) -> No
 def test_writing_holds_no_copy(tmp_path: Path, ending: str) -> None:
     beauty = np.full((2048, 256, 3), 0.5, np.float32)
     layers = {"beauty": beauty, "normal": beauty, "depth": beauty[:, :, 0]}
-    image.write_exr(tmp_path / "first.exr", layers)  # what modules take when they are loaded
+    image.write_exr(tmp_path / "first.exr", layers)  # load the modules and what they allocate once
     tracemalloc.start()
     try:
         if ending == "exr":
@@ -197,7 +197,7 @@ def test_links_are_followed(tmp_path: Path) -> None:
 
 
 def test_an_abandoned_folder_is_removed(tmp_path: Path) -> None:
-    """A process that was killed holds no lock any more, whatever its id was."""
+    """The temporary folder of a killed process is not locked, so it can be removed."""
     code = (
         "import os, sys; from pathlib import Path; from wavecomb.picture.files import replacing\n"
         "with replacing(sys.argv[1]) as part:\n"
@@ -212,7 +212,7 @@ def test_an_abandoned_folder_is_removed(tmp_path: Path) -> None:
 
 
 def test_a_folder_in_use_stays(tmp_path: Path) -> None:
-    """Also where its process id is that of nobody here: the other may be in another container."""
+    """A locked folder stays even if no process has its id, as from another container."""
     with replacing(tmp_path / "a.txt") as part:
         part.write_text("first")
         with replacing(tmp_path / "b.txt") as other:

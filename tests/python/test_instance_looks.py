@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials in instances that read primvars of the instances, and of the meshes inside."""
+"""Materials in instances that read primvars of the instances and of the meshes in them."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ BIND = '(prepend apiSchemas = ["MaterialBindingAPI"])'
 
 
 def reading(name, path=None):
-    """A material whose roughness is the primvar ``wear``."""
+    """Returns a material whose roughness is the primvar ``wear``."""
     path = path or f"/{name}"
     return f"""def Material "{name}" {{
         token outputs:surface.connect = <{path}/S.outputs:surface>
@@ -41,7 +41,7 @@ def wear(value, kind="constant"):
 
 
 def roughness(scene):
-    """Roughness of each mesh as seen, by x of its first point."""
+    """Returns the roughness of each visible mesh, by x of its first point."""
     out = {}
     for mesh, matrix, material in scene.world_meshes():
         x = float((np.append(mesh["positions"][0], 1) @ matrix)[0])
@@ -58,7 +58,7 @@ def test_native_instances_bring_constant_primvars(tmp_path):
     text += f'def Xform "Up" {{ {wear("[0.75]")}\n {instance("I", 50)} }}'
     scene, _ = load(tmp_path, text)
     assert roughness(scene) == {0: 0.25, 10: 0.5, 20: 0.25, 30: 0.5, 40: 0.875, 50: 0.75}
-    # One group for each look, however many instances have it.
+    # Instances with equal values share a group.
     assert len(scene.meshes) == 4
 
 

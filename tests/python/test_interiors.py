@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Media inside of meshes: closed forms, furnaces, priorities, shadows, schedules."""
+"""Media inside meshes: closed forms, furnaces, priorities, shadows, schedules."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WIDE = 4.0
 
 
 def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> int:
-    """Glass or a liquid, or with index 1 fog that a mesh bounds."""
+    """Returns a glass or liquid, or with index 1 a fog bounded by the mesh."""
     return int(
         builder.add_material(
             "openpbr",
@@ -32,7 +32,7 @@ def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> i
 
 
 def absorbing(sigma: Any) -> dict[str, Any]:
-    """Layers of a medium that absorbs by so much."""
+    """Returns the layers of a medium with these absorption coefficients."""
     return {"transmission_color": tuple(np.exp(-np.array(sigma))), "transmission_depth": 1.0}
 
 
@@ -41,7 +41,7 @@ def slab(builder: Any, low: float, high: float, material: int) -> None:
 
 
 def seen_from_above(builder: Any, spp: int = 4, size: int = 8, depth: int = 8, **more: Any) -> Any:
-    """Pixels of an orthographic camera that looks down from 5."""
+    """Returns the pixels of an orthographic camera that looks down from 5."""
     camera = np.eye(4)
     camera[3, 2] = more.pop("height", 5.0)
     builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
@@ -61,7 +61,7 @@ LIGHT = np.array([1.0, 2.0, 3.0])
 
 
 def test_a_clear_slab_absorbs_as_it_should() -> None:
-    """exp(-sigma t) of the floor below, without noise."""
+    """The transmittance is exp(-sigma t), without noise."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, -0.5, filled(builder, 1.0, **absorbing(SIGMA)))
     shining_floor(builder)
@@ -69,7 +69,7 @@ def test_a_clear_slab_absorbs_as_it_should() -> None:
 
 
 def test_a_camera_in_fog_knows_where_it_is() -> None:
-    """Of a slab from -2 to 20 it sees what lies below 5, and of one within it all."""
+    """A camera at 5 is inside of a slab from -2 to 20, and sees only what lies below it."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, 20.0, filled(builder, 1.0, **absorbing(SIGMA)))
     slab(builder, -1.0, 1.0, filled(builder, 1.0, **absorbing(2 * SIGMA)))
@@ -83,7 +83,8 @@ def test_a_camera_in_fog_knows_where_it_is() -> None:
     [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
 )
 def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
-    """A slab above reaches a quarter into one below; of equals the last entered is there."""
+    """Two slabs overlap by a quarter. The higher priority wins, or for equal ones the last entered.
+    """
     builder = wavecomb.SceneBuilder()
     other = SIGMA[::-1]
     for (low, high), sigma, priority in zip(
@@ -97,8 +98,9 @@ def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths
 
 
 def test_indices_are_those_of_both_sides() -> None:
-    """1 / (1 + sum R / (1 - R)) over the interfaces of air, glass, a liquid that reaches into it,
-    and air, which is all that comes through without absorption (Stokes 1862)."""
+    """Without absorption, stacked interfaces of air, glass, an overlapping liquid and air transmit
+    1 / (1 + sum R / (1 - R)) (Stokes 1862).
+    """
     builder = wavecomb.SceneBuilder()
     slab(builder, -1.0, 0.0, filled(builder, 2.0, nested_priority=1.0))
     slab(builder, -2.0, -0.75, filled(builder, 1.25))
@@ -112,7 +114,7 @@ def test_indices_are_those_of_both_sides() -> None:
 
 
 def test_shadow_rays_bring_what_passes() -> None:
-    """A lamp straight above, a clear slab, and a floor that is lit through it."""
+    """Shadow rays pass straight through a clear slab between a light and the floor."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -241,7 +243,7 @@ def test_shadow_rays_meet_bounds_close_behind_a_cut_out() -> None:
     ("ior", "roughness", "anisotropy"), [(1.0, 0.0, 0.6), (1.5, 0.0, 0.0), (1.4, 0.0, -0.5)]
 )
 def test_white_media_lose_nothing(ior: float, roughness: float, anisotropy: float) -> None:
-    """A furnace of albedo 1, whose mean free paths differ by channel."""
+    """A furnace test of albedo 1, with mean free paths that differ by channel."""
     builder = wavecomb.SceneBuilder()
     layers = {
         "transmission_depth": 0.5,
@@ -261,7 +263,7 @@ def test_white_media_lose_nothing(ior: float, roughness: float, anisotropy: floa
 
 
 def box_of_fog(as_mesh: bool, seed: int, **more: Any) -> Any:
-    """A box of fog over a floor, with a lamp in it, as a mesh or as a volume."""
+    """Returns a box of fog with a light in it over a floor, as a mesh or as a volume."""
     builder = wavecomb.SceneBuilder()
     scattering, absorption = np.array([0.8, 0.5, 0.3]), np.array([0.1, 0.3, 0.2])
     low, high = (-1.5, -1.0, -1.5), (1.5, 1.0, 1.5)
@@ -291,7 +293,7 @@ def box_of_fog(as_mesh: bool, seed: int, **more: Any) -> Any:
 
 @pytest.mark.parametrize("equiangular", ["off", "on"])
 def test_fog_in_a_mesh_is_fog(equiangular: str) -> None:
-    """The same light as in a volume of the same coefficients, also where lamps draw distances."""
+    """Equals a volume with the same coefficients, with and without equiangular sampling."""
     mesh = np.array([box_of_fog(True, seed, equiangular=equiangular) for seed in range(8)])
     volume = np.array([box_of_fog(False, seed) for seed in range(8, 16)])
     error = np.sqrt(mesh.var(axis=0, ddof=1) / 8 + volume.var(axis=0, ddof=1) / 8)
@@ -300,7 +302,7 @@ def test_fog_in_a_mesh_is_fog(equiangular: str) -> None:
 
 
 def thin_fog(as_mesh: bool, seed: int, x: float = 3.0, **more: Any) -> Any:
-    """A lamp in thin fog, which fills a mesh or is a volume, seen from outside."""
+    """Renders a light in thin fog from outside. The fog is a mesh or a volume."""
     builder = wavecomb.SceneBuilder()
     sigma = np.full(3, 0.05)
     low, high = (-2.0, -2.0, -2.0), (2.0, 2.0, 2.0)
@@ -316,7 +318,7 @@ def thin_fog(as_mesh: bool, seed: int, x: float = 3.0, **more: Any) -> Any:
 
 
 def test_fog_in_a_mesh_has_no_more_noise() -> None:
-    """The first distance is spread over a pixel's samples, though it is not drawn at the camera."""
+    """Noise equals that of a volume: the first free-flight samples are well distributed."""
     mesh, volume = (
         np.array([thin_fog(as_mesh, seed, depth=4) for seed in range(8)])
         for as_mesh in (True, False)
@@ -327,10 +329,10 @@ def test_fog_in_a_mesh_has_no_more_noise() -> None:
 
 
 def scattered_once(x: float) -> float:
-    """Light of a lamp of radiance 1 and radius 0.02 in ``thin_fog``, in the mean of the picture.
+    """Returns the mean image of single scattering in ``thin_fog``, for a light of radiance 1.
 
-    The integral over points of fog, by distances and directions from the lamp, in which the square
-    of the distance cancels.
+    Integrates over fog points by their distance and direction from the light (radius 0.02), so that
+    the squared distance cancels.
     """
     sigma, radius, most, rng = 0.05, 0.02, 3.0, np.random.default_rng(1)
     d, c, turn = rng.random((3, 2_000_000)) * [[most], [2.0], [2.0 * np.pi]]
@@ -342,11 +344,11 @@ def scattered_once(x: float) -> float:
 
 
 def test_lamps_draw_distances_in_meshes() -> None:
-    """A lamp in thin fog in sight, whose light is scattered once: a closed form."""
+    """Single scattering from a visible light in thin fog, against a closed form."""
     pictures = [thin_fog(True, seed, 0.3, depth=1, equiangular="on") for seed in range(100)]
     means = np.array(pictures).mean(axis=1) / (np.array([20, 18, 15]) * scattered_once(0.3))
     error = means.std(axis=0, ddof=1) / 10.0
-    assert np.all(error < 0.01)  # 0.015 without the lamp
+    assert np.all(error < 0.01)  # 0.015 without equiangular sampling
     assert np.all(np.abs(means.mean(axis=0) - 1.0) < 3.5 * error)
 
 
@@ -408,7 +410,7 @@ def test_one_picture_for_all_schedules(equiangular: str, hidden: bool) -> None:
 
 
 def test_transport_light_says_that_it_has_none() -> None:
-    """One line that says what to do."""
+    """Light paths are refused in one line that names the reason."""
     with pytest.raises(ValueError, match="media inside of meshes"):
         wavecomb.render(scene(), size=(8, 8), spp=1, transport="light")
 
@@ -454,7 +456,7 @@ def Camera "Camera"
 
 
 def test_a_volume_terminal_fills_a_mesh(tmp_path: Path) -> None:
-    """Coefficients per metre, of which a unit of this stage is half a one."""
+    """Coefficients are per metre, and a unit of this stage is half a metre."""
     file = tmp_path / "fog.usda"
     file.write_text(FOG)
     stage = wavecomb.load(file, camera="/Camera")
@@ -486,7 +488,7 @@ def Material "M"
 
 
 def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
-    """Scatter, its anisotropy and the priority of standard_surface."""
+    """Scattering, its anisotropy and the priority of standard_surface."""
     from usd_recorder import load, said
 
     scene, loaded = load(tmp_path, LIQUID)
@@ -498,7 +500,8 @@ def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
 
 
 def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
-    """Light that was scattered in it meets none; without a volume nothing is said of that."""
+    """A warning that light scattered in cloudy glass does not meet volumes, only if there are any.
+    """
     from usd_recorder import load, said
 
     volume = 'def Volume "V" { float3[] extent = [(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)] }\n'

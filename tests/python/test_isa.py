@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which native library is chosen, and whether the choice shows in a picture."""
+"""Choice of the native library by instruction set, and equal images from all of them."""
 
 from __future__ import annotations
 
@@ -158,13 +158,13 @@ def test_pictures_of_every_library(scene: str, tmp_path: Path) -> None:
     if {V3, V4} <= pictures.keys():
         for name, layer in pictures[V3].items():
             assert layer.tobytes() == pictures[V4][name].tobytes(), name
-    # x86-64-v2 has no FMA, so that fma() rounds twice: last bits differ, and with them a few paths.
+    # x86-64-v2 has no FMA, so fma() rounds twice. Last bits differ, and with them a few paths.
     for name, most in (("beauty", 0.06), ("albedo", 0.002), ("normal", 0.004), ("depth", 0.002)):
         assert far_apart(pictures[V2][name], pictures[V3][name]) < most, name
 
 
 def far_apart(a: np.ndarray, b: np.ndarray) -> float:
-    """The share of values that differ by more than a thousandth."""
+    """Returns the fraction of values that differ by more than a thousandth."""
     return 1.0 - float(np.isclose(a, b, rtol=1e-3, atol=1e-6).mean())
 
 
@@ -198,7 +198,7 @@ def test_no_library_holds_instructions_of_another() -> None:
 
 
 def found(pattern: str, library: Path) -> bool:
-    """Whether a line of its code matches."""
+    """Returns whether a line of the library's disassembly matches."""
     code = subprocess.run(
         ["objdump", "-d", "--no-show-raw-insn", library], capture_output=True, text=True, check=True
     ).stdout

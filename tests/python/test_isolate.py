@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Libraries may crash or never end: the caller gets a line, and lives."""
+"""Libraries may crash or hang in a child process: the caller gets one line."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def finished(code: str) -> tuple[int, str, str]:
 
 
 def doubling(path: Path) -> Path:
-    """2^40 prims in forty lines."""
+    """Writes forty lines that compose to 2^40 prims."""
     text = "#usda 1.0\n"
     for i in range(40):
         inside = "".join(f'def "C{j}" (references = </P{i + 1}>) {{}}\n' for j in range(2))
@@ -80,7 +80,7 @@ def test_what_libraries_print_is_passed_on_but_for_what_a_warning_says() -> None
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("group", [False, True])
 def test_signals_are_passed_on_once(number: int, group: bool) -> None:
-    """To the process, as kill does, and to its group, as a terminal does."""
+    """Signals to the process (as by kill) and to its group (as by a terminal) arrive once."""
     code = (
         "import signal, sys, time\n"
         "seen = []\n"
@@ -121,7 +121,7 @@ def test_no_child_outlives_its_parent() -> None:
     end = time.monotonic() + 10
     while Path(f"/proc/{child}").exists() and time.monotonic() < end:
         time.sleep(0.02)
-    # A machine whose first process reaps nobody keeps the entry, but nothing runs.
+    # The entry remains if init does not reap the process, but the process has ended.
     stat = Path(f"/proc/{child}/stat")
     assert not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
 

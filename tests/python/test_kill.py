@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kill -9 at random moments: what is there is whole, what follows is as if nothing had happened."""
+"""kill -9 at random moments: files are complete or absent, and later runs are not affected."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from wavecomb.run.checkpoint import load_checkpoint
 pytestmark = needs("wavecomb._core")
 
 KILLS = 25
-"""Of each kind of render, which make a hundred."""
+"""Number of kills of each kind of render; 100 in total."""
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Nine squares with 7 MB of noise on them, before a camera that moves."""
+    """Nine squares with 7 MB of noise textures before a moving camera."""
     folder = tmp_path_factory.mktemp("pictures")
     noise = np.random.default_rng(3)
     text = "#usda 1.0\n"
@@ -56,10 +56,10 @@ class Kind:
     """A way to render.
 
     Attributes:
-        stage: The fixture that writes it.
-        options: Of the command.
-        frames: Of a sequence; without, a checkpoint goes on.
-        sandbox: Whether the child runs in the sandbox.
+        stage: Name of the fixture that writes the stage.
+        options: Options of the command.
+        frames: Frames of a sequence. Without any, a checkpoint is resumed.
+        sandbox: Value of WAVECOMB_SANDBOX.
     """
 
     stage: str
@@ -68,7 +68,7 @@ class Kind:
     sandbox: str = "off"
 
     def outputs(self, name: str) -> list[str]:
-        """Files that it writes under a name."""
+        """Returns the names of the files that the render writes."""
         return [f"{name}.{frame}.exr" for frame in self.frames] or [f"{name}.exr"]
 
 
@@ -82,7 +82,7 @@ KINDS = {
 
 
 def processes_below(folder: Path) -> list[str]:
-    """Command lines of processes that know the folder."""
+    """Returns command lines of processes whose arguments or environment contain the folder."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:
@@ -95,7 +95,7 @@ def processes_below(folder: Path) -> list[str]:
 
 
 class Killer:
-    """Starts one render again and again and kills it, until it was killed often enough."""
+    """Starts one render repeatedly and kills it at random moments."""
 
     def __init__(self, kind: Kind, stage: Path, folder: Path, seed: int) -> None:
         self.kind, self.stage = kind, stage
@@ -111,7 +111,7 @@ class Killer:
         self.whole_s = time.monotonic() - start
 
     def start(self, name: str) -> subprocess.Popen[str]:
-        """The command, which goes on with what is there."""
+        """Starts the command, which resumes from files that are present."""
         out = self.folder / (f"{name}.#.exr" if self.kind.frames else f"{name}.exr")
         words = [str(self.stage), "-o", str(out), "--size", "48", "48", "--threads", "1"]
         words += [*self.kind.options]
@@ -133,18 +133,18 @@ class Killer:
         )
 
     def kill(self, times: int) -> int:
-        """Kills it so often; how often it had come to an end of its own accord."""
+        """Kills the render a number of times. Returns how often it ended before it was killed."""
         killed = ended = 0
         while killed < times:
             process = self.start("a")
-            # From its first steps to a little beyond its end.
+            # From the first steps to shortly after the end of the render.
             time.sleep(self.random.uniform(0.02, 1.1) * self.whole_s)
             process.kill()
             _, errors = process.communicate()
             assert process.returncode in (0, -signal.SIGKILL), errors
             killed += process.returncode != 0
             self.look()
-            if process.returncode == 0:  # it was done before it was killed: begin again
+            if process.returncode == 0:  # it ended before it was killed; start again
                 ended += 1
                 assert all((self.folder / name).exists() for name in self.kind.outputs("a"))
                 for name in self.kind.outputs("a"):
@@ -153,7 +153,7 @@ class Killer:
         return ended
 
     def look(self) -> None:
-        """Whatever is there is whole, and nobody is left."""
+        """Asserts that all files are complete and no process is left."""
         deadline = time.monotonic() + 20
         while left := processes_below(self.temporary):
             assert time.monotonic() < deadline, left
@@ -166,7 +166,7 @@ class Killer:
                 same_pictures(self.folder / whole, self.folder / name)
 
     def finish(self) -> None:
-        """Lets it end; then all is as if it had never been killed."""
+        """Lets the render end, and asserts that the result equals an undisturbed one."""
         process = self.start("a")
         _, errors = process.communicate()
         assert process.returncode == 0, errors
@@ -188,7 +188,7 @@ Start = Callable[[str, int], Killer]
 
 @pytest.fixture
 def start(request: pytest.FixtureRequest, tmp_path: Path) -> Start:
-    """Renders a kind once, undisturbed, and is ready to kill."""
+    """A function that renders a kind once, undisturbed, and returns its killer."""
 
     def make(name: str, seed: int) -> Killer:
         kind = KINDS[name]

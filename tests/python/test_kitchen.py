@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kitchen: things stand on what they stand on, lamps hang free, most of it is glossy."""
+"""The kitchen: objects rest on their supports, lamps hang free, most materials are glossy."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a render has learned, given to another: parts, sequences, farms, files that are no good."""
+"""Learned data given to other renders: crops, sequences, farms, invalid files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytest.importorskip("wavecomb._core")
 
 SIZE = 64
 SPP = 32
-"""The fewest samples of which an eighth teaches a field."""
+"""The fewest samples of which an eighth suffices to train a field."""
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_it_guides_as_what_is_learned_anew(
 
 
 def test_parts_and_short_renders_are_guided_alike(cornell: Any, taught: wavecomb.Picture) -> None:
-    """A part learns nothing; few samples, which teach no field, are guided as well."""
+    """A render that is given a field does not train, even with too few samples for training."""
     few = render(cornell, spp=2, learn_from=taught)
     assert few.stats["guiding"]["guided_share"] > 0
     assert render(cornell, spp=2).stats["guiding"] is None

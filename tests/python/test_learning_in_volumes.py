@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is learned (guiding, choice of lights, roulette) where light scatters in volumes: one
-picture, and no bias."""
+"""Guiding, light calibration and learned roulette with scattering volumes: equal images for all
+schedules, and no bias."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wavecomb import _core
 pytestmark = needs("wavecomb._core")
 
 SIZE, SPP, SEEDS = 48, 60, 5
-"""Enough samples that an eighth of them teaches."""
+"""Enough samples that an eighth of them trains a field."""
 
 WAYS: list[dict[str, Any]] = [
     {"guiding": "on"},
@@ -28,7 +28,7 @@ WAYS: list[dict[str, Any]] = [
 
 
 def lamps(builder: Any) -> None:
-    """Three in a row above, of which one is strong."""
+    """Adds three lights in a row above the scene, one of them bright."""
     for number, strength in enumerate((20.0, 2.0, 0.5)):
         place = np.eye(4)
         place[3, :3] = (-2.0 + 2.0 * number, 0.5, 3.0)
@@ -53,7 +53,7 @@ def smoke(builder: Any) -> None:
 
 @pytest.fixture(scope="module")
 def scene() -> Any:
-    """Fog, and smoke in it, over a floor, under lamps."""
+    """Returns fog with smoke in it, over a floor, under lights."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -1.0, 0.0, builder.add_material("diffuse", base_color=(0.6, 0.5, 0.4)))
     lamps(builder)
@@ -71,7 +71,7 @@ def render(scene: Any, **settings: Any) -> wavecomb.Picture:
 
 
 def quarters(scene: Any, seed: int, **options: Any) -> Any:
-    """Means of the quarters of a picture."""
+    """Renders an image and returns the means of its quarters."""
     half = SIZE // 2
     seen = np.asarray(render(scene, seed=seed, **options).beauty, np.float64)
     return seen.reshape(2, half, 2, half, -1)[..., :3].mean(axis=(1, 3)).ravel()
@@ -79,7 +79,7 @@ def quarters(scene: Any, seed: int, **options: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def plain(scene: Any) -> Any:
-    """Of several seeds, where nothing is learned."""
+    """Quarters of images of several seeds, without learning."""
     off: dict[str, Any] = {"guiding": "off", "roulette": "throughput", "light_selection": "power"}
     return np.array([quarters(scene, seed, **off) for seed in range(SEEDS)])
 

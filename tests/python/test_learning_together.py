@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Samples that are allotted to pixels whose bounces are guided: neither gets in the other's way.
+"""Allotted samples combined with path guiding.
 
-That such a render goes on where it was stopped is in test_checkpoint.py, and that it is unbiased in
+Resuming of such renders is tested in test_checkpoint.py, and that they are unbiased in
 tests/statistics/test_learning.py.
 """
 
@@ -40,13 +40,13 @@ def both(cornell: Any) -> wavecomb.Picture:
 
 
 def test_the_field_is_that_of_an_even_render(cornell: Any, both: wavecomb.Picture) -> None:
-    """Training goes by the budget, which allotting leaves as it is; its paths are no samples."""
+    """The number of training paths follows spp, which allotment does not change."""
     even = render(cornell, **{**BOTH, "allocate": "even"})
     for fact in FACTS:
         assert both.stats["guiding"][fact] == even.stats["guiding"][fact], fact
     assert both.samples.sum() == even.samples.sum() == SPP * SIZE**2
     assert both.samples.min() >= both.stats["allotment"]["pilot"]
-    # The counts are those that guided pixels ask for, which are not those of others.
+    # The allotment follows the noise of guided pixels, which differs from that of unguided ones.
     plain = render(cornell, allocate="efficiency")
     assert not np.array_equal(both.samples, plain.samples)
 

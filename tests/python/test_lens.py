@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lenses of stages: distortion, overscan, apertures, rolling shutters, motion in the picture."""
+"""Lenses: distortion, overscan, apertures, rolling shutters, motion vectors."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _render(stage: Path, **options: Any) -> wavecomb.Picture:
 
 
 def _centre(alpha: np.ndarray[Any, Any]) -> tuple[float, float]:
-    """Of what is covered in the upper left quarter, pixels."""
+    """Returns the centroid of alpha in the upper left part, in pixels."""
     part = alpha[: alpha.shape[0] * 2 // 5, : alpha.shape[1] * 2 // 5]
     y, x = np.mgrid[: part.shape[0], : part.shape[1]] + 0.5
     return float((x * part).sum() / part.sum()), float((y * part).sum() / part.sum())
@@ -66,7 +66,7 @@ def test_a_barrel_draws_corners_inwards(tmp_path: Path) -> None:
     plain = _render(_stage(tmp_path), spp=64).aovs["alpha"]
     bent = _render(_stage(tmp_path, more="float wavecomb:lens:k1 = -0.3"), spp=64).aovs["alpha"]
     (x, y), (bx, by) = _centre(plain), _centre(bent)
-    # Half the window's width is 20.955 / 2 / 20 on the plane at distance 1.
+    # Half of the window's width is 20.955 / 2 / 20 in the plane at distance 1.
     step = 2 * 20.955 / 2 / 20 / SIZE[0]
     px, py = (x - SIZE[0] / 2) * step, (y - SIZE[1] / 2) * step
     scale = 1 - 0.3 * (px * px + py * py)
@@ -103,7 +103,7 @@ def test_every_schedule_gives_the_same_bits(tmp_path: Path) -> None:
 
 
 def _st_map(path: Path, scale: float) -> Path:
-    """Shows the middle of the picture, magnified."""
+    """Writes an ST map that magnifies the centre of the image."""
     y, x = (np.mgrid[:60, :80] + 0.5) / np.array([60, 80])[:, None, None]
     s, t = 0.5 + (x - 0.5) * scale, 0.5 + (0.5 - y) * scale
     write_exr(path, {"beauty": np.stack([s, t, 0 * s], axis=2).astype(np.float32)})
@@ -171,7 +171,7 @@ def test_motion_is_in_pixels_to_the_right_and_up(tmp_path: Path) -> None:
     picture = _render(_stage(tmp_path, MOVING, says), spp=16, aovs=["motion", "alpha"], frame=1)
     motion = picture.aovs["motion"]
     covered = picture.aovs["alpha"] == 1
-    # A unit at distance 8 on a window of 20.955 / 200 units of its own at focal length 20 / 10.
+    # Pixels of a unit of length at distance 8, for this aperture and focal length.
     pixels = SIZE[0] / (20.955 / 20) / 8
     assert covered.sum() > 20
     np.testing.assert_allclose(motion[covered], np.broadcast_to((pixels, pixels / 4),
@@ -199,13 +199,13 @@ def test_a_rolling_shutter_shears(tmp_path: Path) -> None:
     x = np.arange(SIZE[0]) + 0.5
     rows = np.flatnonzero(rolled.sum(axis=1) > 5)
     centres = (rolled[rows] * x).sum(axis=1) / rolled[rows].sum(axis=1)
-    assert len(rows) > 8 and centres[-2] - centres[1] > 0.8  # it has moved on by the lower rows
-    # Each row is an instant: edges are sharp.
+    assert len(rows) > 8 and centres[-2] - centres[1] > 0.8  # it has moved by the lower rows
+    # Each row has a single instant, so edges are sharp.
     assert (rolled[rows[2:-2]] % 1 > 0).sum(axis=1).max() <= 6
 
 
 def test_an_aperture_has_its_shape(tmp_path: Path) -> None:
-    """A point out of focus: a triangle covers less than the disk, a squeeze halves its width."""
+    """Bokeh of a point: a triangle covers less than a disk, and a squeeze halves the width."""
     point = 'def Sphere "Dot" { double radius = 0.1 }'
     says = "float fStop = 1\n float focusDistance = 3"
     stage = _stage(tmp_path, point, says)

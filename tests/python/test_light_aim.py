@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from lights that are aimed: the same picture for all schedules, and less noise of it."""
+"""Aimed light paths: equal images for all schedules, and less noise."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIZE, SPP = 32, 2
 
 @pytest.fixture(scope="module")
 def landscape(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Wide hills in the sun, with a small ring of glass."""
+    """Wide sunlit hills with a small ring of glass."""
     path = tmp_path_factory.mktemp("aim") / "landscape.usdc"
     write_scene("landscape", path, teapot_level=6, texture_size=64)
     return path
@@ -71,7 +71,7 @@ def test_nobody_aims_where_nobody_asks(landscape: Path) -> None:
 
 
 def test_aimed_paths_find_a_small_ring(landscape: Path) -> None:
-    """And the light that it throws on the ground, which others hardly meet at all."""
+    """Aimed paths also find the caustic on the ground, which other paths hardly ever hit."""
     stage = wavecomb.load(landscape)
     truth = render(stage, seed=99, spp=96, aovs=("by_light_paths",))
     caustic = truth.aovs["by_light_paths"].sum(axis=2) > 0.5 * truth.beauty.sum(axis=2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Filters before lights, and shadows that are not black or end: what is read, and what it gives."""
+"""Light filters, and shadows with a colour or a maximum distance: reading and rendering."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_a_barn_before_a_point_is_a_window(tmp_path):
     free = picture(tmp_path, FLOOR + lamp("SphereLight", POINT))
     lit = picture(tmp_path, FLOOR + light + window)
     shares = lit[:, :, 0] / free[:, :, 0]
-    # A pixel is 0.25 wide; the window, a quarter of the way, lights what is 2 x 4.
+    # A pixel is 0.25 wide. The window at a quarter of the distance lights an area of 2 x 4.
     middle = shares[:, 8]
     assert middle == pytest.approx(np.ones(16), abs=1e-4)
     assert shares[8, :4] == pytest.approx(np.zeros(4), abs=1e-6)
@@ -158,7 +158,7 @@ GLOSSY = """def Material "Gloss" {
 
 @pytest.mark.parametrize("transport", ["path", "light"])
 def test_a_barn_before_a_rect_is_four_boards(tmp_path, transport):
-    """Light samples, bounces and paths from the light, against geometry."""
+    """Light samples, bounces and light paths through a barn door, against real geometry."""
     floor = GLOSSY + quad("Floor", 3, 0, "rel material:binding = </Gloss>")
     size = "float inputs:width = 2\nfloat inputs:height = 2"
     window = barn("float inputs:width = 0.8\nfloat inputs:height = 1.6", 3)
@@ -180,7 +180,7 @@ def test_a_barn_before_a_rect_is_four_boards(tmp_path, transport):
 
 def test_a_cookie_throws_its_picture(tmp_path):
     pixels = np.zeros((2, 2, 3), np.uint8)
-    pixels[0, 0] = (255, 0, 0)  # above, to the left
+    pixels[0, 0] = (255, 0, 0)  # top left
     pixels[1, 1] = (0, 0, 255)
     write_image(tmp_path / "slide.png", pixels, "uint8")
     text = barn(
@@ -193,7 +193,7 @@ def test_a_cookie_throws_its_picture(tmp_path):
     red, blue = got[:4, :4].sum(axis=(0, 1)), got[-4:, -4:].sum(axis=(0, 1))
     assert red[0] > 0 and red[1] == 0 and red[2] < 0.05 * red[0]
     assert blue[2] > 0 and blue[1] == 0 and blue[0] < 0.05 * blue[2]
-    assert got[:2, -2:].max() < 0.15 * got.max()  # between texels it is linear
+    assert got[:2, -2:].max() < 0.15 * got.max()  # linear between texels
 
 
 def test_decay_is_by_the_distance(tmp_path):
@@ -224,7 +224,7 @@ def test_doors_of_a_spot_are_by_its_cone(tmp_path):
 
 KARMA = 'def LightFilter "{0}" {{ uniform token lightFilter:shaderId = "{1}"\n{2}\n}}\n'
 CONE = POINT + "\nfloat inputs:shaping:cone:angle = 36.86989764584402"
-"""Its square is 6 wide on the floor, 4 away: all of it."""
+"""The square around this cone is 6 wide on the floor at distance 4, which covers the floor."""
 
 
 def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):
@@ -247,7 +247,7 @@ def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):
     assert edge.sum() < free.sum(), "an edge alone dims, too"
     lit = free[:, :, 0] > 0
     shares = got[:, :, 0] / np.where(lit, free[:, :, 0], 1)
-    # The left half is dark; from the bottom, half of the square brightens, smoothly.
+    # The left half is dark. From the bottom, half of the square gets brighter smoothly.
     assert (shares[:, :8] == 0).all() and lit.sum() > 100
     y = (7.5 - np.arange(16)) * 0.25 + 3
     t = np.clip(y / 6 / 0.5, 0, 1)[:, None] * np.ones((1, 8))
@@ -257,13 +257,13 @@ def test_karmas_doors_stand_on_the_light_or_before_it(tmp_path):
 
 def test_karmas_gobo_lies_over_the_cone(tmp_path):
     pixels = np.zeros((2, 2, 3), np.uint8)
-    pixels[0, 0] = (255, 0, 0)  # above, to the left
+    pixels[0, 0] = (255, 0, 0)  # top left
     write_image(tmp_path / "slide.png", pixels, "uint8")
     body = "asset inputs:texture = @slide.png@\ncolor3f inputs:tint = (0.5, 1, 1)"
     light = lamp("SphereLight", CONE + "\nrel light:filters = </Gobo>")
     got = picture(tmp_path, FLOOR + light + KARMA.format("Gobo", "kma_lfilter_gobo", body))
     free = picture(tmp_path, FLOOR + lamp("SphereLight", CONE))
-    # A texel's middle is at a quarter of the square.
+    # The centre of a texel is at a quarter of the square.
     assert got[1:3, 1:3, 0].mean() / free[1:3, 1:3, 0].mean() == pytest.approx(0.5, rel=0.1)
     assert got[13:, 13:].max() < 0.01 * got.max() and got[:, :, 1:].max() == 0
 
@@ -281,7 +281,7 @@ def test_gels_multiply_all_light(tmp_path, kind):
     both = "\nrel light:filters = [</Gel>, </Mult>]"
     free = picture(tmp_path, FLOOR + lamp(kind, body))
     got = picture(tmp_path, FLOOR + lamp(kind, body + both) + gel + mult)
-    grey = 0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)  # through both, and half as diffuse
+    grey = 0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)  # product of both filters, with half of the diffuse light
     lit = free[:, :, 0] > 0
     assert got[lit] / free[lit] == pytest.approx(np.full((lit.sum(), 3), grey), rel=1e-3)
 
@@ -310,7 +310,7 @@ def test_what_is_not_done_is_listed(tmp_path):
 
 
 def test_filters_are_placed_with_their_lights(tmp_path):
-    """In an instance the window goes where the light goes."""
+    """In an instance, the filter moves with the light."""
     proto = """class "P" {
         def SphereLight "L" { rel light:filters = </P/Barn> }
         def PxrBarnLightFilter "Barn" { double3 xformOp:translate = (0, 0, -2)
@@ -326,5 +326,5 @@ def test_filters_are_placed_with_their_lights(tmp_path):
         """
     scene, _ = load(tmp_path, proto)
     assert [light["filter"] for light in scene.lights] == [0, 1]
-    # Its window is at -1 of its own space.
+    # The window is at z = -1 in the filter's space.
     assert [f[0][3, :3].tolist() for f in scene.filters] == [[3, 0, -1], [5, 0, -1]]

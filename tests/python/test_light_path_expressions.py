@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions: what they hold, that partitions add up, and who asks for them."""
+"""Light path expressions: contents, partitions that add up, and requests for them."""
 
 from __future__ import annotations
 
@@ -151,11 +151,11 @@ def test_they_are_what_other_layers_say(loaded: Any) -> None:
 
 
 def test_diffuse_light_is_what_lights_without_specular_give(loaded: Any, tmp_path: Path) -> None:
-    """The split by lobes of light samples and of bounces, against a light that has but one."""
+    """The diffuse part, in light samples and bounces, equals the light of a diffuse-only light."""
     seen = _render(loaded, {"a": "C<RD><L.'key'>", "b": "C<RD>B"}, spp=256)
     other = wavecomb.load(_stage(tmp_path, 0))
     only = _render(other, {"a": "C.<L.'key'>", "b": "C.B"}, spp=256)
-    ball = np.s_[8:17, 3:11]  # that has both lobes
+    ball = np.s_[8:17, 3:11]  # has diffuse and specular lobes
     for name in "ab":
         want = _layer(only, name)[ball].mean(axis=(0, 1))
         assert _layer(seen, name)[ball].mean(axis=(0, 1)) == pytest.approx(want, rel=0.03), name
@@ -171,7 +171,7 @@ def Camera "Cam" { float focalLength = 20
 
 
 def test_multipliers_go_to_the_lobe_that_they_are_of(tmp_path: Path) -> None:
-    """What bounces meet of a light, too: a sky on plastic, half of which finds it by bounces."""
+    """Multipliers also apply to light found by bounces, as half of the sky on plastic is."""
     asked = {"diffuse": "C<RD>B", "glossy": "C<RG>B", "seen": "CB"}
     found = {}
     for diffuse in (1, 0.25):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of the beauty, light groups and light path expressions where paths start at the lights."""
+"""Direct and indirect layers, light groups and light path expressions with light paths."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LAYERS = ("emission", "direct", "indirect", "light_groups", "techniques")
 
 @pytest.fixture(scope="module")
 def stages(caustics: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Loaded, each with a group ``key``."""
+    """Loaded stages, each with a light group ``key``."""
     from pxr import Sdf, Usd
 
     folder = tmp_path_factory.mktemp("layers")
@@ -69,7 +69,7 @@ def test_layers_add_up_and_leave_the_beauty(stages: Any, name: str, transport: s
     for what, partition in PARTITIONS.items():
         layers = [f"lpe_{one}" for one in partition]
         np.testing.assert_allclose(total(found, layers), found.beauty, **near, err_msg=what)
-    # What is said in two ways is one thing.
+    # Two definitions of the same layer agree.
     for other, expression in (("emission", "f"), ("direct", "g"), ("light_key", "m")):
         np.testing.assert_allclose(
             found.aovs[f"lpe_{expression}"], found.aovs[other], **near, err_msg=other
@@ -96,7 +96,7 @@ def test_layers_are_the_same_for_all_schedules(stages: Any, transport: str) -> N
 
 
 def test_a_layer_is_the_same_alone(stages: Any) -> None:
-    """And in a region; groups that are not asked for take no room."""
+    """A layer does not depend on others or on a crop, and unrequested groups need no memory."""
     first = render(stages["caustics"])
     alone = render(stages["caustics"], aovs=["direct", "light_key", "lpe:k=" + ASKED["k"]])
     assert "light_other" not in alone.aovs
@@ -107,14 +107,14 @@ def test_a_layer_is_the_same_alone(stages: Any) -> None:
     for name in ("indirect", "light_key", "lpe_k"):
         got, want = part.aovs[name][y0:y1, x0:x1], first.aovs[name][y0:y1, x0:x1]
         assert got.tobytes() == want.tobytes(), name
-    # The beauty and three layers, and the samples of a light path.
+    # Splats of the beauty and of three layers, and the sample count of light paths.
     camera = render(stages["caustics"], transport="path", aovs=["direct", "light_key", "lpe:k=C.*"])
     film = [p.stats["memory_bytes"]["film"] for p in (alone, camera)]
     assert film[0] - film[1] == SIZE[0] * SIZE[1] * (4 * 48 + 4)
 
 
 def test_light_paths_bring_what_expressions_say(stages: Any) -> None:
-    """A caustic is scattered diffusely last, and before that by glass or gold alone."""
+    """A caustic has a diffuse last vertex, and only glass or gold before it."""
     path = ["techniques", "lpe:caustic=CD[GS]+L", "lpe:rest=C[^D].*"]
     found = render(stages["caustics"], spp=16, aovs=path, light_aim="on")
     caustic = found.aovs["lpe_caustic"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from lights: one picture for all schedules, parts of it, what they do not go with."""
+"""Light paths: equal images for all schedules, crops, and unsupported features."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_settings_of_paths_change_the_picture_alike(stages: Any) -> None:
 def test_parts_are_those_of_the_whole(stages: Any, projection: Any) -> None:
     stage = wavecomb.load(stages("caustics"), projection=projection)
     whole = render(stage).beauty
-    # A latlong picture's seam and its pole beneath belong to the part.
+    # This crop includes the seam and the lower pole of a latlong image.
     x0, y0, x1, y1 = region = (9, 5, 27, 22) if projection is None else (9, 5, 32, 32)
     part = render(stage, region=region).beauty
     assert np.array_equal(part[y0:y1, x0:x1], whole[y0:y1, x0:x1])
@@ -123,7 +123,8 @@ def test_what_it_does_not_go_with_is_one_line(
 
 
 def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
-    """Units of sums follow the lights: 2^20 times the power is 2^20 times as bright."""
+    """Splat units follow the lights: 2^20 times the power gives exactly 2^20 times the brightness.
+    """
     from pxr import Usd, UsdLux
 
     path = stages("caustics")
@@ -137,7 +138,7 @@ def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
 
 
 def test_lights_that_send_no_paths_are_named(stages: Any, tmp_path: Path) -> None:
-    """And no light is lost: camera paths alone find all of it."""
+    """Lights without light paths are listed, and camera paths find all of their light."""
     from pxr import Usd, UsdLux
 
     stage = Usd.Stage.Open(str(stages("caustics")))

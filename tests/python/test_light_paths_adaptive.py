@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from the lights until a picture is clean enough: exact, and as noisy as they say."""
+"""Adaptive renders with light paths: reproducible, and as noisy as reported."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_one_picture_whatever_the_schedule(
 
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 def test_the_error_is_that_of_both_kinds_of_paths(stage: Any, transport: str) -> None:
-    """Against the mean over seeds: what is told is what there is, but for what is rarely met."""
+    """The reported error agrees with the deviation from the mean over seeds."""
     seeds = 8
     found = [render(stage, transport=transport, spp=32, seed=k, error=True) for k in range(seeds)]
     pictures = np.stack([one.beauty.astype(np.float64) for one in found])
@@ -57,7 +57,7 @@ def test_the_error_is_that_of_both_kinds_of_paths(stage: Any, transport: str) ->
     known = np.abs(pictures - mean).sum(axis=(1, 2, 3)).mean() / mean.sum()
     known *= np.sqrt(seeds / (seeds - 1))
     told = np.mean([one.stats["error"] for one in found])
-    # Halves do not tell what neither of them has met: camera paths alone would be told 0.78 of it.
+    # Light that neither half buffer contains does not count: camera paths alone report 0.78 of it.
     assert 0.7 < told / known < 1.3
     variance = np.mean([one.variance.sum() for one in found])
     assert 0.5 < variance / pictures.var(axis=0, ddof=1).sum() < 2.5

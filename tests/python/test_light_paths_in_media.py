@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from lights where media are: refused in one line, or left out by auto; nothing darkens."""
+"""Light paths with media: refused in one line, or not used by auto; nothing gets darker."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIZE = 12
 
 
 def stage(medium: str) -> Any:
-    """A glass ball's worth of what focuses light, a lamp, and a medium."""
+    """A stage with a glass ball, a light and a medium."""
     builder = wavecomb.SceneBuilder()
     looks = {
         "skin": {"subsurface_weight": 1.0, "subsurface_radius": (1, 1, 1)},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from lights in renders that are stopped and go on, with lenses and in motion."""
+"""Light paths in stopped and resumed renders, with lenses and motion blur."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AOVS = ["direct", "indirect", "light_groups", "by_light_paths", "lpe:a=C.*D[LO]"
 
 @pytest.fixture(scope="module")
 def stages(caustics: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """The plain one; with a lens; and with a ball of glass that moves while the shutter is open."""
+    """A plain stage, one with a lens, and one with a moving ball of glass."""
     from pxr import Gf, Usd, UsdGeom
 
     folder = tmp_path_factory.mktemp("stopped")
@@ -80,7 +80,7 @@ def test_lenses_and_motion_are_one_picture(stages: Any, name: str, transport: st
 
 
 def went_on(scene: Any, settings: dict[str, Any], runs: int = 200) -> tuple[Any, int]:
-    """The render, stopped again and again, each part in another schedule."""
+    """Renders with repeated stops; each run has another schedule."""
     state: dict[str, Any] | None = None
     for run in range(runs):
         watcher = StopAt(random.Random(run).randrange(2))

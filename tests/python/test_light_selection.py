@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights chosen by tree: the same mean as by power, less noise, one picture for all schedules."""
+"""Light selection by tree: same mean as by power, less noise, equal images for all schedules."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Any:
 def builder_scene(
     glass: bool = False, edit: dict[int, dict[str, Any]] | None = None
 ) -> wavecomb.SceneBuilder:
-    """A room of many small lights under a dome, with a pane of rough glass; lights as edited."""
+    """Returns a room of many small lights under a dome, with a rough glass pane and edited lights.
+    """
     rng = np.random.default_rng(4)
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -77,7 +78,7 @@ def test_the_mean_is_that_of_power(glass: bool) -> None:
         )
         for selection in ("power", "tree")
     }
-    # Over blocks of 8 x 8 pixels, which makes means of runs normal.
+    # Means over blocks of 8 x 8 pixels are close to normally distributed.
     blocks = {k: v.reshape(runs, 3, 8, 4, 8, 3).mean(axis=(2, 4, 5)) for k, v in stacks.items()}
     a, b = blocks["power"], blocks["tree"]
     z = (a.mean(0) - b.mean(0)) / np.sqrt((a.var(0, ddof=1) + b.var(0, ddof=1)) / runs)
@@ -92,7 +93,7 @@ def test_the_mean_is_that_of_power(glass: bool) -> None:
 
 @pytest.mark.slow
 def test_the_tree_has_less_noise(street: Any) -> None:
-    # Lights that are seen are as noisy either way.
+    # The noise of directly visible lights does not depend on the selection.
     def lit(selection: str, seed: int, spp: int) -> Any:
         return render(street, selection, seed, spp, max_depth=2, aovs=["direct"]).aovs["direct"]
 
@@ -124,7 +125,7 @@ def test_one_picture_for_all_schedules(glass: bool) -> None:
 
 
 def test_light_groups_follow_the_choice() -> None:
-    """What each group gave adds up to the picture, and is what that group alone would give."""
+    """Light groups add up to the beauty, and each equals a render with its lights alone."""
     scene = builder_scene().build()
     picture = render(scene, "tree", spp=64, aovs=["light_groups"])
     groups = {name: layer for name, layer in picture.aovs.items() if name.startswith("light_")}
@@ -172,7 +173,8 @@ def test_the_street_has_the_lights_that_were_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_tree_that_nobody_chooses_by_is_not_built() -> None:
-    """One strong lamp and many faint ones: by power, unless a render asks for the tree."""
+    """With one bright light and many faint ones, lights are selected by power unless set otherwise.
+    """
 
     def scene() -> wavecomb.Scene:
         rng = np.random.default_rng(6)

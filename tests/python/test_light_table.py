@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from the core's table of lights; a row that is added is found everywhere."""
+"""The core's table of light parameters: every consumer picks up new rows."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ ADDED = (
 )  # fmt: skip
 
 FOLLOW = ("wavecomb.gui.scene.light_inputs",)
-"""Modules that make something of the table."""
+"""Modules that derive data from the table."""
 
 
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table with a few rows more, as if the core had them."""
+    """Adds rows to the table, as if the core had them."""
     add_rows(monkeypatch, light_parameters, ADDED, FOLLOW)
 
 
 def another(row: LightParameter) -> Any:
-    """A value that a row takes and that is not its default."""
+    """Returns a valid value other than the default."""
     if row.refers == "group":
         return "key"
     values = {
@@ -53,7 +53,7 @@ def another(row: LightParameter) -> Any:
 
 
 def build(*lights: dict[str, Any], mesh_light: dict[str, Any] | None = None) -> Any:
-    """A scene with these lights, and what they may refer to."""
+    """Returns a scene with these lights, and with objects that they may refer to."""
     builder = core.SceneBuilder(1)
     builder.add_texture(np.full((4, 8, 3), 0.5, np.float32), srgb=False, name="/sky.exr")
     builder.add_ies([0.0, 90.0], [0.0], np.array([[100, 0]], np.float32))
@@ -171,7 +171,7 @@ def test_inputs_are_those_of_usdlux() -> None:
         for type_name in prims:
             prim = stage.DefinePrim(f"/P{number}", type_name)
             if not prim.HasAPI(UsdLux.LightAPI):
-                continue  # none of UsdLux
+                continue  # not in UsdLux
             seen += 1
             UsdLux.ShapingAPI.Apply(prim)
             UsdLux.ShadowAPI.Apply(prim)

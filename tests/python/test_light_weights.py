@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shares of lights by calibration: less noise, the same mean, one picture for all schedules."""
+"""Light calibration: less noise, same mean, equal images for all schedules."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def studio(studio_path: Path) -> Any:
 
 
 def room() -> Any:
-    """Shiny and matt walls, a lamp that a board hides from most, small lamps, a dome, a glow."""
+    """Returns glossy and diffuse walls, a mostly hidden light, small lights, a dome, an emissive
+    mesh."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
 
@@ -41,7 +42,7 @@ def room() -> Any:
 
     def place(x: float, y: float, z: float) -> Any:
         at = np.eye(4)
-        at[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # shines down
+        at[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # emits downwards
         at[3, :3] = x, y, z
         return at
 
@@ -114,7 +115,7 @@ def test_the_mean_is_that_of_power(selection: str) -> None:
         for weights in ("power", "calibrated")
     }
     assert not np.array_equal(stacks["power"][0], stacks["calibrated"][0])
-    # Over blocks of 8 x 8 pixels, which makes means of runs normal.
+    # Means over blocks of 8 x 8 pixels are close to normally distributed.
     blocks = {k: v.reshape(runs, 3, 8, 4, 8, 3).mean(axis=(2, 4, 5)) for k, v in stacks.items()}
     a, b = blocks["power"], blocks["calibrated"]
     z = (a.mean(0) - b.mean(0)) / np.sqrt((a.var(0, ddof=1) + b.var(0, ddof=1)) / runs)
@@ -150,7 +151,7 @@ def test_light_groups_add_up(studio: Any) -> None:
 
 
 class _StopAtOnce:
-    """Stops a render at the first look that finds new samples, and keeps its state."""
+    """Stops a render when it first reports new samples, and keeps its state."""
 
     def __init__(self) -> None:
         self.state: dict[str, Any] = {}

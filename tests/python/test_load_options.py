@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from the table of options of loading; a row that is added is found everywhere."""
+"""The table of loading options: every consumer picks up new rows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wavecomb.load_options import LoadOptions, Row, given, row_of, rows, split
 
 
 def command_of(got: dict[str, Any]) -> click.Command:
-    """A command with all options of loading, which puts into ``got`` what was given."""
+    """Returns a command with all loading options, which stores their values in ``got``."""
 
     @click.command()
     @stage_options
@@ -30,7 +30,7 @@ def command_of(got: dict[str, Any]) -> click.Command:
 
 
 def run(*arguments: str) -> dict[str, Any]:
-    """What these arguments come to."""
+    """A function that parses arguments and returns the options."""
     got: dict[str, Any] = {}
     result = CliRunner().invoke(command_of(got), ["shot.usd", *arguments])
     assert result.exit_code == 0, result.output

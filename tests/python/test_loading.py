@@ -31,7 +31,7 @@ LINUX = only_where(sys.platform == "linux", "reads /proc")
 
 
 def textured_stage(folder: Path) -> Path:
-    """Eight quads with an image each: one file is missing, one broken, one used in two ways."""
+    """Eight quads with one image each: one is missing, one is broken, one is used twice."""
     rng = np.random.default_rng(7)
     for k in range(6):
         write_png(folder / f"{k}.png", rng.random((16 + k, 20, 3)).astype(np.float32))
@@ -68,12 +68,12 @@ def test_reading_ahead_changes_nothing(tmp_path: Path) -> None:
         )
     (one, a), (many, b) = loads
     assert a.report.lines() == b.report.lines()
-    assert len(one.textures) == len(many.textures) == 9  # with the checker, and 0.png twice
+    assert len(one.textures) == len(many.textures) == 9  # with the placeholder, and 0.png in two colour spaces
     for x, y in zip(one.textures, many.textures, strict=True):
         assert x["srgb"] == y["srgb"] and np.array_equal(x["pixels"], y["pixels"])
     warnings = [line for line in b.report.lines() if "cannot be read" in line]
     assert len(warnings) == 2 and any("no such file" in line for line in warnings)
-    assert not Sdf.Layer.Find(str(path))  # closed, also where reading failed
+    assert not Sdf.Layer.Find(str(path))  # closed, also if reading failed
     assert not [t for t in threading.enumerate() if t.name.startswith("wavecomb-image")]
 
 
@@ -93,8 +93,8 @@ def test_few_images_lie_ready(monkeypatch: pytest.MonkeyPatch) -> None:
     while len(read) < 3 and time.monotonic() < deadline:
         time.sleep(0.001)
     time.sleep(0.02)
-    assert sorted(read) == ["a", "bad", "image0"]  # one more than there are threads
-    assert ahead.read("image19").channels == 3  # out of turn: read at once
+    assert sorted(read) == ["a", "bad", "image0"]  # one more than the number of threads
+    assert ahead.read("image19").channels == 3  # not yet read: read at once
     with pytest.raises(TextureError, match="broken"):
         ahead.read("bad")
     for k in range(19):
@@ -118,7 +118,7 @@ def test_help_imports_little() -> None:
 
 
 def calls_to_read(path: Path, count: int, kind: str) -> int:
-    """Calls of Python's functions that reading a stage of cubes or meshes takes."""
+    """Counts the Python calls made by reading a stage of cubes or meshes."""
     stage = Usd.Stage.CreateNew(str(path))
     material = UsdShade.Material.Define(stage, "/Grey")
     shader = UsdShade.Shader.Define(stage, "/Grey/Surface")
@@ -138,7 +138,7 @@ def calls_to_read(path: Path, count: int, kind: str) -> int:
         prim.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
     stage.Save()
     profile = cProfile.Profile()
-    wavecomb.load(path)  # what is imported or made once is no cost of a prim
+    wavecomb.load(path)  # imports and caches are not costs of a prim
     with profile:
         wavecomb.load(path)
     return sum(entry.callcount for entry in profile.getstats())
@@ -180,7 +180,7 @@ def test_shapes_of_equal_size_share_their_arrays() -> None:
 
 
 def big_mesh(path: Path, side: int, smooth: bool) -> None:
-    """A wavy square of 2 side^2 triangles; ``smooth``: quads whose normals are to be made."""
+    """Writes a wavy square of 2 side^2 triangles. ``smooth``: quads whose normals are computed."""
     u = np.linspace(-1, 1, side + 1, dtype=np.float32)
     x, z = np.meshgrid(u, u)
     points = np.stack([x, 0.1 * np.sin(9 * x) * np.cos(7 * z), z], -1).reshape(-1, 3)
@@ -236,7 +236,7 @@ print(json.dumps({"imports": imports, "load": after, "peak": memory("VmHWM"),
 @pytest.mark.slow
 @pytest.mark.parametrize("smooth", [False, True])
 def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
-    """Peak memory stays within 1.5 x of arrays and BVH; nothing is copied; all threads build."""
+    """Peak memory is at most 1.5 times arrays and BVH, without copies; all threads build."""
     pytest.importorskip("wavecomb._core")
     stage = tmp_path / "big.usdc"
     big_mesh(stage, 900, smooth)
@@ -249,10 +249,10 @@ def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
     assert parts["meshes"] == 12 * vertices * (2 if smooth else 1) + 12 * triangles
     assert parts["accelerator"] > 32 * triangles
     assert got["reported"] == pytest.approx(got["peak"], rel=0.05)
-    # One set of arrays is in memory after loading, not two.
+    # Only one set of arrays is in memory after loading.
     assert got["load"] - got["imports"] < 1.4 * parts["meshes"] + 10e6
     assert got["peak"] - got["imports"] <= 1.5 * sum(parts.values())
-    # The thread that asked gathers the picture: a tenth of so short a render.
+    # The calling thread also assembles the image, a tenth of so short a render.
     assert got["shares"]["1"] > 0.8
     assert got["shares"]["2"] < 0.75
 
@@ -281,7 +281,7 @@ print((memory("VmHWM") - before) / count)
 
 @LINUX
 def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
-    """Some 150 bytes each stay, and what was added is gone before records are made."""
+    """An instance needs about 150 bytes. The builder's copy is freed before records are made."""
     pytest.importorskip("wavecomb._core")
     run = subprocess.run([sys.executable, "-c", MANY], capture_output=True, text=True, check=True)
     assert 100 < float(run.stdout) < 260, run.stdout
@@ -289,7 +289,7 @@ def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
 
 @pytest.mark.slow
 def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
-    """OpenImageIO without an image to read, and Rich without a terminal, before the picture."""
+    """OpenImageIO loads only for an image to read, and Rich only for a terminal."""
     path = tmp_path / "stage.usda"
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.Sphere.Define(stage, "/Ball")
@@ -324,7 +324,7 @@ print(json.dumps([name for name in ("OpenImageIO", "rich") if name in sys.module
 @LINUX
 @pytest.mark.slow
 def test_what_a_frame_does_not_need_is_not_in_memory() -> None:
-    """Other frames of a cache, other payloads than those of a mask: 60 MB each."""
+    """Other frames of a cache, and payloads outside of a mask, are not in memory (60 MB each)."""
     pytest.importorskip("wavecomb._core")
     command = [sys.executable, "benchmarks/large_stages.py", "--gb", "0.06", "--points", "20000"]
     root = Path(__file__).resolve().parents[2]
