@@ -176,7 +176,7 @@ def nurbs_strands(
     if not good.all():
         whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
         _say_left_out(prim, report, good, "; ".join(whys[:3]))
-    # What a curve that is left out would have, so that values for all curves still fit.
+    # Curves that are left out count here, so that arrays of values for all curves still fit.
     segments = np.array(
         [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
          for i, one in enumerate(found)], np.intp,

@@ -88,8 +88,8 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
   using U = UInt<F>;
   const SceneView& scene = v.scene;
   Color<F> emission = at.emission;
-  // What the camera sees by itself or in a mirror is found by no other technique: there textures
-  // stay filtered, as an image needs it.
+  // No other technique finds emission that the camera sees directly or in a mirror. It keeps the
+  // texture filter, since images need antialiasing.
   if constexpr (Bsdf::kTextured)
     if (at.textured && v.depth > 0) [[unlikely]] {
       const Mask<F> varies =
