@@ -115,7 +115,8 @@ TEST(Subdivision, RefusesWhatCannotBeSubdivided) {
   desc = cube(1);
   const std::vector<float> values(30);
   desc.primvars = {{PrimvarKind::kVertex, values, 3, 0}};
-  EXPECT_EQ(complaint(desc), "the wrong number of components of a primvar, 30 where the mesh needs 24");
+  EXPECT_EQ(complaint(desc),
+            "the wrong number of components of a primvar, 30 where the mesh needs 24");
   const std::vector<int32_t> edges = {0, 1, 1, 2};
   const std::vector<float> sharpness = {2};
   desc = cube(1);

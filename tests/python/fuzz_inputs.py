@@ -414,8 +414,7 @@ BY_COMMAND = ("product names",)
 
 
 def words_for(case: Path) -> list[str]:
-    """Returns arguments of ``wavecomb`` that make it read a case. Its output file follows ``-o``.
-    """
+    """Returns arguments of ``wavecomb`` that make it read a case. Its output follows ``-o``."""
     out, stage = str(case.with_name("out.exr")), str(case.with_name("stage.usda"))
     small = ["--size", "8", "8", "--spp", "1", "--quiet"]
     if case.name.startswith("mesh."):

@@ -52,8 +52,8 @@ class Verdict:
     Attributes:
         kind: One of ``KINDS``.
         number: Number of the case within its kind.
-        outcome: rendered, warned, refused; contained (a library crashed, and the user got one line);
-            wrong or hang, which are faults.
+        outcome: rendered, warned, refused; contained (a library crashed, and the user got one
+            line); wrong or hang, which are faults.
         said: The message, or a description of the fault.
         seconds: Time of the worker or of the command.
         death: How the worker ended, if it did.
@@ -264,8 +264,7 @@ def run(
     keep: Path | None = None,
     until: float = math.inf,
 ) -> list[Verdict]:
-    """Checks cases with several workers until a deadline. Copies the files of faults to ``keep``.
-    """
+    """Checks cases with several workers until a deadline. Copies files of faults to ``keep``."""
     queue: SimpleQueue[tuple[int, tuple[str, int]]] = SimpleQueue()
     for case in enumerate(cases):
         queue.put(case)

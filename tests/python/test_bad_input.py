@@ -76,8 +76,7 @@ def render(stage: Path, out: Path, *options: object) -> subprocess.CompletedProc
 
 
 def refused(done: subprocess.CompletedProcess[str], folder: Path, *names: str) -> str:
-    """Asserts exit code 2, one error line with all ``names``, and no image file. Returns the line.
-    """
+    """Asserts exit code 2, one error line with all ``names``, and no image. Returns the line."""
     assert done.returncode == 2, done.stderr
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1, done.stderr

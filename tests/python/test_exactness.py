@@ -36,8 +36,7 @@ _plain: dict[Any, wavecomb.Picture] = {}
 
 
 def texture_scene() -> Any:
-    """Returns 24 textured tiles with four programs before a mirror. Two tiles share each texture.
-    """
+    """Returns 24 textured tiles with four programs before a mirror. Two tiles share a texture."""
     rng = np.random.default_rng(7)
     builder = wavecomb.SceneBuilder()
     textures = [

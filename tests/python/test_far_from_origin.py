@@ -466,13 +466,8 @@ def test_what_floats_cannot_hold_is_said(
 
 
 def test_cameras_and_positions_of_the_window() -> None:
-<<<<<<< HEAD
-    """Poses are of the scene; what is shown of them is of the world."""
-    from wavecomb.gui.viewport.navigate import Pose
-=======
     """Camera poses of the window are in scene space; it shows world space."""
-    from wavecomb.gui.viewport.orbit import Pose
->>>>>>> 1cf48fcb (Word the comments of tests/python plainly)
+    from wavecomb.gui.viewport.navigate import Pose
     from wavecomb.gui.viewport.scene_lookup import camera_pose
 
     usd = open_text(f"""def Camera "C" {{

@@ -83,8 +83,7 @@ def test_a_camera_in_fog_knows_where_it_is() -> None:
     [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
 )
 def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
-    """Two slabs overlap by a quarter. The higher priority wins, or for equal ones the last entered.
-    """
+    """Two slabs overlap by a quarter. The higher priority wins; of equal ones, the last entered."""
     builder = wavecomb.SceneBuilder()
     other = SIGMA[::-1]
     for (low, high), sigma, priority in zip(
@@ -500,8 +499,7 @@ def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
 
 
 def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
-    """A warning that light scattered in cloudy glass does not meet volumes, only if there are any.
-    """
+    """A warning that light scattered in cloudy glass misses volumes, only if there are any."""
     from usd_recorder import load, said
 
     volume = 'def Volume "V" { float3[] extent = [(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)] }\n'

@@ -26,8 +26,7 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Any:
 def builder_scene(
     glass: bool = False, edit: dict[int, dict[str, Any]] | None = None
 ) -> wavecomb.SceneBuilder:
-    """Returns a room of many small lights under a dome, with a rough glass pane and edited lights.
-    """
+    """Returns a room of many small lights under a dome, with rough glass and edited lights."""
     rng = np.random.default_rng(4)
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -173,8 +172,7 @@ def test_the_street_has_the_lights_that_were_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_tree_that_nobody_chooses_by_is_not_built() -> None:
-    """With one bright light and many faint ones, lights are selected by power unless set otherwise.
-    """
+    """With one bright light and many faint ones, lights are selected by power by default."""
 
     def scene() -> wavecomb.Scene:
         rng = np.random.default_rng(6)

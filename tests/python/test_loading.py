@@ -68,7 +68,8 @@ def test_reading_ahead_changes_nothing(tmp_path: Path) -> None:
         )
     (one, a), (many, b) = loads
     assert a.report.lines() == b.report.lines()
-    assert len(one.textures) == len(many.textures) == 9  # with the placeholder, and 0.png in two colour spaces
+    # With the placeholder, and 0.png in two colour spaces.
+    assert len(one.textures) == len(many.textures) == 9
     for x, y in zip(one.textures, many.textures, strict=True):
         assert x["srgb"] == y["srgb"] and np.array_equal(x["pixels"], y["pixels"])
     warnings = [line for line in b.report.lines() if "cannot be read" in line]
