@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wavecomb.usd.graphs.node import INPUTS, nodes_of
+from wavecomb.usd.graphs.values import INPUTS, nodes_of
 
 COLUMNS = {"uv": 0, "position": 3, "local_position": 6, "normal": 9, "local_normal": 12,
            "tangent": 15, "view": 18,

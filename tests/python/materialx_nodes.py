@@ -11,8 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.graphs.node import POINT_SIZE, fit
-from wavecomb.usd.graphs.program import assemble
+from wavecomb.usd.graphs.values import POINT_SIZE, assemble, fit
 from wavecomb.usd.materialx.library import WIDTHS, library
 from wavecomb.usd.materialx.nodes.call import NodeCall
 from wavecomb.usd.materialx.nodes.network import Networks

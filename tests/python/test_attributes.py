@@ -12,7 +12,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.usd import load_stage
-from wavecomb.usd.graphs.node import POINT_SIZE
+from wavecomb.usd.graphs.values import POINT_SIZE
 
 _core = pytest.importorskip("wavecomb._core")
 

@@ -156,9 +156,7 @@ def openpbr_scene() -> Any:
 
 def graph_scene() -> Any:
     """Returns tiles with parameters driven by the same or different graphs; one tile emits."""
-    from wavecomb.usd.graphs.expressions import Expressions
-    from wavecomb.usd.graphs.node import PARAMETERS, numbers
-    from wavecomb.usd.graphs.program import assemble
+    from wavecomb.usd.graphs.values import PARAMETERS, Expressions, assemble, numbers
 
     builder = wavecomb.SceneBuilder()
     texels = np.random.default_rng(2).integers(0, 256, (64, 64, 3), np.uint8)

@@ -10,11 +10,17 @@ import pytest
 from graph_reference import FORMULAS, evaluate
 
 from wavecomb import _core
-from wavecomb.usd.graphs import program
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import INPUTS, POINT_SIZE, GraphTooLarge, is_constant, numbers
-from wavecomb.usd.graphs.program import assemble
+from wavecomb.usd.graphs import values
 from wavecomb.usd.graphs.surface import linear
+from wavecomb.usd.graphs.values import (
+    INPUTS,
+    POINT_SIZE,
+    Expressions,
+    GraphTooLarge,
+    assemble,
+    is_constant,
+    numbers,
+)
 
 CONTINUOUS = [c for c in FORMULAS if c not in ("modulo", "less", "equal", "floor", "sign")]
 JUMPS = ["modulo", "less", "floor", "sign"]
@@ -211,7 +217,7 @@ def test_registers_are_used_again():
         value = make.op("sin", make.op("add", value, numbers(0.1 * i)))
     graph = assemble(dict(enumerate(value)))
     assert graph.count == 800  # the first addition, of 0, is dropped
-    top = np.frombuffer(graph.ops, program._OP)["to"].max()
+    top = np.frombuffer(graph.ops, values._OP)["to"].max()
     assert top < 12
 
 
@@ -228,7 +234,7 @@ def test_programs_that_read_what_is_not_there_are_refused():
     make = Expressions()
     graph = assemble(dict(enumerate(make.op("sin", make.input("position")))))
     builder.add_graph(graph.ops, graph.constants, graph.images, graph.outputs)
-    ops = np.frombuffer(graph.ops, program._OP)
+    ops = np.frombuffer(graph.ops, values._OP)
 
     def changed(**fields):
         other = ops.copy()

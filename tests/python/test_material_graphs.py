@@ -11,7 +11,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 from wavecomb.usd import load_stage
-from wavecomb.usd.graphs.node import PARAMETERS, POINT_SIZE
+from wavecomb.usd.graphs.values import PARAMETERS, POINT_SIZE
 
 UV = 'def Shader "UV" { uniform token info:id = "ND_texcoord_vector2"\nfloat2 outputs:out }\n'
 

@@ -16,7 +16,7 @@ from wavecomb.usd.looks.parameters import as_stored, light_values, material_para
 from wavecomb.usd.looks.surface import DEFAULTS
 from wavecomb.usd.looks.surface_values import surface_values
 from wavecomb.usd.materialx.surfaces.inputs import definitions
-from wavecomb.usd.materialx.surfaces.models import MODELS, layers_of
+from wavecomb.usd.materialx.surfaces.openpbr import MODELS, layers_of
 
 MATERIAL = """
 def Material "%s" {

@@ -7,7 +7,7 @@ import numpy as np
 
 from wavecomb import _core
 from wavecomb.usd import LoadedStage, load_stage
-from wavecomb.usd.graphs.program import Graph
+from wavecomb.usd.graphs.values import Graph
 
 INHERIT = 0xFFFFFFFF
 

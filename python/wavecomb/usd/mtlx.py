@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import Value
+from wavecomb.usd.graphs.values import Expressions, Value
 from wavecomb.usd.looks.network import shader_id, source_of
 from wavecomb.usd.stage.unread import unread_mtlx
 
@@ -148,7 +147,7 @@ def surface(
         from wavecomb.usd.materialx.surfaces.hair import HairReader
 
         return HairReader(material, time, textures, report).read(shader)
-    from wavecomb.usd.materialx.surfaces.reader import MaterialXReader
+    from wavecomb.usd.materialx.surfaces.openpbr import MaterialXReader
 
     return MaterialXReader(material, time, textures, report, values).read(shader, model)
 

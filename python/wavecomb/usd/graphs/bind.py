@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.graphs.expressions import Expressions, substituted
-from wavecomb.usd.graphs.node import (
+from wavecomb.usd.graphs.surface import graphs_of, plain_use, substituted
+from wavecomb.usd.graphs.values import (
     OF_SPACE,
     PARAMETERS,
     PRIMVAR,
+    Expressions,
     Node,
     Value,
     fit,
     is_constant,
     numbers,
 )
-from wavecomb.usd.graphs.surface import graphs_of, plain_use
-from wavecomb.usd.looks.surface import TEXTURED_PARAMETERS, SurfaceGraph
+from wavecomb.usd.looks.surface import TEXTURED_PARAMETERS
 
 if TYPE_CHECKING:
     from wavecomb.usd.looks.surface import Surface
@@ -158,8 +158,3 @@ def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str
     axes = [make.input(name) for name in _AXES]
     turned = {name: mapped_sum(axes, inverse[:3, i]) for i, name in enumerate(_AXES)}
     return {_LOCAL[0]: position, _LOCAL[1]: make.op("divide", normal, length), **turned}
-
-
-def asks_for(graph: SurfaceGraph | None) -> bool:
-    """Whether a graph is another on each mesh."""
-    return graph is not None and (bool(graph.primvars) or graph.in_object_space)

@@ -9,21 +9,24 @@ from typing import Any, Protocol
 import numpy as np
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.graphs.expressions import Expressions, substituted
-from wavecomb.usd.graphs.node import (
+from wavecomb.picture.working_space import from_rec709
+from wavecomb.usd.graphs.values import (
     OF_SPACE,
     PARAMETERS,
     POINT_SIZE,
     PRIMVAR,
+    Expressions,
+    Graph,
     GraphTooLarge,
     Node,
     Part,
     Value,
+    assemble,
     fit,
     is_constant,
     nodes_of,
+    numbers,
 )
-from wavecomb.usd.graphs.program import Graph, assemble
 from wavecomb.usd.looks.surface import (
     COLOUR_PARAMETERS,
     TEXTURED_PARAMETERS,
@@ -59,6 +62,37 @@ class Networks(Protocol):
 
     def in_working_space(self) -> Networks:
         """The same networks with constant colours of the working space; tells nothing."""
+
+
+Replaced = Callable[[Node, tuple[Value, ...]], Value | None]
+"""Called as replaced(node, its operands made anew); None: the node stays."""
+
+
+def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
+    """A value made anew with other values in the place of some nodes; primvars give way always."""
+    done: dict[Node, Value] = {}
+
+    def part_of(part: Part) -> Part:
+        return part if isinstance(part, float) else done[part[0]][part[1]]
+
+    for node in nodes_of(value):
+        operands = tuple(tuple(part_of(part) for part in one) for one in node.operands)
+        new = replaced(node, operands)
+        if new is None:
+            new = operands[0] if node.code == PRIMVAR else make.again(node, operands)
+        done[node] = fit(new, node.results)
+    return tuple(part_of(part) for part in value)
+
+
+def in_working_space(make: Expressions, value: Value, working: str) -> Value:
+    """A colour of linear Rec.709 in the working space; what follows r, g and b stays."""
+    if working == "rec709":
+        return value
+    matrix = from_rec709(np.eye(3), working)
+    rgb = tuple(
+        make.op("dot", value[:3], numbers(*(float(x) for x in matrix[:, i])))[0] for i in range(3)
+    )
+    return rgb + value[3:]
 
 
 def uv_matrix(uv: Value) -> tuple[float, ...] | None:

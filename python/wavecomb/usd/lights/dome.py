@@ -10,9 +10,8 @@ from pxr import Usd, UsdGeom
 from wavecomb.usd.lights.dome_formats import FORMATS, format_of, to_latlong
 from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
 from wavecomb.usd.looks.network import number, word
-from wavecomb.usd.looks.pixels import read_image
+from wavecomb.usd.looks.pixels import Image, read_image
 from wavecomb.usd.looks.texture import TextureTable
-from wavecomb.usd.looks.texture_cache import Image
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.report import LoadReport
 

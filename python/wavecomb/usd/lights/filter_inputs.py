@@ -8,8 +8,8 @@ from typing import Any
 
 from pxr import Usd
 
-from wavecomb.usd.looks.colour_space import Colour, read_colour
-from wavecomb.usd.looks.network import colour, number, word
+from wavecomb.usd.looks.colour_space import Colour
+from wavecomb.usd.looks.network import colour, number, read_colour, word
 from wavecomb.usd.stage.report import LoadReport
 
 _PREFIXES = (

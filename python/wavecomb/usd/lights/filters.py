@@ -26,9 +26,7 @@ from wavecomb.usd.lights.filter_inputs import (
     plain_kind,
 )
 from wavecomb.usd.lights.gels import GELS
-from wavecomb.usd.looks.asset_files import asset_file
-from wavecomb.usd.looks.colour_space import space_of
-from wavecomb.usd.looks.network import number
+from wavecomb.usd.looks.network import asset_file, number, space_of
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections
 from wavecomb.usd.stage.report import LoadReport

@@ -24,11 +24,18 @@ from wavecomb.usd.lights.dome import DomeReader
 from wavecomb.usd.lights.filters import Filter, FilterReader
 from wavecomb.usd.lights.gels import Gel, gel_of
 from wavecomb.usd.lights.links import LinkTable
-from wavecomb.usd.looks.asset_files import UDIM, asset_file, tile_files
-from wavecomb.usd.looks.colour_space import Colour, read_colour, space_of
-from wavecomb.usd.looks.network import colour, number
+from wavecomb.usd.looks.colour_space import Colour
+from wavecomb.usd.looks.network import (
+    UDIM,
+    asset_file,
+    colour,
+    number,
+    read_colour,
+    space_of,
+    tile_files,
+)
+from wavecomb.usd.looks.pixels import Image
 from wavecomb.usd.looks.texture import TextureTable
-from wavecomb.usd.looks.texture_cache import Image
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 

@@ -17,8 +17,8 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import PrimvarError, as_integers, find_primvar, in_linear
 from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.triangulate import Topology
-from wavecomb.usd.graphs.bind import asks_for, at_other_sets, bound
-from wavecomb.usd.graphs.node import PARAMETERS, GraphTooLarge
+from wavecomb.usd.graphs.bind import at_other_sets, bound
+from wavecomb.usd.graphs.values import PARAMETERS, GraphTooLarge
 from wavecomb.usd.looks.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.looks.network import colour, number
 from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
@@ -210,7 +210,7 @@ class Assigner:
 
     def _bound(self, primvars: _Primvars, surface: Surface) -> int:
         """The id of a surface, with this gprim's values where it reads constant primvars."""
-        if asks_for(surface.graph):
+        if surface.graph is not None and surface.graph.depends_on_mesh:
             surface = self._with_graph(primvars, surface)
         if primvars.own_uv:
             surface = self._at_other_sets(primvars, surface)
@@ -301,7 +301,8 @@ class Assigner:
 
 def is_alike(surface: Surface) -> bool:
     """Whether a surface is the same on all gprims."""
-    reads = surface.primvars or asks_for(surface.graph) or surface.emission_attributes()
+    graph = surface.graph
+    reads = surface.primvars or (graph and graph.depends_on_mesh) or surface.emission_attributes()
     return not (reads or surface.texture_uvs or surface.object_reads or surface.stand_in)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colour spaces of textures and values, to the working space, by OpenColorIO's built-in config."""
+"""Conversions between colour spaces by OpenColorIO's built-in config."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd
-
-from wavecomb.usd.stage.report import LoadReport
 
 Colour = tuple[float, float, float]
 
 OCIO_NAMES = {"rec709": "Linear Rec.709 (sRGB)", "acescg": "ACEScg"}
-"""What OpenColorIO calls the working spaces."""
+"""Names of the working spaces in OpenColorIO."""
 
 LINEAR = OCIO_NAMES["rec709"]
 SRGB = "sRGB Encoded Rec.709 (sRGB)"
@@ -59,61 +56,8 @@ def _config() -> Any:
     return oiio.ColorConfig("ocio://default")
 
 
-def space_of(attribute: Usd.Attribute | None) -> str:
-    """The colour space that a stage gives an attribute, itself or by a prim above it; else "".
-
-    Of files only what they have themselves: what prims say is meant for values.
-    """
-    if not attribute:
-        return ""
-    if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
-        return str(attribute.GetColorSpace())
-    if attribute.HasColorSpace():
-        return str(attribute.GetColorSpace())
-    # USD's own search gives up at names that it does not know itself, such as srgb_texture.
-    prim = attribute.GetPrim()
-    while prim and not prim.IsPseudoRoot():
-        if prim.HasAPI(Usd.ColorSpaceAPI):
-            name = Usd.ColorSpaceAPI(prim).GetColorSpaceNameAttr().Get()
-            if name:
-                return str(name)
-        prim = prim.GetParent()
-    return ""
-
-
-def linear_colour(colour: Colour, attribute: Usd.Attribute | None) -> Colour:
-    """A colour of an attribute in linear Rec.709.
-
-    Raises:
-        ValueError: OpenColorIO does not know its space.
-    """
-    name = space_of(attribute)
-    if not name:
-        return colour
-    space = canonical(name)
-    if space is None:
-        raise ValueError(f"colour space {name}")
-    return convert_colour(colour, space, "rec709")
-
-
-def read_colour(
-    colour: Colour, attribute: Usd.Attribute | None, report: LoadReport, place: object
-) -> Colour:
-    """A colour of an attribute in linear Rec.709; lists a space that is not known."""
-    try:
-        return linear_colour(colour, attribute)
-    except ValueError as error:
-        report.missing(f"{error} (read as linear)", place)
-        return colour
-
-
-def holds_colour(attribute: Usd.Attribute | None) -> bool:
-    """Whether the type of an attribute is a colour, which has a colour space."""
-    return attribute is not None and attribute.GetTypeName().role == "Color"
-
-
 def colours_in_linear(colours: NDArray[Any], name: str) -> NDArray[np.float32]:
-    """Colours (k, 3 or more) of a space in linear Rec.709; further components stay.
+    """Converts colours (k, 3 or more) of a space to linear Rec.709; further components stay.
 
     Raises:
         ValueError: OpenColorIO does not know the space.
@@ -128,9 +72,9 @@ def colours_in_linear(colours: NDArray[Any], name: str) -> NDArray[np.float32]:
 
 
 def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float32]:
-    """Colours (h, w, 3 or 4), encoded in a space of OpenColorIO's, in the working space.
+    """Converts colours (h, w, 3 or 4) from a space of OpenColorIO to the working space.
 
-    uint8 counts as 0 to 1; alpha stays. What is not finite becomes 0.
+    uint8 counts as 0 to 1, alpha stays, and values that are not finite become 0.
     """
     import OpenImageIO as oiio
 
@@ -140,7 +84,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
         if pixels.dtype == np.uint8:
             rows /= np.float32(255)
         buffer = oiio.ImageBuf(np.ascontiguousarray(rows[..., :3]))
-        # On this thread alone: OpenImageIO's pool was seen to wait for ever.
+        # On this thread alone: OpenImageIO's thread pool can deadlock here.
         made = oiio.ImageBufAlgo.colorconvert(
             buffer, source, OCIO_NAMES[working], unpremult=False,
             colorconfig="ocio://default", nthreads=1,
@@ -154,8 +98,77 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
 
 @functools.cache
 def convert_colour(colour: Colour, source: str, working: str) -> Colour:
-    """One colour, as ``convert``."""
+    """Converts one colour, as ``convert`` does."""
     if source in (RAW, OCIO_NAMES[working]):
         return colour
     r, g, b = convert(np.array(colour, np.float32).reshape(1, 1, 3), source, working)[0, 0]
     return float(r), float(g), float(b)
+
+
+# ---- the sRGB curve, and mip levels in linear light --------------------------------------------
+
+
+def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
+    """The sRGB transfer curve of IEC 61966-2-1, encoded to linear."""
+    v = np.asarray(values, np.float32)
+    low = v / np.float32(12.92)
+    high = ((np.maximum(v, 0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
+    return np.where(v <= 0.04045, low, high).astype(np.float32)
+
+
+def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
+    """An image (h, w, c) at half its size, rounded down, as the core makes mip levels.
+
+    Box filter in linear light; ``srgb``: colours of uint8 are encoded. The type stays.
+    """
+    height, width, channels = pixels.shape
+    out = np.empty((max(height // 2, 1), max(width // 2, 1), channels), pixels.dtype)
+    # Bands of an even height stand for themselves; else all at once.
+    band = 256 if height % 2 == 0 else height
+    colours = (channels - 1) if channels % 2 == 0 else channels
+    for first in range(0, height, band):
+        rows = pixels[first : first + band]
+        if rows.dtype == np.uint8:
+            light = rows.astype(np.float32) / np.float32(255)
+            if srgb:
+                light[..., :colours] = _LINEAR[rows[..., :colours]]
+        else:
+            light = rows.astype(np.float32)
+        light = _halve_axis(_halve_axis(light, 0), 1)
+        if rows.dtype == np.uint8:
+            if srgb:
+                light[..., :colours] = _encode(light[..., :colours])
+            light = np.rint(light * 255).clip(0, 255)
+        out[first // 2 : first // 2 + len(light)] = light
+    return out
+
+
+def _halve_axis(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
+    """Means of boxes along an axis; of an odd number of n values boxes are n / (n // 2) wide."""
+    size = values.shape[axis]
+    if size == 1:
+        return values
+    values = np.moveaxis(values, axis, 0)
+    if size % 2 == 0:
+        out = 0.5 * values[0::2] + 0.5 * values[1::2]
+    else:
+        n = size // 2
+        sums = np.concatenate([np.zeros_like(values[:1]), values]).cumsum(axis=0, dtype=np.float64)
+        edge = np.arange(n + 1) * (size / n)
+        whole = np.minimum(edge.astype(np.intp), size - 1)
+        part = (edge - whole).reshape(-1, *([1] * (values.ndim - 1)))
+        at = sums[whole] * (1 - part) + sums[whole + 1] * part
+        out = (np.diff(at, axis=0) * (n / size)).astype(np.float32)
+    return np.moveaxis(out, 0, axis)
+
+
+_CODES = np.arange(256) / 255.0
+_LINEAR = np.where(
+    _CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4
+).astype(np.float32)  # fmt: skip
+
+
+def _encode(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The sRGB transfer curve of values of at least 0."""
+    high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)

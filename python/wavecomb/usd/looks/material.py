@@ -14,11 +14,10 @@ from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd import mtlx
-from wavecomb.usd.graphs.expressions import Expressions, in_working_space
-from wavecomb.usd.graphs.node import PARAMETERS, GraphTooLarge, fit, numbers
-from wavecomb.usd.graphs.surface import graphs_of
+from wavecomb.usd.graphs.surface import graphs_of, in_working_space
+from wavecomb.usd.graphs.values import PARAMETERS, Expressions, GraphTooLarge, fit, numbers
 from wavecomb.usd.looks.emission import mean_emission
-from wavecomb.usd.looks.network import shader_id
+from wavecomb.usd.looks.network import shader_id, shader_name, surface_outputs
 from wavecomb.usd.looks.preview import PreviewReader
 from wavecomb.usd.looks.surface import (
     COLOUR_PARAMETERS,
@@ -28,14 +27,13 @@ from wavecomb.usd.looks.surface import (
     fallback_surface,
     is_cloudy,
 )
-from wavecomb.usd.looks.terminals import terminals
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.inside import filling
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.graphs.program import Graph
+    from wavecomb.usd.graphs.values import Graph
 
 INHERIT_MATERIAL = 0xFFFFFFFF
 """Same as ``_core.INHERIT_MATERIAL``: what the instance says."""
@@ -86,7 +84,7 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     """
     shader = material.ComputeSurfaceSource()[0]
     # Where a material comes in both forms, the preview is the one for who knows no MaterialX.
-    others = (one.shader for one in terminals(material))
+    others = (one for _, one in surface_outputs(material))
     for candidate in chain((material.ComputeSurfaceSource("mtlx")[0], shader), others):
         name = shader_id(candidate)
         if name.startswith(("ND_UsdPreviewSurface", "UsdPreviewSurface")):
@@ -348,11 +346,11 @@ class MaterialTable:
         if kind:
             read = mtlx.surface(prim, self.time, self._textures, self._report, shader, kind)
             return read or _stand_in(prim)
-        found = list(terminals(material))
+        found = surface_outputs(material)
         if not found and (inside := filling(material, self.time, self._report)) is not None:
             return inside
         if found:
-            what = ", ".join(map(str, found))
+            what = ", ".join(f"{shader_name(one)} of {output}" for output, one in found)
             self._report.missing(f"surface shader {what} ({_INSTEAD})", prim.GetPath())
         elif not material.GetSurfaceOutputs():
             self._report.warn(f"material without a surface: {_INSTEAD}", prim.GetPath())

@@ -1,15 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shader networks: what feeds an input, through node graphs and interface inputs."""
+"""Shader networks: sources of shader inputs, and the values, colours and files of attributes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pxr import Sdf, Usd, UsdShade
 
+from wavecomb.usd.graphs.values import Value, is_constant
+from wavecomb.usd.looks.colour_space import canonical, convert_colour
+from wavecomb.usd.stage.report import LoadReport
+
+Colour = tuple[float, float, float]
+
 MAX_DEPTH = 32
 """Shaders in a row before a network is taken for a cycle."""
+
+UDIM = "<UDIM>"
+_SMALL_UDIM = "<udim>"
+_NO_ID = "a shader without info:id"
 
 
 @dataclass(frozen=True)
@@ -18,9 +29,9 @@ class Source:
 
     Attributes:
         shader: The shader, where the input is connected to one.
-        output: Its output's name.
+        output: Name of the shader's output.
         value: The value, where there is one.
-        attribute: Which holds that value.
+        attribute: The attribute that holds the value.
     """
 
     shader: UsdShade.Shader | None = None
@@ -118,3 +129,221 @@ def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, floa
     except (TypeError, ValueError, IndexError):
         return default
     return (r, g, b) if (r - r) + (g - g) + (b - b) == 0 else default
+
+
+# ---- colour spaces -------------------------------------------------------------------------------
+
+
+def space_of(attribute: Usd.Attribute | None) -> str:
+    """The colour space that a stage gives an attribute, directly or by an ancestor prim; or "".
+
+    The space that an ancestor names applies to values only, not to files.
+    """
+    if not attribute:
+        return ""
+    if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset or attribute.HasColorSpace():
+        return str(attribute.GetColorSpace())
+    # USD's own search stops at names that it does not know, such as srgb_texture.
+    prim = attribute.GetPrim()
+    while prim and not prim.IsPseudoRoot():
+        if prim.HasAPI(Usd.ColorSpaceAPI):
+            name = Usd.ColorSpaceAPI(prim).GetColorSpaceNameAttr().Get()
+            if name:
+                return str(name)
+        prim = prim.GetParent()
+    return ""
+
+
+def linear_colour(colour: Colour, attribute: Usd.Attribute | None) -> Colour:
+    """A colour of an attribute in linear Rec.709.
+
+    Raises:
+        ValueError: OpenColorIO does not know its space.
+    """
+    name = space_of(attribute)
+    if not name:
+        return colour
+    space = canonical(name)
+    if space is None:
+        raise ValueError(f"colour space {name}")
+    return convert_colour(colour, space, "rec709")
+
+
+def read_colour(
+    colour: Colour, attribute: Usd.Attribute | None, report: LoadReport, place: object
+) -> Colour:
+    """A colour of an attribute in linear Rec.709; reports an unknown space."""
+    try:
+        return linear_colour(colour, attribute)
+    except ValueError as error:
+        report.missing(f"{error} (read as linear)", place)
+        return colour
+
+
+def holds_colour(attribute: Usd.Attribute | None) -> bool:
+    """Whether the type of an attribute is a colour, which has a colour space."""
+    return attribute is not None and attribute.GetTypeName().role == "Color"
+
+
+# ---- outputs of materials ------------------------------------------------------------------------
+
+
+def surface_outputs(material: UsdShade.Material) -> list[tuple[str, UsdShade.Shader]]:
+    """Names of the surface outputs that lead to a shader, and the shaders, in the stage's order.
+
+    Outputs for other renderers, such as outputs:ri:surface, are among them.
+    """
+    return [
+        (str(output.GetFullName()), shader)
+        for output in material.GetSurfaceOutputs()
+        for attribute in UsdShade.Utils.GetValueProducingAttributes(output)
+        if (shader := UsdShade.Shader(attribute.GetPrim()))
+    ]
+
+
+def shader_name(shader: UsdShade.Shader) -> str:
+    """info:id of a shader, else the name of its source."""
+    if name := shader_id(shader):
+        return name
+    authored = {one.GetName(): one for one in shader.GetPrim().GetAuthoredAttributes()}
+    for name, attribute in authored.items():
+        if name.endswith(":sourceAsset:subIdentifier"):
+            return word(attribute.Get()) or _NO_ID
+    for name, attribute in authored.items():
+        value = attribute.Get() if name.endswith(":sourceAsset") else None
+        if isinstance(value, Sdf.AssetPath):
+            return str(value.path)
+    return _NO_ID
+
+
+# ---- values for each object ----------------------------------------------------------------------
+
+
+class InputValues:
+    """Reads inputs that have one value for each object, such as the scale of a texture.
+
+    The values may stand behind node graphs, interfaces, primvar readers and constant nodes.
+
+    Attributes:
+        reads: Primvars of the object that values come from, first use first.
+    """
+
+    def __init__(
+        self,
+        time: Usd.TimeCode,
+        report: LoadReport,
+        node_value: Callable[[UsdShade.Shader, str, str], Value | None],
+        primvars: Mapping[str, Any] | None = None,
+    ) -> None:
+        """``node_value`` evaluates MaterialX nodes (``Networks.node``).
+
+        ``primvars`` holds the object's values; readers of other primvars have their fallback.
+        """
+        self.reads: dict[str, None] = {}
+        self._time = time
+        self._report = report
+        self._node_value = node_value
+        self._primvars = primvars or {}
+        self._depth = 0
+
+    def of(
+        self, shader: UsdShade.Shader, name: str, default: Any = None, *, by_object: bool = True
+    ) -> Any:
+        """The value of an input, or the default where nothing is authored.
+
+        Reports an input that varies, and, unless ``by_object``, one that a primvar gives.
+        """
+        source = source_of(shader, name, self._time)
+        if source is None:
+            return default
+        if source.shader is None:
+            return source.value
+        node, identifier = source.shader, shader_id(source.shader)
+        if identifier.startswith("UsdPrimvarReader_") and self._depth < MAX_DEPTH:
+            if by_object:
+                return self._read(node, default)
+        elif identifier.startswith("ND_"):
+            value = self._node_value(node, source.output, "number")
+            if value is not None and is_constant(value):
+                numbers = tuple(float(part) for part in value)  # type: ignore[arg-type]
+                return numbers if len(numbers) > 1 else numbers[0]
+        by = identifier or "a node without info:id"
+        what = f"{shader_id(shader)} input {name} by {by} (its default)"
+        self._report.missing(what, shader.GetPath())
+        return default
+
+    def _read(self, reader: UsdShade.Shader, default: Any) -> Any:
+        """The value of a primvar reader, whose varname and fallback may be connected."""
+        self._depth += 1
+        try:
+            name = self.of(reader, "varname", "")
+            if isinstance(name, str) and name:
+                self.reads[name] = None
+                if name in self._primvars:
+                    return self._primvars[name]
+            return self.of(reader, "fallback", default)
+        finally:
+            self._depth -= 1
+
+
+# ---- files ---------------------------------------------------------------------------------------
+
+
+def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
+    """The file that an asset value names: resolved if it resolves, else as authored.
+
+    For a UDIM texture this is the pattern with ``<UDIM>`` in it.
+    """
+    if not isinstance(value, Sdf.AssetPath):
+        return _file_of_text(str(value or ""), attribute)
+    if _SMALL_UDIM in value.path:  # as Arnold writes it
+        return _file_of_text(value.path, attribute)
+    path = value.resolvedPath or value.path
+    if UDIM not in path and UDIM not in value.path:
+        return path
+    if UDIM in value.resolvedPath:
+        return value.resolvedPath
+    layer = layer_of_value(attribute)
+    found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
+    if not found and layer is not None and value.path.startswith("."):
+        return str(layer.ComputeAbsolutePath(value.path))  # for messages: there are no tiles
+    return found or value.path
+
+
+def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:
+    """The file that a text names; relative names start at the layer that has the text."""
+    name = name.replace(_SMALL_UDIM, UDIM)
+    layer = layer_of_value(attribute)
+    return str(layer.ComputeAbsolutePath(name)) if name and layer is not None else name
+
+
+def tile_files(pattern: str) -> list[tuple[int, str]]:
+    """Numbers and files of the existing tiles of a UDIM pattern, 1001 to 1100."""
+    found = UsdShade.UdimUtils.ResolveUdimTilePaths(pattern, None)
+    return [(int(number), path) for path, number in found]
+
+
+def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
+    """Files that the shaders in a material name: a guess at the images that it will need."""
+    for prim in _each_once(material):
+        for attribute in prim.GetAuthoredAttributes():
+            if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
+                value = attribute.Get(time)
+                if value is None:
+                    continue
+                if UDIM in value.path:
+                    yield from (path for _, path in tile_files(asset_file(value, attribute)))
+                elif value.resolvedPath:
+                    yield value.resolvedPath
+
+
+def _each_once(top: Usd.Prim) -> Iterator[Usd.Prim]:
+    """A prim and its descendants; prims in instances once for each prototype."""
+    tops = [top.GetPrimInPrototype() if top.IsInstanceProxy() else top]
+    known: set[Sdf.Path] = set()
+    while tops:
+        for prim in Usd.PrimRange(tops.pop()):
+            yield prim
+            if prim.IsInstance() and (prototype := prim.GetPrototype()).GetPath() not in known:
+                known.add(prototype.GetPath())
+                tops.append(prototype)

@@ -21,9 +21,18 @@ from wavecomb.usd import mtlx
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import LightReader
-from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical, linear_colour, space_of
+from wavecomb.usd.looks.colour_space import LINEAR, RAW, canonical
 from wavecomb.usd.looks.material import PREVIEW, surface_source
-from wavecomb.usd.looks.network import Source, colour, number, shader_id, source_of, value_of
+from wavecomb.usd.looks.network import (
+    Source,
+    colour,
+    linear_colour,
+    number,
+    shader_id,
+    source_of,
+    space_of,
+    value_of,
+)
 from wavecomb.usd.looks.preview import INPUTS, constant, program_of
 from wavecomb.usd.looks.surface import COLOUR, COLOUR_PARAMETERS, SWITCH, InputDefinition
 from wavecomb.usd.stage.identity import LightGroups

@@ -18,7 +18,6 @@ from pxr import Ar
 from wavecomb.machine import usable_cores
 from wavecomb.picture.files import kind_of, problem_of
 from wavecomb.run.isolate import trail
-from wavecomb.usd.looks.texture_cache import Image, Stamp
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -26,6 +25,60 @@ if TYPE_CHECKING:
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
 """Most memory that decoding one image may take."""
+
+
+Stamp = tuple[int, int]
+"""When a file was changed, in ns, and its size in bytes."""
+
+
+class Image:
+    """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top.
+
+    Attributes:
+        size: Height and width.
+        channels: Channels of each pixel.
+        dtype: Of the pixels.
+        stamp: Of its file before it was read; None: not known.
+        wraps: Modes in s and t that the file asks for: black, clamp, repeat or mirror.
+        encoded: Whether the file says that it is sRGB; None: it does not say.
+    """
+
+    def __init__(
+        self,
+        pixels: NDArray[Any],
+        stamp: Stamp | None = None,
+        wraps: tuple[str, str] = ("black", "black"),
+        encoded: bool | None = None,
+    ) -> None:
+        self.stamp = stamp
+        self.wraps = wraps
+        self.encoded = encoded
+        self._pixels: NDArray[Any] | None = pixels
+        self.size = int(pixels.shape[0]), int(pixels.shape[1])
+        self.channels = int(pixels.shape[2])
+        self.dtype = pixels.dtype
+
+    @property
+    def is_here(self) -> bool:
+        """Whether the pixels were not taken yet."""
+        return self._pixels is not None
+
+    def take(self) -> NDArray[Any]:
+        """Hands the pixels over, once."""
+        pixels, self._pixels = self._pixels, None
+        if pixels is None:
+            raise ValueError("the pixels of this image were taken before")
+        return pixels
+
+    @property
+    def automatic_srgb(self) -> bool:
+        """Whether ``sourceColorSpace = auto`` means sRGB.
+
+        As the file says, else of 8 bits with 3 or 4 channels.
+        """
+        if self.encoded is not None:
+            return self.encoded
+        return self.dtype == np.uint8 and self.channels >= 3
 
 
 class TextureError(ValueError):
@@ -330,61 +383,3 @@ class ReadAhead:
                 self._pool = ThreadPoolExecutor(self._threads, "wavecomb-image")
             path = self._waiting.popleft()
             self._ready[path] = self._pool.submit(read_image, path)
-
-
-def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
-    """An image (h, w, c) at half its size, rounded down, as the core makes mip levels.
-
-    Box filter in linear light; ``srgb``: colours of uint8 are encoded. The type stays.
-    """
-    height, width, channels = pixels.shape
-    out = np.empty((max(height // 2, 1), max(width // 2, 1), channels), pixels.dtype)
-    # Bands of an even height stand for themselves; else all at once.
-    band = 256 if height % 2 == 0 else height
-    colours = (channels - 1) if channels % 2 == 0 else channels
-    for first in range(0, height, band):
-        rows = pixels[first : first + band]
-        if rows.dtype == np.uint8:
-            light = rows.astype(np.float32) / np.float32(255)
-            if srgb:
-                light[..., :colours] = _LINEAR[rows[..., :colours]]
-        else:
-            light = rows.astype(np.float32)
-        light = _halve_axis(_halve_axis(light, 0), 1)
-        if rows.dtype == np.uint8:
-            if srgb:
-                light[..., :colours] = _encode(light[..., :colours])
-            light = np.rint(light * 255).clip(0, 255)
-        out[first // 2 : first // 2 + len(light)] = light
-    return out
-
-
-def _halve_axis(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    """Means of boxes along an axis; of an odd number of n values boxes are n / (n // 2) wide."""
-    size = values.shape[axis]
-    if size == 1:
-        return values
-    values = np.moveaxis(values, axis, 0)
-    if size % 2 == 0:
-        out = 0.5 * values[0::2] + 0.5 * values[1::2]
-    else:
-        n = size // 2
-        sums = np.concatenate([np.zeros_like(values[:1]), values]).cumsum(axis=0, dtype=np.float64)
-        edge = np.arange(n + 1) * (size / n)
-        whole = np.minimum(edge.astype(np.intp), size - 1)
-        part = (edge - whole).reshape(-1, *([1] * (values.ndim - 1)))
-        at = sums[whole] * (1 - part) + sums[whole + 1] * part
-        out = (np.diff(at, axis=0) * (n / size)).astype(np.float32)
-    return np.moveaxis(out, 0, axis)
-
-
-_CODES = np.arange(256) / 255.0
-_LINEAR = np.where(
-    _CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4
-).astype(np.float32)  # fmt: skip
-
-
-def _encode(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The sRGB transfer curve of values of at least 0."""
-    high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)

@@ -12,26 +12,28 @@ from pxr import Usd, UsdShade
 
 from wavecomb.material_table import own_parameters, preview_programs, programs
 from wavecomb.usd import mtlx
-from wavecomb.usd.graphs.node import PARAMETERS
 from wavecomb.usd.graphs.surface import Drivers
-from wavecomb.usd.looks.asset_files import asset_file
-from wavecomb.usd.looks.colour_space import SRGB, canonical, read_colour, space_of
-from wavecomb.usd.looks.input_values import InputValues
+from wavecomb.usd.graphs.values import PARAMETERS
+from wavecomb.usd.looks.colour_space import SRGB, canonical
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
+    InputValues,
     Source,
+    asset_file,
     colour,
     number,
     pair,
+    read_colour,
     shader_id,
     source_of,
+    space_of,
     word,
 )
 from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
 
 if TYPE_CHECKING:
+    from wavecomb.usd.looks.pixels import Image
     from wavecomb.usd.looks.texture import TextureTable, TiledImage
-    from wavecomb.usd.looks.texture_cache import Image
     from wavecomb.usd.stage.report import LoadReport
 
 INPUTS: dict[str, tuple[str, Any]] = {
@@ -102,7 +104,7 @@ class PreviewReader:
         self.textures = textures
         self.report = report
         self.drivers = Drivers(mtlx.networks(material, time, textures, report))
-        self.values = InputValues(time, report, self.drivers.networks, primvars)
+        self.values = InputValues(time, report, self.drivers.networks.node, primvars)
         self._by_object = True
         self.uv_names = self.drivers.networks.uv_names
         self.textured = self.drivers.textured

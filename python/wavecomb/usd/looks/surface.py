@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from wavecomb.usd.graphs.node import Value
-    from wavecomb.usd.graphs.program import Graph
+    from wavecomb.usd.graphs.values import Graph, Value
 
 NUMBER, COLOUR, SWITCH = "number", "colour", "switch"
 
@@ -64,6 +63,11 @@ class SurfaceGraph:
     primvars: tuple[str, ...] = ()
     in_object_space: bool = False
     outputs: tuple[tuple[str, Value], ...] = field(default=(), compare=False, repr=False)
+
+    @property
+    def depends_on_mesh(self) -> bool:
+        """Whether the graph differs from mesh to mesh."""
+        return bool(self.primvars) or self.in_object_space
 
 
 COLOUR_PARAMETERS = ("base_color", "specular_color", "emission")

@@ -13,31 +13,30 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from wavecomb.errors import WavecombError
-from wavecomb.machine import give_back_memory
+from wavecomb.machine import give_back_memory, temporary_folder
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import memory
-from wavecomb.usd.looks.asset_files import UDIM, image_files, tile_files
-from wavecomb.usd.looks.colour_space import LINEAR, OCIO_NAMES, RAW, SRGB, canonical, convert
-from wavecomb.usd.looks.pixels import ReadAhead, TextureError, halve, read_image, stamp_of
-from wavecomb.usd.looks.texture_cache import Image, TextureCache
+from wavecomb.usd.looks.colour_space import (
+    LINEAR,
+    OCIO_NAMES,
+    RAW,
+    SRGB,
+    canonical,
+    convert,
+    halve,
+    to_linear,
+)
+from wavecomb.usd.looks.network import UDIM, image_files, tile_files
+from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
 
-_WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black"}
-
+_WRAPS = ("repeat", "clamp", "mirror", "black")
 
 CURVE = "sRGB curve"
 """In place of a space to convert from: only the transfer curve of sRGB is undone, by the core."""
-
-
-def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
-    """The sRGB transfer curve of IEC 61966-2-1, encoded to linear."""
-    v = np.asarray(values, np.float32)
-    low = v / np.float32(12.92)
-    high = ((np.maximum(v, 0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    return np.where(v <= 0.04045, low, high).astype(np.float32)
 
 
 def checker() -> NDArray[np.uint8]:
@@ -50,48 +49,22 @@ Key = tuple[str, str, str, str]
 """A plain texture: its file, the space that it is converted from, and its wrap modes."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class TiledImage:
-    """The images of a UDIM texture; what holds for all is asked of the first.
+    """The images of a UDIM texture.
 
     Attributes:
-        first: That of the lowest number.
-        tiles: Their files by number.
+        first: Image of the lowest number.
+        tiles: Numbers and files.
     """
 
     first: Image
     tiles: tuple[tuple[int, str], ...]
 
-    @property
-    def channels(self) -> int:
-        """Channels of each pixel."""
-        return self.first.channels
-
-    @property
-    def dtype(self) -> Any:
-        """The type of the pixels."""
-        return self.first.dtype
-
-    @property
-    def wraps(self) -> tuple[str, str]:
-        """Tiles do not wrap."""
-        return ("clamp", "clamp")
-
-    @property
-    def automatic_srgb(self) -> bool:
-        """As of an ``Image``."""
-        return self.first.automatic_srgb
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """Arguments of ``SceneBuilder.add_texture``."""
-
-    name: str
-    pixels: NDArray[Any]
-    srgb: bool
-    wrap_s: str
-    wrap_t: str
+    def __post_init__(self) -> None:
+        """Takes over what ``Image`` says of the first tile; tiles do not wrap."""
+        self.channels, self.dtype = self.first.channels, self.first.dtype
+        self.wraps, self.automatic_srgb = ("clamp", "clamp"), self.first.automatic_srgb
 
 
 def _converts(space: str) -> bool:
@@ -104,6 +77,53 @@ def stored_type(image: Image, space: str) -> Any:
     if image.dtype == np.uint8 and _converts(space):
         return np.dtype(np.float16)
     return image.dtype
+
+
+@dataclass(frozen=True)
+class TextureCache:
+    """The textures of a scene, for later ones to share.
+
+    Attributes:
+        scene: That holds them.
+        images: What they were made of, by file; without pixels.
+        ids: Texture ids by file and options.
+        store: What keeps them within a limit.
+    """
+
+    scene: _core.Scene
+    images: dict[str, Image]
+    ids: dict[tuple[Any, ...], int]
+    store: _core.TextureStore | None = None
+
+
+MEGABYTE = 1_000_000
+
+
+def texture_store(
+    limit: float | None, reuse: TextureCache | None, report: LoadReport
+) -> _core.TextureStore | None:
+    """What keeps textures within ``limit`` MB; None: nothing does.
+
+    That of ``reuse`` where it has the same limit, so that the limit is for what is shared too.
+
+    Raises:
+        WavecombError: The limit cannot be.
+    """
+    from wavecomb import _core
+
+    if limit is None:
+        return None
+    bytes_ = int(min(limit * MEGABYTE, 2**63))
+    if reuse is not None and reuse.store is not None and reuse.store.limit_bytes == bytes_:
+        return reuse.store
+    obstacle = _core.TextureStore.obstacle()
+    if obstacle:
+        report.note(f"texture limit {limit:g} MB: kept by leaving out mip levels, as {obstacle}")
+        return None
+    try:
+        return _core.TextureStore(bytes_, temporary_folder())
+    except ValueError as error:
+        raise WavecombError(str(error)) from None
 
 
 class TextureTable:
@@ -235,15 +255,15 @@ class TextureTable:
             return self._add_tiles(path, image, colour_space, is_colour, missing)
         path = self._twin(path)
         space = self._space(path, image, colour_space, is_colour)
-        wraps = _WRAPS.get(wrap_s, "black"), _WRAPS.get(wrap_t, "black")
-        texture: Key = (path, space, *wraps)
+        s, t = (mode if mode in _WRAPS else "black" for mode in (wrap_s, wrap_t))
+        texture: Key = (path, space, s, t)
         key = (*texture, self.drops.get(texture, 0))
         if key not in self._ids:
             reuse = self._reuse
             if reuse is not None and key in reuse.ids and image is self._known(path):
                 self._ids[key] = self._builder.share_texture(reuse.scene, reuse.ids[key])
             else:
-                self._ids[key] = self._add(path, image, space, *wraps)
+                self._ids[key] = self._add(path, image, space, s, t)
             self._report.tally("textures")
         return self._ids[key]
 
@@ -286,70 +306,59 @@ class TextureTable:
             return CURVE if space == SRGB else RAW
         return RAW if space == OCIO_NAMES[self.working] else space
 
-    def _prepared(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> Prepared:
-        """The pixels of an image, taken, as the core is given them."""
+    def _as_stored(
+        self, path: str, image: Image, space: str, wraps: tuple[str, str]
+    ) -> NDArray[Any]:
+        """Takes the pixels of an image as the core stores them, without its dropped levels."""
         pixels = image.take()
-        srgb = space == CURVE
         dtype = stored_type(image, space)
         if _converts(space):
             top = 65504.0 if dtype == np.float16 else 3.4e38
             linear = np.clip(convert(pixels, space, self.working), -top, top)
             pixels = np.ascontiguousarray(linear, dtype)
-        elif srgb and pixels.dtype != np.uint8:
+        elif space == CURVE and pixels.dtype != np.uint8:
             colours = 3 if image.channels >= 3 else 1
             linear = to_linear(pixels[..., :colours])
             linear = np.concatenate([linear, pixels[..., colours:]], axis=2)
             pixels = np.ascontiguousarray(linear, image.dtype)
-        for _ in range(self.drops.get((path, space, wrap_s, wrap_t), 0)):
-            pixels = halve(pixels, srgb)
-        return Prepared(path, pixels, srgb, wrap_s, wrap_t)
+        for _ in range(self.drops.get((path, space, *wraps), 0)):
+            pixels = halve(pixels, space == CURVE)
+        return pixels
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # Gone from memory once it is in the scene; a second use in another way reads it again.
+        # An image is dropped once it is in the scene; another use of the file reads it again.
         here = image if image.is_here else read_image(path)
-        ready = self._prepared(path, here, space, wrap_s, wrap_t)
+        pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
         if self.store is not None:
             self.store.set_waiting(self._ahead.bytes)
         try:
             return self._builder.add_texture(
-                ready.pixels, srgb=ready.srgb, wrap_s=wrap_s, wrap_t=wrap_t, name=path
+                pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
         except ValueError as error:  # no room for it
             raise WavecombError(str(error)) from None
         finally:
             if self.store is not None:
-                # Else the allocator keeps what images took.
-                del ready
+                # Else the allocator keeps the memory of images.
+                del pixels
                 give_back_memory()
 
-    def again(self, number: int) -> Prepared:
-        """What a texture of an image, by its id, was made of: read once more.
-
-        Raises:
-            TextureError: Its file is no longer what it was.
-        """
-        key = next(key for key, known in self._ids.items() if known == number)
-        if len(key) != 5:
-            return Prepared("missing texture", checker(), False, "repeat", "repeat")
-        path, space, wrap_s, wrap_t, _ = key
-        return self._prepared(path, read_image(path), space, wrap_s, wrap_t)
-
     def mean(self, number: int) -> NDArray[np.float64]:
-        """(4,) Linear mean of a texture's file, read once more; 1 where there is no file."""
+        """Reads a texture's file again for its linear mean (4,); 1 where there is no file."""
         key = next((key for key, known in self._ids.items() if known == number), ())
         if len(key) == 3:  # of tiles
             means = [self.mean(tile) for _, tile in key[1]]
             return np.asarray(np.mean(means, axis=0)) if means else np.ones(4)
         if len(key) != 5:
             return np.ones(4)
+        path, space, wrap_s, wrap_t, _ = key
         try:
-            ready = self.again(number)
+            pixels = self._as_stored(path, read_image(path), space, (wrap_s, wrap_t))
         except (TextureError, OSError, ValueError):
             return np.ones(4)
-        pixels = ready.pixels
         values = pixels.astype(np.float32) / (255.0 if pixels.dtype == np.uint8 else 1.0)
         colours = 3 if values.shape[2] >= 3 else 1
-        if ready.srgb and pixels.dtype == np.uint8:
+        if space == CURVE and pixels.dtype == np.uint8:
             values[..., :colours] = to_linear(values[..., :colours])
         found = np.nan_to_num(values).mean(axis=(0, 1), dtype=np.float64)
         alpha = found[colours] if len(found) > colours else 1.0

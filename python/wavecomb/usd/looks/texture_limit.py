@@ -22,9 +22,8 @@ from pxr import Tf, Usd, UsdGeom
 from wavecomb.usd.geometry.mesh_arrays import UV_NAMES
 from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.looks.material import MaterialTable, bound_materials
-from wavecomb.usd.looks.pixels import TextureError, read_header
-from wavecomb.usd.looks.texture import Key, TextureTable, stored_type
-from wavecomb.usd.looks.texture_cache import MEGABYTE, Image
+from wavecomb.usd.looks.pixels import Image, TextureError, read_header
+from wavecomb.usd.looks.texture import MEGABYTE, Key, TextureTable, stored_type
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 

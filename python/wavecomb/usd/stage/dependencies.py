@@ -11,7 +11,7 @@ from pathlib import Path
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from wavecomb.usd import mtlx
-from wavecomb.usd.looks.asset_files import UDIM, asset_file, tile_files
+from wavecomb.usd.looks.network import UDIM, asset_file, tile_files
 from wavecomb.usd.stage.diagnostics import captured
 from wavecomb.usd.stage.opening import open_stage
 from wavecomb.usd.stage.report import LoadReport

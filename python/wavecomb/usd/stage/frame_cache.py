@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Gf, Usd
 
-from wavecomb.usd.looks.texture_cache import TextureCache
+from wavecomb.usd.looks.texture import TextureCache
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.varying import Varying
 

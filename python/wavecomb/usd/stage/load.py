@@ -39,8 +39,7 @@ from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.lights.light import LightReader
 from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.material import MaterialTable
-from wavecomb.usd.looks.texture import TextureTable
-from wavecomb.usd.looks.texture_cache import MEGABYTE, TextureCache, texture_store
+from wavecomb.usd.looks.texture import MEGABYTE, TextureCache, TextureTable, texture_store
 from wavecomb.usd.stage.catchers import IGNORED, check_there, set_catchers
 from wavecomb.usd.stage.choice import RenderChoice
 from wavecomb.usd.stage.diagnostics import NOT_TEXT, captured, commentary
@@ -154,8 +153,6 @@ def load_stage(
             store = None if store_factory is None else store_factory(report)
             builder = builder_factory()
         textures = TextureTable(builder, report, threads, reuse, chosen.working_space, store)
-        if hasattr(builder, "read_again"):  # it has no pixels of its own
-            builder.read_again = textures.again
 
         def surfaces_of(materials: MaterialTable) -> Surfaces:
             return Surfaces(

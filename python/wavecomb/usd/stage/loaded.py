@@ -18,7 +18,7 @@ from wavecomb.usd.volumes.info import VolumeFacts
 
 if TYPE_CHECKING:
     from wavecomb import _core
-    from wavecomb.usd.looks.texture_cache import TextureCache
+    from wavecomb.usd.looks.texture import TextureCache
 
 
 @dataclass

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.looks.assign import Draw
-from wavecomb.usd.looks.texture_cache import MEGABYTE
+from wavecomb.usd.looks.texture import MEGABYTE
 from wavecomb.usd.stage.group import Group, Scope, placed_volumes
 from wavecomb.usd.stage.instancing import sound
 from wavecomb.usd.stage.origin import Origin

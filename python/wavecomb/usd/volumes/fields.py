@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from pxr import Usd, UsdVol
 
-from wavecomb.usd.looks.asset_files import asset_file
-from wavecomb.usd.looks.network import word
+from wavecomb.usd.looks.network import asset_file, word
 from wavecomb.usd.stage.report import LoadReport
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from pxr import Usd, UsdShade
 
-from wavecomb.usd.looks.colour_space import holds_colour, read_colour
 from wavecomb.usd.looks.network import (
     MAX_DEPTH,
     colour,
+    holds_colour,
     number,
+    read_colour,
     shader_id,
     source_of,
     value_of,

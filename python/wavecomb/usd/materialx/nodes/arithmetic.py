@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import Value, numbers
+from wavecomb.usd.graphs.values import Expressions, Value, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import NORMAL, NUMBER
+from wavecomb.usd.graphs.values import Value, fit, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.materialx.nodes.images import read_image
 

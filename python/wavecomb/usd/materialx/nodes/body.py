@@ -7,8 +7,8 @@ from typing import Any
 
 from pxr import Sdf
 
-from wavecomb.usd.graphs.node import Value, numbers
 from wavecomb.usd.graphs.surface import NORMAL, NUMBER
+from wavecomb.usd.graphs.values import Value, numbers
 from wavecomb.usd.looks.network import Source
 from wavecomb.usd.materialx.library import WIDTHS, Feed, FlatGraph, Inner
 from wavecomb.usd.materialx.nodes.call import NodeCall

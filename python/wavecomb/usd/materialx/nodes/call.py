@@ -8,9 +8,8 @@ from typing import Any, Protocol
 
 from pxr import Sdf, Usd
 
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import NORMAL, NUMBER
+from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
 from wavecomb.usd.looks.network import Source, word
 from wavecomb.usd.stage.report import LoadReport
 

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.expressions import Expressions, in_working_space
-from wavecomb.usd.graphs.node import Value, fit, numbers
-from wavecomb.usd.graphs.surface import COLOURS
+from wavecomb.usd.graphs.surface import COLOURS, in_working_space
+from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 LUMA = (0.2722287, 0.6740818, 0.0536895)

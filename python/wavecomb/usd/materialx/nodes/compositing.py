@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import Value, numbers
+from wavecomb.usd.graphs.values import Expressions, Value, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 ONE = numbers(1.0)

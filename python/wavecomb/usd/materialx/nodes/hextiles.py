@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import Value, fit, is_constant, numbers
 from wavecomb.usd.graphs.surface import NORMAL
+from wavecomb.usd.graphs.values import Expressions, Value, fit, is_constant, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.materialx.nodes.colours import LUMA
 from wavecomb.usd.materialx.nodes.images import read_image, stretch_of

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import math
 
-from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import COLOURS, NORMAL, uv_matrix
-from wavecomb.usd.looks.asset_files import asset_file
-from wavecomb.usd.looks.colour_space import space_of
+from wavecomb.usd.graphs.values import Value, fit, numbers
+from wavecomb.usd.looks.network import asset_file, space_of
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}

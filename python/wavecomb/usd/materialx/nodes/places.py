@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.expressions import in_working_space
-from wavecomb.usd.graphs.node import Value, fit, numbers
-from wavecomb.usd.graphs.surface import COLOURS, NORMAL
+from wavecomb.usd.graphs.surface import COLOURS, NORMAL, in_working_space
+from wavecomb.usd.graphs.values import Value, fit, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.materialx.nodes.spaces import tangent_of_object
 from wavecomb.usd.stage.times import frame_number

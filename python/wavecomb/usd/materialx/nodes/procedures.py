@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.node import Value, numbers
+from wavecomb.usd.graphs.values import Value, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}

@@ -8,9 +8,8 @@ those rows over their determinant.
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.expressions import Expressions
-from wavecomb.usd.graphs.node import Value, fit, numbers
 from wavecomb.usd.graphs.surface import NORMAL, NUMBER
+from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
 NODES: dict[str, Handler] = {}

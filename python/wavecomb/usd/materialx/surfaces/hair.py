@@ -8,21 +8,16 @@ and scales of its lobes. What a node drives is turned round by a graph.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pxr import Usd, UsdShade
+from pxr import UsdShade
 
 from wavecomb.picture.working_space import LUMINANCE
-from wavecomb.usd.graphs.node import Value, fit, is_constant, numbers
-from wavecomb.usd.graphs.surface import Drivers
+from wavecomb.usd.graphs.values import fit, is_constant, numbers
 from wavecomb.usd.looks.network import colour, number, pair, shader_id, source_of, value_of
 from wavecomb.usd.looks.surface import Surface
 from wavecomb.usd.materialx.nodes.hair import color_divisor
-from wavecomb.usd.materialx.nodes.network import Networks
-
-if TYPE_CHECKING:
-    from wavecomb.usd.looks.texture import TextureTable
-    from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.materialx.surfaces.openpbr import SurfaceReader
 
 _LOBES = {"R": (0.1, 0.1), "TT": (0.05, 0.05), "TRT": (0.2, 0.2)}
 """Lobes, with the defaults of their roughnesses."""
@@ -49,30 +44,18 @@ def _inverse(function: Any, wanted: float) -> float:
     return 0.5 * (low + high)
 
 
-class HairReader:
-    """Reads one ``chiang_hair_bsdf``."""
-
-    def __init__(
-        self,
-        material: Usd.Prim,
-        time: Usd.TimeCode,
-        textures: TextureTable,
-        report: LoadReport,
-    ) -> None:
-        self.material = material
-        self.time = time
-        self.report = report
-        self.drivers = Drivers(Networks(material, time, textures, report))
+class HairReader(SurfaceReader):
+    """Reads a ``chiang_hair_bsdf``."""
 
     def read(self, shader: UsdShade.Shader) -> Surface:
         """The surface; what it cannot show is said."""
-        parameters: dict[str, Any] = {}
-        self._put(parameters, "ior", self.drivers.value(shader, "ior", "ior") or (1.55,))
+        parameters = self.parameters
+        self.put("ior", self.drivers.value(shader, "ior", "ior") or (1.55,))
         if parameters.get("ior", 1.55) < 1.0:
             self.report.warn("ior of hair below 1: set to 1.55", self.material.GetPath())
             parameters["ior"] = 1.55
-        self._roughness(parameters, shader)
-        self._colour(parameters, shader)
+        self._roughness(shader)
+        self._colour(shader)
         # MaterialX's angle turns the other way, and 0.5 of it is no tilt.
         angle = self._number(shader, "cuticle_angle", 0.5)
         parameters["cuticle_tilt"] = min(max(90.0 - 180.0 * angle, -90.0), 90.0)
@@ -80,23 +63,18 @@ class HairReader:
             parameters[f"tint_{lobe.lower()}"] = self._tint(shader, f"tint_{lobe}")
         for name in ("normal", "curve_direction"):
             if source_of(shader, name, self.time) is not None:
-                self._missing(f"MaterialX chiang_hair_bsdf input {name} (the curve's own)")
+                self.missing(f"MaterialX chiang_hair_bsdf input {name} (the curve's own)")
         return self.drivers.surface("hair", parameters)
 
-    def _put(self, parameters: dict[str, Any], name: str, value: Value) -> None:
-        constant = self.drivers.put(name, value)
-        if constant is not None:
-            parameters[name] = constant if len(constant) > 1 else constant[0]
-
-    def _roughness(self, parameters: dict[str, Any], shader: UsdShade.Shader) -> None:
+    def _roughness(self, shader: UsdShade.Shader) -> None:
         """Roughnesses: those of one helper as they are, else from variances and scales."""
-        helper = self._helper(shader)
+        helper, parameters = self._helper(shader), self.parameters
         if helper is not None:
             along = self.drivers.value(helper, "longitudinal", "roughness") or (0.1,)
             low = self.drivers.networks.make.op(
                 "clamp", fit(along, 1), numbers(0.001), numbers(1.0)
             )
-            self._put(parameters, "roughness", low)
+            self.put("roughness", low)
             about = self._number(helper, "azimuthal", 0.2)
             parameters["scale_tt"] = self._number(helper, "scale_TT", 0.5)
             parameters["scale_trt"] = self._number(helper, "scale_TRT", 2.0)
@@ -104,7 +82,7 @@ class HairReader:
             pairs = {lobe: self._pair(shader, lobe) for lobe in _LOBES}
             scales = {s for _, s in pairs.values()}
             if max(scales) > min(scales):
-                self._missing(
+                self.missing(
                     "MaterialX chiang_hair_bsdf lobes of different azimuthal roughness "
                     "(that of roughness_R for all)"
                 )
@@ -140,15 +118,15 @@ class HairReader:
                 about = min(max(self._number(source.shader, "azimuthal", 0.2), 0.001), 1.0)
                 given = (variance(along) * factor**2, scale(about))
             else:
-                self._missing(
+                self.missing(
                     f"MaterialX chiang_hair_bsdf input roughness_{lobe} by a node (its default)"
                 )
         v, s = pair(given, _LOBES[lobe])
         return min(max(v, 0.001), 1.0), min(max(s, 0.001), 1.0)
 
-    def _colour(self, parameters: dict[str, Any], shader: UsdShade.Shader) -> None:
+    def _colour(self, shader: UsdShade.Shader) -> None:
         """The colour whose absorption, at the roughness of the hair, is what is asked for."""
-        about = parameters["azimuthal_roughness"]
+        about = self.parameters["azimuthal_roughness"]
         name = "absorption_coefficient"
         source = source_of(shader, name, self.time)
         node = None if source is None else source.shader
@@ -156,13 +134,13 @@ class HairReader:
             given = value_of(node, "azimuthal_roughness", self.time, 0.2)
             if abs(number(given, 0.2) - about) < 1e-6:
                 value = self.drivers.value(node, "color", "base_color") or (1.0,)
-                self._put(parameters, "base_color", fit(value, 3))
+                self.put("base_color", fit(value, 3))
                 return
         absorption = fit(self.drivers.value(shader, name, "base_color") or (0.0,), 3)
         m = self.drivers.networks.make
         root = m.op("sqrt", m.op("max", absorption, numbers(0.0)))
         value = m.op("exp", m.op("multiply", root, numbers(-color_divisor(about))))
-        self._put(parameters, "base_color", value)
+        self.put("base_color", value)
 
     def _number(self, shader: UsdShade.Shader, name: str, default: float) -> float:
         """An input that is one number for all."""
@@ -171,7 +149,7 @@ class HairReader:
             return default
         if not is_constant(value):
             what = f"MaterialX {shader_id(shader).removeprefix('ND_')} input {name} by a node"
-            self._missing(f"{what} (its default)")
+            self.missing(f"{what} (its default)")
             return default
         return float(value[0])  # type: ignore[arg-type]
 
@@ -183,12 +161,9 @@ class HairReader:
         white = (1.0, 1.0, 1.0)
         value = self.drivers.value(shader, name, "base_color")
         if value is None or not is_constant(value):
-            self._missing(f"MaterialX chiang_hair_bsdf input {name} by a node (white)")
+            self.missing(f"MaterialX chiang_hair_bsdf input {name} by a node (white)")
             return 1.0
         rgb = colour(fit(value, 3), white)
         if max(rgb) - min(rgb) > 1e-4:
-            self._missing(f"MaterialX chiang_hair_bsdf input {name} in a colour (its luminance)")
+            self.missing(f"MaterialX chiang_hair_bsdf input {name} in a colour (its luminance)")
         return min(max(sum(a * b for a, b in zip(rgb, LUMINANCE, strict=True)), 0.0), 1.0)
-
-    def _missing(self, what: str) -> None:
-        self.report.missing(what, self.material.GetPath())

@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from wavecomb.usd.looks.surface import COLOUR, NUMBER, SWITCH, InputDefinition
-from wavecomb.usd.materialx.surfaces.models import MODELS, layers_of
+from wavecomb.usd.materialx.surfaces.openpbr import MODELS, LayerInputs, layers_of
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
 _MOST = 1e6
@@ -22,19 +22,15 @@ _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness"
 """Right ends of sliders where MaterialX says nothing."""
 
 
-class _Names:
-    """Notes which inputs are read, as ``openpbr.Inputs``; 1 makes all of them be asked for."""
+class _ReadInputs(LayerInputs):
+    """Records which inputs are read; the value 1 makes ``layers_of`` read all of them."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
 
-    def number(self, name: str, default: float) -> float:
+    def constant(self, name: str, parameter: str) -> Any:
         self.read.add(name)
         return 1.0
-
-    def colour(self, name: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
-        self.read.add(name)
-        return (1.0, 1.0, 1.0)
 
     def ignored(self, *names: str) -> None:
         pass
@@ -46,7 +42,7 @@ class _Names:
 @functools.cache
 def read_inputs(model: str) -> frozenset[str]:
     """Inputs of a shading model that have an effect here, without normals."""
-    names = _Names()
+    names = _ReadInputs()
     layers_of(model, names)
     for row in MODELS[model].textured.values():
         names.read |= {name for name in (row.input, row.weight[0]) if name}

@@ -1,41 +1,48 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's surface shaders as parameters of program "openpbr": each is translated here, once.
+"""MaterialX's surface shaders as parameters of the program "openpbr".
 
-A parameter is an input times a number, whether that is a constant, a texture or a graph. What is
-no product of one input stands in ``openpbr``. Why Standard Surface does not go through MaterialX's
-own graph, ``standard_surface_to_open_pbr_surface``, is told in docs/decisions/materialx-graphs.md.
+These are standard_surface, open_pbr_surface and gltf_pbr. A parameter is an input times a number;
+the input is a constant, a plain texture, or driven by a value graph. ``layers_of`` computes the
+other parameters. docs/decisions/materialx-graphs.md says why Standard Surface is not converted by
+MaterialX's graph ``standard_surface_to_open_pbr_surface``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from wavecomb.usd.graphs.node import Value, fit, numbers
+from pxr import Usd, UsdShade
+
+from wavecomb.usd.graphs.surface import Drivers, sampled
+from wavecomb.usd.graphs.values import Value, fit, is_constant, numbers
+from wavecomb.usd.looks.network import Colour, colour, holds_colour, number, source_of
+from wavecomb.usd.looks.surface import Surface
+from wavecomb.usd.materialx.nodes.network import Networks
 
 if TYPE_CHECKING:
     from wavecomb.usd.graphs.surface import Drivers
+    from wavecomb.usd.looks.texture import TextureTable
+    from wavecomb.usd.stage.report import LoadReport
 
-Colour = tuple[float, float, float]
 
-WHITE: Colour = (1.0, 1.0, 1.0)
-PALE: Colour = (0.8, 0.8, 0.8)
-BLACK: Colour = (0.0, 0.0, 0.0)
+WHITE, PALE, BLACK = (1.0, 1.0, 1.0), (0.8, 0.8, 0.8), (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Row:
-    """Where a parameter comes from.
+    """Source of a parameter.
 
     Attributes:
-        input: Of the shader; "" where there is none, and the default counts.
-        default: Of that input: a number, a colour, or a bool for a switch.
-        factor: That a number is multiplied by.
-        divisor: That it is divided by.
-        driven: Whether a node may give it; else that node's typical value is one value for all, or
-            ``openpbr`` knows what to do with it.
-        weight: Another input that it is multiplied by, with its default.
+        input: Input of the shader.
+        default: Default of the input: a number, a colour, or a bool for a switch.
+        factor: Factor of a number.
+        divisor: Divisor of a number.
+        driven: Whether a node may drive the parameter. Otherwise the mean of the node's value is
+            used everywhere, unless ``drive_layers`` handles the input.
+        weight: Another input that multiplies this one, with its default.
     """
 
     input: str
@@ -52,9 +59,9 @@ class Model:
 
     Attributes:
         textured: Parameters that plain textures may drive.
-        normal: The input that tilts the surface.
-        layers: All other parameters; names are those of ``add_material(openpbr=...)``.
-        ignored: Inputs without effect, said where they are authored.
+        normal: Input with the shading normal.
+        layers: Other parameters, by the names of ``add_material(openpbr=...)``.
+        ignored: Inputs without effect, which are reported where they are authored.
     """
 
     textured: dict[str, Row]
@@ -62,6 +69,15 @@ class Model:
     layers: dict[str, Row]
     ignored: tuple[str, ...]
 
+
+_MEDIUM = {
+    "transmission_color": Row("transmission_color", WHITE, driven=False),
+    "transmission_depth": Row("transmission_depth", 0.0, driven=False),
+    "transmission_scatter": Row("transmission_scatter", BLACK, driven=False),
+    "transmission_scatter_anisotropy": Row("transmission_scatter_anisotropy", 0.0, driven=False),
+    "nested_priority": Row("dielectric_priority", 0.0, driven=False),
+}
+"""The medium inside, which standard_surface and open_pbr_surface describe by the same inputs."""
 
 MODELS: dict[str, Model] = {
     "standard_surface": Model(
@@ -83,13 +99,7 @@ MODELS: dict[str, Model] = {
             "anisotropy": Row("specular_anisotropy", 0.0),
             "rotation": Row("specular_rotation", 0.0),
             "transmission_weight": Row("transmission", 0.0),
-            "transmission_color": Row("transmission_color", WHITE, driven=False),
-            "transmission_depth": Row("transmission_depth", 0.0, driven=False),
-            "transmission_scatter": Row("transmission_scatter", BLACK, driven=False),
-            "transmission_scatter_anisotropy": Row(
-                "transmission_scatter_anisotropy", 0.0, driven=False
-            ),
-            "nested_priority": Row("dielectric_priority", 0.0, driven=False),
+            **_MEDIUM,
             "subsurface_weight": Row("subsurface", 0.0),
             "subsurface_color": Row("subsurface_color", WHITE),
             "subsurface_anisotropy": Row("subsurface_anisotropy", 0.0),
@@ -104,13 +114,8 @@ MODELS: dict[str, Model] = {
             "thin_walled": Row("thin_walled", False, driven=False),
         },
         ignored=(
-            "transmission_dispersion",
-            "transmission_extra_roughness",
-            "coat_anisotropy",
-            "coat_rotation",
-            "coat_affect_roughness",
-            "coat_normal",
-            "tangent",
+            *("transmission_dispersion", "transmission_extra_roughness", "tangent"),
+            *("coat_anisotropy", "coat_rotation", "coat_affect_roughness", "coat_normal"),
         ),
     ),
     "open_pbr_surface": Model(
@@ -131,13 +136,7 @@ MODELS: dict[str, Model] = {
             "specular_weight": Row("specular_weight", 1.0),
             "anisotropy": Row("specular_roughness_anisotropy", 0.0),
             "transmission_weight": Row("transmission_weight", 0.0),
-            "transmission_color": Row("transmission_color", WHITE, driven=False),
-            "transmission_depth": Row("transmission_depth", 0.0, driven=False),
-            "transmission_scatter": Row("transmission_scatter", BLACK, driven=False),
-            "transmission_scatter_anisotropy": Row(
-                "transmission_scatter_anisotropy", 0.0, driven=False
-            ),
-            "nested_priority": Row("dielectric_priority", 0.0, driven=False),
+            **_MEDIUM,
             "subsurface_weight": Row("subsurface_weight", 0.0),
             "subsurface_color": Row("subsurface_color", PALE),
             "subsurface_anisotropy": Row("subsurface_scatter_anisotropy", 0.0),
@@ -189,24 +188,8 @@ MODELS: dict[str, Model] = {
 """Shading models by the name in their shaders' ids."""
 
 
-class Inputs(Protocol):
-    """Constants of a shader's inputs."""
-
-    def number(self, name: str, default: float) -> float:
-        """A number; the default where nothing is authored."""
-
-    def colour(self, name: str, default: Colour) -> Colour:
-        """A colour; the default where nothing is authored."""
-
-    def ignored(self, *names: str) -> None:
-        """Says that inputs are authored which have no effect."""
-
-    def approximated(self, what: str) -> None:
-        """Says that something is not drawn as it is meant."""
-
-
-def layers_of(model: str, inputs: Inputs) -> dict[str, Any]:
-    """The layers of a shading model: its parameters that no plain texture drives."""
+def layers_of(model: str, inputs: LayerInputs) -> dict[str, Any]:
+    """Parameters of a shading model that plain textures cannot drive."""
     known = MODELS[model]
     inputs.ignored(*known.ignored)
     found = {name: _read(row, inputs) for name, row in known.layers.items()}
@@ -217,13 +200,12 @@ def layers_of(model: str, inputs: Inputs) -> dict[str, Any]:
     if model != "gltf_pbr":
         found["subsurface_radius"] = _free_paths(model, inputs)
         if found["subsurface_weight"] > 0 and found["transmission_weight"] > 0:
-            what = "subsurface scattering beside transmission (diffuse in its colour)"
-            inputs.approximated(what)
+            inputs.approximated("subsurface scattering beside transmission (diffuse in its colour)")
     return found
 
 
-def _free_paths(model: str, i: Inputs) -> Colour:
-    """Mean free paths below the surface, by channel."""
+def _free_paths(model: str, i: LayerInputs) -> Colour:
+    """Mean free paths of subsurface scattering, by channel."""
     if model == "standard_surface":
         scale, by_channel = i.number("subsurface_scale", 1.0), i.colour("subsurface_radius", WHITE)
     else:
@@ -232,22 +214,21 @@ def _free_paths(model: str, i: Inputs) -> Colour:
     return (scale * by_channel[0], scale * by_channel[1], scale * by_channel[2])
 
 
-def _read(row: Row, inputs: Inputs) -> Any:
+def _read(row: Row, inputs: LayerInputs) -> Any:
     if isinstance(row.default, tuple):
         return inputs.colour(row.input, row.default)
     value = inputs.number(row.input, float(row.default))
     return value != 0.0 if isinstance(row.default, bool) else value * row.factor / row.divisor
 
 
-def _standard_surface(i: Inputs, found: dict[str, Any]) -> dict[str, Any]:
+def _standard_surface(i: LayerInputs, found: dict[str, Any]) -> dict[str, Any]:
     specular = found["specular_weight"]
     if specular < 1.0 and i.number("metalness", 0.0) >= 1.0:
-        specular = 1.0  # dims the edge of a metal only; OpenPBR's weight would dim all of it
-    film = 1.0 if found["film_thickness"] > 0 else 0.0
-    return {"specular_weight": specular, "film_weight": film}
+        specular = 1.0  # dims only the edge of a metal; OpenPBR's weight would dim all of it
+    return {"specular_weight": specular, "film_weight": float(found["film_thickness"] > 0)}
 
 
-def _gltf_pbr(i: Inputs) -> dict[str, Any]:
+def _gltf_pbr(i: LayerInputs) -> dict[str, Any]:
     sheen = i.colour("sheen_color", BLACK)
     fuzz = max(sheen)
     depth = i.number("attenuation_distance", 0.0)
@@ -271,7 +252,7 @@ def _gltf_pbr(i: Inputs) -> dict[str, Any]:
 def drive_layers(
     model: str, layers: dict[str, Any], driven: dict[str, Value], drivers: Drivers
 ) -> None:
-    """Lets driven inputs drive their parameters, and takes them out of ``driven``."""
+    """Connects driven inputs to their parameters and removes them from ``driven``."""
     m = drivers.networks.make
     for parameter, row in MODELS[model].layers.items():
         if not row.driven or row.input not in driven:
@@ -294,3 +275,125 @@ def drive_layers(
         strongest = m.op("max", m.op("max", sheen[:1], sheen[1:2]), sheen[2:])
         drivers.put("fuzz_weight", strongest)
         drivers.put("fuzz_color", m.op("divide", sheen, strongest))
+
+
+class SurfaceReader:
+    """Base of readers of MaterialX surface shaders."""
+
+    def __init__(
+        self,
+        material: Usd.Prim,
+        time: Usd.TimeCode,
+        textures: TextureTable,
+        report: LoadReport,
+        values: Mapping[str, Any] | None = None,
+    ) -> None:
+        """``values``: constants that replace inputs of the surface shader."""
+        self.values = values or {}
+        self.material = material
+        self.time = time
+        self.report = report
+        self.drivers = Drivers(Networks(material, time, textures, report))
+        self.parameters: dict[str, Any] = {}
+
+    def put(self, name: str, value: Value) -> None:
+        """Sets a parameter to a constant, or lets a texture or graph drive it."""
+        constant = self.drivers.put(name, value)
+        if constant is not None:
+            self.parameters[name] = constant if len(constant) > 1 else constant[0]
+
+    def missing(self, what: str) -> None:
+        """Reports something that is not supported."""
+        self.report.missing(what, self.material.GetPath())
+
+
+class MaterialXReader(SurfaceReader):
+    """Reads a standard_surface, open_pbr_surface or gltf_pbr."""
+
+    def read(self, shader: UsdShade.Shader, model_name: str) -> Surface:
+        """The surface: parameters that textures may drive, and layers."""
+        model = MODELS[model_name]
+        self.parameters["presence"] = True
+        for parameter, row in model.textured.items():
+            weight = self._value(shader, "", *row.weight)
+            is_black = is_constant(weight) and weight[0] <= 0.0  # type: ignore[operator]
+            if parameter != "emission" or not is_black:
+                value = self._value(shader, parameter, row.input, row.default)
+                value = fit(value, 3) if isinstance(row.default, tuple) else value[:1]
+                self.put(parameter, self.drivers.scaled(value, weight))
+        if self.parameters.get("ior", 1.5) <= 0.0:
+            self.report.warn("ior of 0 or less: set to 1.5", self.material.GetPath())
+            self.parameters["ior"] = 1.5
+        normal = self.drivers.value(shader, model.normal, "normal")
+        if normal is not None:
+            self.drivers.put("normal", normal)
+        inputs = LayerInputs(self, shader, model_name)
+        layers = self.parameters["openpbr"] = layers_of(model_name, inputs)
+        if layers["anisotropy"] or any("anisotropy" in name for name in inputs.driven):
+            self.drivers.networks.uv_names.append("st")  # the direction of brushing
+        drive_layers(model_name, layers, inputs.driven, self.drivers)
+        for name in inputs.driven:
+            self.missing(f"MaterialX {model_name} input {name} by a node (one value for all)")
+        return self.drivers.surface("openpbr", self.parameters)
+
+    def _value(
+        self, shader: UsdShade.Shader, parameter: str, name: str, default: float | Colour
+    ) -> Value:
+        """The value of an input of the surface shader, or its default."""
+        if name in self.values:
+            value = self.values[name]
+            return numbers(*value) if isinstance(value, tuple) else numbers(float(value))
+        found = self.drivers.value(shader, name, parameter) if name else None
+        if found is None:
+            return default if isinstance(default, tuple) else (float(default),)
+        return found
+
+
+class LayerInputs:
+    """Constants of a shader's inputs, and means of driven ones.
+
+    Attributes:
+        driven: Varying values by input; those that drive a parameter are removed.
+    """
+
+    def __init__(self, reader: MaterialXReader, shader: UsdShade.Shader, model: str) -> None:
+        self._reader = reader
+        self._shader = shader
+        self._model = model
+        self.driven: dict[str, Value] = {}
+
+    def number(self, name: str, default: float) -> float:
+        """A number, or the default where nothing is authored."""
+        return number(self.constant(name, "number"), default)
+
+    def colour(self, name: str, default: Colour) -> Colour:
+        """A colour, or the default where nothing is authored."""
+        return colour(self.constant(name, "any_color"), default)
+
+    def ignored(self, *names: str) -> None:
+        """Reports authored inputs without effect."""
+        for name in names:
+            # Interfaces of materials connect all inputs, also to inputs without a value.
+            if source_of(self._shader, name, self._reader.time) is not None:
+                self._reader.missing(f"MaterialX {self._model} input {name} (ignored)")
+
+    def approximated(self, what: str) -> None:
+        """Reports an approximation."""
+        self._reader.missing(f"{what}: approximated")
+
+    def constant(self, name: str, parameter: str) -> Any:
+        """The value of an input; the mean of a driven one; None where nothing is authored."""
+        if name in self._reader.values:
+            return self._reader.values[name]
+        source = source_of(self._shader, name, self._reader.time)
+        if source is None:
+            return None
+        if source.is_value and not holds_colour(source.attribute):
+            return source.value
+        value = self._reader.drivers.value(self._shader, name, parameter)
+        if value is None:
+            return None
+        if not is_constant(value):
+            self.driven[name] = value
+            value = tuple(float(x) for x in sampled(value).mean(axis=0))
+        return value[0] if len(value) == 1 else value

@@ -1,0 +1,396 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values of graphs: how they are made, folded and compiled to the flat programs of the core.
+
+A value is a tuple of parts, one for each component. A part is a number, or a component of a node:
+swizzles, extractions and combinations need no operation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wavecomb import _core
+
+CODES = {name: number for number, name in enumerate(_core.GRAPH_CODES)}
+INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
+PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
+"""Parameter -> (its first component, how many it has)."""
+
+POINT_SIZE = 3 * len(INPUTS) - 3
+"""Numbers of a point: uv, its width, then position, local position, normal, local normal, tangent,
+view and the three axes of normals, of three each."""
+
+OF_SPACE = ("local_position", "local_normal", "normal_x", "normal_y", "normal_z")
+"""Inputs that depend on the object's own space."""
+
+PRIMVAR = "primvar"
+"""A node that stands for what a mesh gives."""
+
+
+class GraphTooLarge(Exception):
+    """A graph needs more registers or operations than there are."""
+
+
+class Node:
+    """One operation; equal ones are one node."""
+
+    __slots__ = ("attribute", "code", "image", "number", "operands", "width")
+
+    def __init__(
+        self,
+        code: str,
+        width: int,
+        operands: tuple[Value, ...],
+        number: int,
+        image: tuple[int, float] | None,
+        attribute: str = "",
+    ) -> None:
+        self.attribute = attribute
+        self.code = code
+        self.width = width
+        self.operands = operands
+        self.number = number
+        self.image = image
+
+    @property
+    def name(self) -> str:
+        """Which input it is; "" of other operations."""
+        return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
+
+    @property
+    def results(self) -> int:
+        """Registers that it writes."""
+        return 1 if self.code == "dot" else self.width
+
+
+Part = float | tuple[Node, int]
+Value = tuple[Part, ...]
+
+
+def is_constant(value: Value) -> bool:
+    """Whether all components are numbers."""
+    return all(isinstance(part, float) for part in value)
+
+
+def numbers(*values: float) -> Value:
+    """A constant, in 32 bits; what is not finite is 0."""
+    return tuple(float(np.float32(v)) if np.isfinite(v) else 0.0 for v in values)
+
+
+def fit(value: Value, width: int) -> Value:
+    """Another number of components: numbers spread, vectors lose or gain some."""
+    if len(value) == width:
+        return value
+    if len(value) == 1:
+        return value * width
+    if len(value) > width:
+        return value[:width]
+    return (*value, 0.0)[: min(width, 3)] + ((1.0,) if width == 4 else ())
+
+
+def nodes_of(parts: Sequence[Part]) -> list[Node]:
+    """All nodes that parts need, operands before what reads them."""
+    order: list[Node] = []
+    done: set[Node] = set()
+    stack: list[tuple[Node, bool]] = [
+        (part[0], False) for part in reversed(parts) if not isinstance(part, float)
+    ]
+    while stack:
+        node, ready = stack.pop()
+        if node in done:
+            continue
+        if ready:
+            done.add(node)
+            order.append(node)
+            continue
+        stack.append((node, True))
+        for value in reversed(node.operands):
+            stack += [(p[0], False) for p in reversed(value) if not isinstance(p, float)]
+    return order
+
+
+_OP = np.dtype(
+    [("code", "u1"), ("width", "u1"), ("steps", "u1"), ("pad", "u1"), ("to", "u2"),
+     ("operands", "u2", 4), ("number", "u2")]
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Graph:
+    """A flat program, as ``SceneBuilder.add_graph`` takes it.
+
+    ``attributes``: primvars that it reads, with how many components.
+    """
+
+    ops: bytes
+    constants: tuple[float, ...]
+    images: tuple[tuple[int, float], ...]
+    outputs: tuple[tuple[int, int], ...]
+    attributes: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its attributes."""
+        return tuple(name for name, _ in self.attributes)
+
+    @property
+    def count(self) -> int:
+        """Operations."""
+        return len(self.ops) // _OP.itemsize
+
+    def run(self, points: Any, lanes: int = 1) -> Any:
+        """Its outputs at points (n, ``POINT_SIZE``), textures taken for white, without a mesh."""
+        array = np.ascontiguousarray(points, np.float32)
+        return _core.run_graph(
+            self.ops, self.constants, self.images, self.outputs, self.names, array, lanes=lanes
+        )
+
+
+def assemble(outputs: dict[int, Part]) -> Graph:
+    """The program whose outputs are these parts, by component number.
+
+    Raises:
+        GraphTooLarge: It needs more registers or operations than there are.
+    """
+    return _Assembler(outputs).graph()
+
+
+class _Assembler:
+    """Gives nodes registers, in their order, and writes operations."""
+
+    def __init__(self, outputs: dict[int, Part]) -> None:
+        self._outputs = outputs
+        self._order = nodes_of(list(outputs.values()))
+        self._free = [True] * _core.GRAPH_REGISTERS
+        self._place: dict[Node, int] = {}
+        self._constants: list[float] = []
+        self._images: list[tuple[int, float]] = []
+        self._attributes: dict[str, int] = {}
+        self._ops: list[tuple[Any, ...]] = []
+
+    def graph(self) -> Graph:
+        last: dict[Node, int] = {}
+        for at, node in enumerate(self._order):
+            for value in node.operands:
+                last |= {part[0]: at for part in value if not isinstance(part, float)}
+        for part in self._outputs.values():
+            if not isinstance(part, float):
+                last[part[0]] = len(self._order)
+        for at, node in enumerate(self._order):
+            self._write(node)
+            for read in {
+                p[0] for value in node.operands for p in value if not isinstance(p, float)
+            }:
+                if last[read] == at:
+                    self._release(self._place[read], read.results)
+        outputs = tuple(
+            (number, self._operand((part,))[0]) for number, part in sorted(self._outputs.items())
+        )
+        if len(self._ops) > _core.GRAPH_OPS or len(self._constants) >= _core.GRAPH_CONSTANT:
+            raise GraphTooLarge(f"{len(self._ops)} operations")
+        ops = np.array(self._ops, _OP).tobytes() if self._ops else b""
+        return Graph(
+            ops, tuple(self._constants), tuple(self._images), outputs,
+            tuple(self._attributes.items()),
+        )  # fmt: skip
+
+    def _write(self, node: Node) -> None:
+        operands, steps, copies = [0] * 4, 0, []
+        for k, value in enumerate(node.operands):
+            place, step, copied = self._operand(value)
+            operands[k] = place
+            steps |= step << k
+            if copied:
+                copies.append((place, len(value)))
+        to = self._place[node] = self._take(node.results)
+        number = node.number
+        if node.image is not None:
+            number = self._image(node.image)
+        if node.attribute:
+            known = self._attributes
+            known[node.attribute] = max(known.get(node.attribute, 0), node.width)
+            number = list(known).index(node.attribute)
+        self._emit(node.code, node.width, steps, to, operands, number)
+        for place, width in copies:
+            self._release(place, width)
+
+    def _operand(self, value: Value) -> tuple[int, int, bool]:
+        """Where a value is, whether it is a vector, and whether it was copied to be there."""
+        if len(set(value)) == 1:
+            return self._single(value[0]), 0, False
+        if is_constant(value):
+            return self._constant(value), 1, False
+        first = value[0]
+        if not isinstance(first, float):
+            node, at = first
+            if value == tuple((node, at + i) for i in range(len(value))):
+                return self._place[node] + at, 1, False
+        places = [self._single(part) for part in value] + [0] * (4 - len(value))
+        to = self._take(len(value))
+        self._emit("copy", len(value), 0, to, places, 0)
+        return to, 1, True
+
+    def _single(self, part: Part) -> int:
+        if isinstance(part, float):
+            return self._constant((part,))
+        return self._place[part[0]] + part[1]
+
+    def _constant(self, value: Value) -> int:
+        wanted = [float(part) for part in value]  # type: ignore[arg-type]
+        keys = [np.float32(x).tobytes() for x in wanted]
+        have = [np.float32(x).tobytes() for x in self._constants]
+        for at in range(len(have) - len(keys) + 1):
+            if have[at : at + len(keys)] == keys:
+                return int(_core.GRAPH_CONSTANT) + at
+        self._constants += wanted
+        return int(_core.GRAPH_CONSTANT) + len(self._constants) - len(wanted)
+
+    def _image(self, image: tuple[int, float]) -> int:
+        if image not in self._images:
+            self._images.append(image)
+        return self._images.index(image)
+
+    def _take(self, width: int) -> int:
+        for at in range(len(self._free) - width + 1):
+            if all(self._free[at : at + width]):
+                self._free[at : at + width] = [False] * width
+                return at
+        raise GraphTooLarge(f"more than {len(self._free)} values at once")
+
+    def _release(self, at: int, width: int) -> None:
+        self._free[at : at + width] = [True] * width
+
+    def _emit(
+        self, code: str, width: int, steps: int, to: int, operands: list[int], number: int
+    ) -> None:
+        self._ops.append((CODES[code], width, steps, 0, to, tuple(operands), number))
+
+
+_WHOLE = {"dot", "cross", "rgbtohsv", "hsvtorgb", "image", "input", "copy"}
+_POINTS = {"noise2": 2, "noise3": 3, "fractal3": 3, "cell2": 2, "cell3": 3, "worley2": 2,
+           "worley3": 3}  # fmt: skip
+
+
+class Expressions:
+    """Makes nodes, each once, and folds what is constant."""
+
+    def __init__(self) -> None:
+        self._nodes: dict[tuple[Any, ...], Node] = {}
+
+    def input(self, name: str) -> Value:
+        """What the surface says: of ``GRAPH_INPUTS``."""
+        width = 2 if name == "uv" else 3
+        return self._all(self._node("input", width, (), INPUTS[name]))
+
+    def image(self, texture: int, uv: Value, stretch: float) -> Value:
+        """r, g, b and alpha of a texture."""
+        return self._all(self._node("image", 4, (uv,), 0, (texture, stretch)))
+
+    def primvar(self, number: int, otherwise: Value) -> Value:
+        """A value that each mesh gives; ``otherwise`` where it does not. Replaced before use."""
+        return self._all(self._node(PRIMVAR, len(otherwise), (otherwise,), number))
+
+    def again(self, node: Node, operands: tuple[Value, ...]) -> Value:
+        """A node with other operands."""
+        if node.code == "input":
+            return self.input(node.name)
+        if node.code == "image" and node.image is not None:
+            return self.image(node.image[0], operands[0], node.image[1])
+        if node.attribute:
+            return self.attribute(node.attribute, node.width, operands[0])
+        return self.op(node.code, *operands, number=node.number, width=node.width)
+
+    def attribute(self, name: str, width: int, fallback: Value) -> Value:
+        """A primvar of the mesh at hits; ``fallback`` where it has none of so many components."""
+        return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
+
+    def op(self, code: str, *operands: Value, number: int = 0, width: int = 0) -> Value:
+        """An operation on values: component by component but for those on whole vectors.
+
+        ``width``: components of the result where the operands do not say.
+        """
+        if code in _POINTS:
+            point = fit(operands[0], _POINTS[code])
+            rest = operands[1:]
+            return self._whole(code, width, (point, *rest), number)
+        widest = max(len(value) for value in operands)
+        wide = tuple(fit(value, widest) for value in operands)
+        if code in _WHOLE:
+            return self._whole(code, widest, wide, number)
+        return self._by_component(code, wide, widest)
+
+    def _whole(self, code: str, width: int, operands: tuple[Value, ...], number: int) -> Value:
+        node = self._node(code, width, operands, number)
+        value = self._all(node)
+        return self._folded(value) if all(is_constant(v) for v in operands) else value
+
+    def _by_component(self, code: str, operands: tuple[Value, ...], width: int) -> Value:
+        known: dict[int, Part] = {}
+        for i in range(width):
+            parts = tuple(value[i] for value in operands)
+            simple = _simplified(code, parts)
+            if simple is not None:
+                known[i] = simple
+            elif all(isinstance(part, float) for part in parts):
+                one = self._node(code, 1, tuple((part,) for part in parts))
+                known[i] = self._folded(self._all(one))[0]
+        open_ones = {tuple(value[i] for value in operands) for i in range(width) if i not in known}
+        if len(open_ones) == 1:
+            (parts,) = open_ones
+            node = self._node(code, 1, tuple((part,) for part in parts))
+            return tuple(known.get(i, (node, 0)) for i in range(width))
+        if not open_ones:
+            return tuple(known[i] for i in range(width))
+        node = self._node(code, width, operands)
+        return tuple(known.get(i, (node, i)) for i in range(width))
+
+    def _folded(self, value: Value) -> Value:
+        graph = assemble(dict(enumerate(value)))
+        row = graph.run(np.zeros((1, POINT_SIZE), np.float32))[0]
+        return numbers(*(float(x) for x in row))
+
+    def _all(self, node: Node) -> Value:
+        return tuple((node, i) for i in range(node.results))
+
+    def _node(
+        self,
+        code: str,
+        width: int,
+        operands: tuple[Value, ...],
+        number: int = 0,
+        image: tuple[int, float] | None = None,
+        attribute: str = "",
+    ) -> Node:
+        key = (code, width, operands, number, image, attribute)
+        node = self._nodes.get(key)
+        if node is None:
+            node = self._nodes[key] = Node(code, width, operands, number, image, attribute)
+        return node
+
+
+def _simplified(code: str, parts: tuple[Part, ...]) -> Part | None:
+    """What an operation comes to without one; None where it is needed."""
+    a = parts[0]
+    b = parts[1] if len(parts) > 1 else None
+    if code == "add":
+        return b if a == 0.0 else a if b == 0.0 else None
+    if code == "subtract":
+        return a if b == 0.0 else None
+    if code == "multiply":
+        if a == 0.0 or b == 0.0:
+            return 0.0
+        return b if a == 1.0 else a if b == 1.0 else None
+    if code in ("divide", "power"):
+        return a if b == 1.0 else None
+    if code == "mix":
+        c = parts[2]
+        return a if c == 0.0 or a == b else b if c == 1.0 else None
+    if code == "select":
+        if isinstance(a, float):
+            return b if a != 0.0 else parts[2]
+        return b if b == parts[2] else None
+    return None

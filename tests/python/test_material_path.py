@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files that a material passes from USD to its kernel: few enough to be read in one sitting."""
+
+import functools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_texture_limit import write_image
+from usd_recorder import QUAD, load
+
+import wavecomb
+import wavecomb.usd.materialx.nodes.network
+import wavecomb.usd.materialx.surfaces.openpbr
+from wavecomb.usd.looks.assign import Assigner
+from wavecomb.usd.looks.material import MaterialTable
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = Path(wavecomb.__file__).parent
+
+MOST = 23
+"""Files of Python and C++ together."""
+
+NOT_ON_THE_PATH = {"isa.py", "usd/stage/report.py"}
+"""The choice of the native library, and the messages about the stage."""
+
+NATIVE = (
+    "bindings/materials.cpp",  # add_material and add_texture
+    "bindings/scene_values.cpp",  # keywords to members of Material
+    "src/wavecomb/scene/material_data.h",  # Material and MaterialRecord
+    "src/wavecomb/scene/settled_material.cpp",  # Material without inputs that have no effect
+    "src/wavecomb/scene/scene_materials.cpp",  # Material to MaterialRecord
+    "src/wavecomb/surface/inputs.inl",  # inputs at a hit: constants and textures
+    "src/wavecomb/material/params.h",  # MaterialRecord to parameters at a hit
+)
+KERNELS = {
+    "UsdPreviewSurface": (
+        "src/wavecomb/scene/material_table.h",
+        "src/wavecomb/material/programs/principled.h",
+    ),
+    "ND_open_pbr_surface_surfaceshader": (
+        "src/wavecomb/scene/openpbr_data.h",
+        "src/wavecomb/material/openpbr_params.h",
+        "src/wavecomb/material/programs/openpbr.h",
+    ),
+}
+
+PREVIEW = """
+    def Shader "S" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </M/T.outputs:rgb>
+        float inputs:roughness = 0.3
+        token outputs:surface
+    }
+    def Shader "T" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @./map.png@
+        float2 inputs:st.connect = </M/R.outputs:result>
+        float3 outputs:rgb
+    }
+    def Shader "R" {
+        uniform token info:id = "UsdPrimvarReader_float2"
+        string inputs:varname = "st"
+        float2 outputs:result
+    }
+"""
+OPEN_PBR = """
+    def Shader "S" {
+        uniform token info:id = "ND_open_pbr_surface_surfaceshader"
+        color3f inputs:base_color.connect = </M/T.outputs:out>
+        float inputs:specular_roughness = 0.3
+        token outputs:surface
+    }
+    def Shader "T" {
+        uniform token info:id = "ND_image_color3"
+        asset inputs:file = @./map.png@
+        color3f outputs:out
+    }
+"""
+
+
+@pytest.fixture
+def traced(monkeypatch):
+    """Files of the package whose functions run while materials are read and added."""
+    files, depth = set(), [0]
+
+    def note(frame, event, _):
+        name = Path(frame.f_code.co_filename)
+        if event == "call" and PACKAGE in name.parents:
+            files.add(name.relative_to(PACKAGE).as_posix())
+
+    def watched(function):
+        @functools.wraps(function)
+        def call(*arguments, **options):
+            depth[0] += 1
+            if depth[0] == 1:
+                sys.setprofile(note)
+            try:
+                return function(*arguments, **options)
+            finally:
+                depth[0] -= 1
+                if depth[0] == 0:
+                    sys.setprofile(None)
+
+        return call
+
+    for owner, names in (
+        (MaterialTable, ("expect", "surface", "add")),
+        (Assigner, ("assign", "uv_names")),
+    ):
+        for name in names:
+            monkeypatch.setattr(owner, name, watched(getattr(owner, name)))
+    return files
+
+
+@pytest.mark.parametrize("shader", KERNELS)
+def test_a_material_passes_few_files(tmp_path, traced, shader):
+    write_image(tmp_path / "map.png", np.full((4, 4, 3), 90, np.uint8))
+    text = PREVIEW if shader == "UsdPreviewSurface" else OPEN_PBR
+    output = "" if shader == "UsdPreviewSurface" else "mtlx:"
+    scene, _ = load(
+        tmp_path,
+        f"""def Mesh "Q" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
+            {QUAD}
+            texCoord2f[] primvars:st = [(0,0), (1,0), (1,1), (0,1)] (interpolation = "vertex")
+            rel material:binding = </M>
+        }}
+        def Material "M" {{
+            token outputs:{output}surface.connect = </M/S.outputs:surface>
+            {text}
+        }}""",
+    )
+    material = scene.material_of("/Q")
+    assert material["textures"]["base_color"] and material["roughness"] == pytest.approx(0.3)
+    native = [*NATIVE, *KERNELS[shader]]
+    assert [name for name in native if not (ROOT / name).is_file()] == []
+    python = sorted(traced - NOT_ON_THE_PATH)
+    assert len(python) + len(native) <= MOST, "\n".join([*python, *native])
