@@ -19,7 +19,7 @@ from wavecomb import _core
 from wavecomb.scenes import write_scene
 from wavecomb.scenes.network import Network
 from wavecomb.usd import load_stage
-from wavecomb.usd.materialx.nodes.hair import color_divisor
+from wavecomb.usd.materialx.nodes.colours import color_divisor
 from wavecomb.usd.materialx.surfaces.hair import scale, variance
 
 STRAND = """

@@ -35,26 +35,16 @@ class GraphTooLarge(Exception):
     """A graph needs more registers or operations than there are."""
 
 
+@dataclass(eq=False, slots=True)
 class Node:
-    """One operation; equal ones are one node."""
+    """One operation; ``Expressions`` makes equal ones once."""
 
-    __slots__ = ("attribute", "code", "image", "number", "operands", "width")
-
-    def __init__(
-        self,
-        code: str,
-        width: int,
-        operands: tuple[Value, ...],
-        number: int,
-        image: tuple[int, float] | None,
-        attribute: str = "",
-    ) -> None:
-        self.attribute = attribute
-        self.code = code
-        self.width = width
-        self.operands = operands
-        self.number = number
-        self.image = image
+    code: str
+    width: int
+    operands: tuple[Value, ...]
+    number: int
+    image: tuple[int, float] | None
+    attribute: str = ""
 
     @property
     def name(self) -> str:
@@ -69,6 +59,7 @@ class Node:
 
 Part = float | tuple[Node, int]
 Value = tuple[Part, ...]
+Operand = Value | float
 
 
 def is_constant(value: Value) -> bool:
@@ -308,11 +299,28 @@ class Expressions:
         """A primvar of the mesh at hits; ``fallback`` where it has none of so many components."""
         return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 
-    def op(self, code: str, *operands: Value, number: int = 0, width: int = 0) -> Value:
-        """An operation on values: component by component but for those on whole vectors.
+    def add(self, a: Operand, b: Operand) -> Value:
+        """The sum a + b."""
+        return self.op("add", a, b)
+
+    def sub(self, a: Operand, b: Operand) -> Value:
+        """The difference a - b."""
+        return self.op("subtract", a, b)
+
+    def mul(self, a: Operand, b: Operand) -> Value:
+        """The product a b."""
+        return self.op("multiply", a, b)
+
+    def div(self, a: Operand, b: Operand) -> Value:
+        """The quotient a / b."""
+        return self.op("divide", a, b)
+
+    def op(self, code: str, *given: Operand, number: int = 0, width: int = 0) -> Value:
+        """An operation on values: by component, except for those on whole vectors.
 
         ``width``: components of the result where the operands do not say.
         """
+        operands = tuple(numbers(one) if isinstance(one, float) else one for one in given)
         if code in _POINTS:
             point = fit(operands[0], _POINTS[code])
             rest = operands[1:]

@@ -40,10 +40,10 @@ def _image(n: NodeCall) -> Value:
         u, v = v, u
     placed: Value = ()
     for axis, part in (("s", u), ("t", v)):
-        part = m.op("multiply", part, numbers(n.number(f"{axis}scale", 1.0)))
+        part = m.mul(part, numbers(n.number(f"{axis}scale", 1.0)))
         if n.number(f"{axis}flip", 0.0):
-            part = m.op("subtract", numbers(1.0), part)
-        placed += m.op("add", part, numbers(n.number(f"{axis}offset", 0.0)))
+            part = m.sub(1.0, part)
+        placed += m.add(part, numbers(n.number(f"{axis}offset", 0.0)))
     wraps = [_WRAPS.get(n.text(f"{axis}wrap", "periodic"), "repeat") for axis in "st"]
     said = n.text("color_space", "auto")
     texel = read_image(
@@ -51,8 +51,8 @@ def _image(n: NodeCall) -> Value:
         name="filename", space=_SPACES.get(said, said),
     )  # fmt: skip
     if n.kind != NORMAL:
-        rgb = m.op("multiply", texel[:3], fit(n.value("multiply", _WHITE), 3))
-        texel = m.op("add", rgb, fit(n.value("offset", _BLACK), 3)) + texel[3:]
+        rgb = m.mul(texel[:3], fit(n.value("multiply", _WHITE), 3))
+        texel = m.add(rgb, fit(n.value("offset", _BLACK), 3)) + texel[3:]
     return _of_output(n, texel)
 
 
@@ -75,11 +75,11 @@ def _normal_map(n: NodeCall) -> Value:
         return numbers(0.0, 0.0, 1.0)
     tilted = fit(texel, 3)
     if n.number("color_to_signed", 1.0):
-        tilted = m.op("subtract", m.op("multiply", tilted, numbers(2.0)), numbers(1.0))
+        tilted = m.sub(m.mul(tilted, 2.0), 1.0)
     sides = (n.number("strength", 1.0), n.number("strength", 1.0))
     turned = [-1.0 if n.number(f"invert_{axis}", 0.0) else 1.0 for axis in "xy"]
     scale = tuple(side * sign for side, sign in zip(sides, turned, strict=True))
-    return m.op("multiply", tilted[:2], numbers(*scale)) + tilted[2:]
+    return m.mul(tilted[:2], numbers(*scale)) + tilted[2:]
 
 
 def _binary(code: str, first: float, second: float) -> Handler:
@@ -101,8 +101,8 @@ def _mix(n: NodeCall) -> Value:
     first, second = n.value("input1", 0.0), n.value("input2", 1.0)
     width = max(len(first), len(second))
     first, second, m = fit(first, width), fit(second, width), n.make
-    mixed = m.op("multiply", m.op("subtract", second, first), n.value("mix", 0.5, 1))
-    return m.op("add", first, mixed)
+    mixed = m.mul(m.sub(second, first), n.value("mix", 0.5, 1))
+    return m.add(first, mixed)
 
 
 @_node("arnold_flat")
@@ -121,10 +121,10 @@ def _color_correct(n: NodeCall) -> Value:
             n.networks.report.missing(f"arnold:color_correct input {name}", n.inputs.path)
     gamma = n.number("gamma", 1.0)
     if gamma > 0 and gamma != 1.0:
-        rgb = m.op("power", m.op("max", rgb, numbers(0.0)), numbers(1.0 / gamma))
-    rgb = m.op("multiply", rgb, numbers(math.pow(2.0, n.number("exposure", 0.0))))
-    rgb = m.op("multiply", rgb, fit(n.value("multiply", _WHITE), 3))
-    return m.op("add", rgb, fit(n.value("add", _BLACK), 3)) + x[3:4]
+        rgb = m.op("power", m.op("max", rgb, 0.0), numbers(1.0 / gamma))
+    rgb = m.mul(rgb, numbers(math.pow(2.0, n.number("exposure", 0.0))))
+    rgb = m.mul(rgb, fit(n.value("multiply", _WHITE), 3))
+    return m.add(rgb, fit(n.value("add", _BLACK), 3)) + x[3:4]
 
 
 @_node("arnold_user_data_rgb", "arnold_user_data_rgba", "arnold_user_data_float")

@@ -145,7 +145,7 @@ class NodeCall:
             self.networks.uv_names.append("st")
             return make.input("uv")
         if kind == "viewdirection":
-            return make.op("subtract", numbers(0.0), make.input("view"))
+            return make.sub(0.0, make.input("view"))
         if kind == "normal" and self.kind == NORMAL:
             return numbers(0.0, 0.0, 1.0)
         if space != "world" and kind in ("position", "normal"):
@@ -155,7 +155,7 @@ class NodeCall:
     def world_position(self) -> Value:
         """The position of the surface in the world, which the scene's may differ from."""
         position, origin = self.make.input("position"), self.networks.textures.origin
-        return self.make.op("add", position, numbers(*origin)) if any(origin) else position
+        return self.make.add(position, numbers(*origin)) if any(origin) else position
 
 
 Handler = Callable[[NodeCall], Value | None]

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes of colours."""
+"""MaterialX nodes of colours, of compositing, and of the absorption of hair."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from wavecomb.usd.graphs.surface import COLOURS, in_working_space
 from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 
-LUMA = (0.2722287, 0.6740818, 0.0536895)
-"""Default of ``lumacoeffs``: AP1, as MaterialX has it."""
-
 NODES: dict[str, Handler] = {}
 _node = adder(NODES)
+
+LUMA = (0.2722287, 0.6740818, 0.0536895)
+"""Default of ``lumacoeffs`` in MaterialX: those of AP1."""
 
 
 @_node("rgbtohsv", "hsvtorgb")
@@ -33,16 +35,16 @@ _KELVIN = (800.0, 25000.0)
 _CHROMATICITY = ((2222.0, (-1.1063814, -1.34811020, 2.18555832, -0.20219683)),
         (4000.0, (-0.9549476, -1.37418593, 2.09137015, -0.16748867)),
         (0.0, (3.0817580, -5.87338670, 3.75112997, -0.37001483)))  # fmt: skip
-"""Up to a temperature, y of a black body's chromaticity as a cubic of x; the last for the rest."""
+"""y of a black body's chromaticity as a cubic of x, up to a temperature; the last for the rest."""
 
 _TO_REC709 = ((3.2406, -0.9689, 0.0557), (-1.5372, 1.8758, -0.2040), (-0.4986, 0.0415, 1.0570))
-"""What X, Y and Z give red, green and blue."""
+"""Red, green and blue of X, Y and Z."""
 
 
 def _cubic(m: Expressions, x: Value, factors: tuple[float, ...]) -> Value:
     total = numbers(factors[0])
     for factor in factors[1:]:
-        total = m.op("add", m.op("multiply", total, x), numbers(factor))
+        total = m.add(m.mul(total, x), factor)
     return total
 
 
@@ -50,21 +52,125 @@ def _cubic(m: Expressions, x: Value, factors: tuple[float, ...]) -> Value:
 def _blackbody(n: NodeCall) -> Value:
     """Kang et al. 2002, "Design of Advanced Color Temperature Control System", at luminance 1."""
     m = n.make
-    kelvin = m.op("clamp", n.value("temperature", 5000.0, 1), *(numbers(x) for x in _KELVIN))
-    t = m.op("divide", numbers(1000.0), kelvin)
+    kelvin = m.op("clamp", n.value("temperature", 5000.0, 1), *_KELVIN)
+    t = m.div(1000.0, kelvin)
     warm = _cubic(m, t, (-0.2661239, -0.2343580, 0.8776956, 0.179910))
     cold = _cubic(m, t, (-3.0258469, 2.1070379, 0.2226347, 0.240390))
-    x = m.op("select", m.op("less", kelvin, numbers(4000.0)), warm, cold)
+    x = m.op("select", m.op("less", kelvin, 4000.0), warm, cold)
     y = _cubic(m, x, _CHROMATICITY[-1][1])
     for limit, factors in reversed(_CHROMATICITY[:-1]):
-        below = m.op("less", kelvin, numbers(limit))
-        y = m.op("select", below, _cubic(m, x, factors), y)
-    z = m.op("subtract", m.op("subtract", numbers(1.0), x), y)
-    xyz = m.op("divide", x, y) + numbers(1.0) + m.op("divide", z, y)
+        y = m.op("select", m.op("less", kelvin, limit), _cubic(m, x, factors), y)
+    z = m.sub(m.sub(1.0, x), y)
+    xyz = m.div(x, y) + numbers(1.0) + m.div(z, y)
     rgb = tuple(
         m.op("dot", xyz, numbers(*(row[i] for row in _TO_REC709)))[0] for i in range(3)
     )  # fmt: skip
-    value = m.op("max", rgb, numbers(0.0))
+    value = m.op("max", rgb, 0.0)
     if n.networks.converts and n.kind in COLOURS:
         return in_working_space(m, value, n.networks.textures.working)
     return value
+
+
+# ---- compositing ---------------------------------------------------------------------------------
+
+Formula = Callable[[Expressions, Value, Value], Value]
+"""The result of a foreground over a background."""
+
+
+def _blend(formula: Formula, width: int = 0) -> Handler:
+    def compiled(n: NodeCall) -> Value:
+        fg, bg = n.value("fg", width=width), n.value("bg", width=width)
+        return n.make.op("mix", bg, formula(n.make, fg, bg), n.value("mix", 1.0, 1))
+
+    return compiled
+
+
+def _layered(formula: Formula) -> Handler:
+    """Porter and Duff 1984, of colours that are multiplied by their alpha."""
+    return _blend(formula, 4)
+
+
+def _screen(m: Expressions, f: Value, b: Value) -> Value:
+    return m.sub(1.0, m.mul(m.sub(1.0, f), m.sub(1.0, b)))
+
+
+def _matte(m: Expressions, f: Value, b: Value) -> Value:
+    alpha, rest = f[3:], m.sub(1.0, f[3:])
+    over = m.add(m.mul(f[:3], alpha), m.mul(b[:3], rest))
+    return over + m.add(alpha, m.mul(b[3:], rest))
+
+
+def _disjoint_over(m: Expressions, f: Value, b: Value) -> Value:
+    total = m.add(f[3:], b[3:])
+    scale = m.div(m.sub(1.0, f[3:]), b[3:])
+    under = m.op("select", m.op("less", 1.0, total), m.mul(b[:3], scale), b[:3])
+    return m.add(f[:3], under) + m.op("min", total, 1.0)
+
+
+def _by_alpha(code: str) -> Handler:
+    def compiled(n: NodeCall) -> Value:
+        x = n.value("in", (0.0, 0.0, 0.0, 1.0), 4)
+        return n.make.op(code, x[:3], x[3:]) + x[3:]
+
+    return compiled
+
+
+NODES |= {
+    "mix": lambda n: n.make.op("mix", n.value("bg"), n.value("fg"), n.value("mix")),
+    "plus": _blend(lambda m, f, b: m.add(b, f)),
+    "minus": _blend(lambda m, f, b: m.sub(b, f)),
+    "difference": _blend(lambda m, f, b: m.op("abs", m.sub(b, f))),
+    "screen": _blend(_screen),
+    "burn": _blend(lambda m, f, b: m.sub(1.0, m.div(m.sub(1.0, b), f))),
+    "dodge": _blend(lambda m, f, b: m.div(b, m.sub(1.0, f))),
+    "inside": lambda n: n.make.mul(n.value("in"), n.value("mask", 1.0, 1)),
+    "outside": lambda n: n.make.mul(n.value("in"), n.make.sub(1.0, n.value("mask", 0.0, 1))),
+    "premult": _by_alpha("multiply"),
+    "unpremult": _by_alpha("divide"),
+    "over": _layered(lambda m, f, b: m.add(f, m.mul(b, m.sub(1.0, f[3:])))),
+    "in": _layered(lambda m, f, b: m.mul(f, b[3:])),
+    "out": _layered(lambda m, f, b: m.mul(f, m.sub(1.0, b[3:]))),
+    "mask": _layered(lambda m, f, b: m.mul(b, f[3:])),
+    "matte": _layered(_matte),
+    "disjointover": _layered(_disjoint_over),
+}
+
+
+# ---- hair, as in MaterialX's shader code ---------------------------------------------------------
+
+_EUMELANIN = (0.657704, 0.498077, 0.254106)
+_PHEOMELANIN = (0.829443, 0.670320, 0.349937)
+
+
+def color_divisor(azimuthal: float) -> float:
+    """Divisor of a colour's logarithm that gives the square root of the absorption.
+
+    Chiang et al. 2016, eq. 9; ``fibre_color_divisor`` of the core.
+    """
+    p = azimuthal
+    return 5.969 + p * (-0.215 + p * (2.532 + p * (-10.73 + p * (5.574 + p * 0.245))))
+
+
+@_node("chiang_hair_absorption_from_color")
+def _from_color(n: NodeCall) -> Value:
+    m = n.make
+    color = m.op("clamp", n.value("color", (1.0,) * 3, 3), 0.001, 1.0)
+    divisor = color_divisor(n.number("azimuthal_roughness", 0.2))
+    root = m.mul(m.op("log", color), 1.0 / divisor)
+    return m.mul(root, root)
+
+
+@_node("deon_hair_absorption_from_melanin")
+def _from_melanin(n: NodeCall) -> Value:
+    """E. d'Eon et al., "An Energy-Conserving Hair Reflectance Model", 2011."""
+    m = n.make
+    left = m.sub(1.0, n.value("melanin_concentration", 0.25, 1))
+    amount = m.mul(m.op("log", m.op("max", left, 1e-4)), -1.0)
+    red = n.value("melanin_redness", 0.5, 1)
+
+    def of(share: Value, name: str, default: tuple[float, ...]) -> Value:
+        log = m.op("log", m.op("max", n.value(name, default, 3), 1e-6))
+        return m.mul(fit(m.mul(amount, share), 3), m.mul(log, -1.0))
+
+    brown = of(m.sub(1.0, red), "eumelanin_color", _EUMELANIN)
+    return m.op("max", m.add(brown, of(red, "pheomelanin_color", _PHEOMELANIN)), 0.0)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from wavecomb.usd.graphs.surface import NORMAL
 from wavecomb.usd.graphs.values import Expressions, Value, fit, is_constant, numbers
+from wavecomb.usd.materialx.nodes.arithmetic import fract, weighted_sum
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
 from wavecomb.usd.materialx.nodes.colours import LUMA
 from wavecomb.usd.materialx.nodes.images import read_image, stretch_of
@@ -37,16 +38,12 @@ class _Copy:
     weight: Value
 
 
-def _fract(m: Expressions, x: Value) -> Value:
-    return m.op("subtract", x, m.op("floor", x))
-
-
 def _hash(m: Expressions, p: Value) -> Value:
     """Two numbers of two, in [0, 1)."""
-    a = _fract(m, m.op("multiply", (p[0], p[1], p[0]), numbers(0.1031, 0.1030, 0.0973)))
-    turned = m.op("add", (a[1], a[2], a[0]), numbers(33.33))
-    a = m.op("add", a, m.op("dot", a, turned))
-    return _fract(m, m.op("multiply", m.op("add", (a[0], a[0]), (a[1], a[2])), (a[2], a[1])))
+    a = fract(m, m.mul((p[0], p[1], p[0]), numbers(0.1031, 0.1030, 0.0973)))
+    turned = m.add((a[1], a[2], a[0]), 33.33)
+    a = m.add(a, m.op("dot", a, turned))
+    return fract(m, m.mul(m.add((a[0], a[0]), (a[1], a[2])), (a[2], a[1])))
 
 
 def _mix(m: Expressions, ends: Value, at: Value) -> Value:
@@ -54,8 +51,8 @@ def _mix(m: Expressions, ends: Value, at: Value) -> Value:
 
 
 def _turned(m: Expressions, v: Value, sin: Value, cos: Value) -> Value:
-    x = m.op("subtract", m.op("multiply", v[:1], cos), m.op("multiply", v[1:2], sin))
-    y = m.op("add", m.op("multiply", v[:1], sin), m.op("multiply", v[1:2], cos))
+    x = m.sub(m.mul(v[:1], cos), m.mul(v[1:2], sin))
+    y = m.add(m.mul(v[:1], sin), m.mul(v[1:2], cos))
     return x + y
 
 
@@ -64,10 +61,10 @@ class _Grid:
 
     def __init__(self, n: NodeCall) -> None:
         m = self.make = n.make
-        self.coord = m.op("multiply", n.coordinates(), n.value("tiling", 1.0, 2))
+        self.coord = m.mul(n.coordinates(), n.value("tiling", 1.0, 2))
         self._rotation = n.value("rotation", 1.0, 1)
         degrees = n.value("rotationrange", (0.0, 360.0), 2)
-        self._turns = m.op("multiply", degrees, numbers(math.pi / 180))
+        self._turns = m.mul(degrees, numbers(math.pi / 180))
         self._scale = n.value("scale", 1.0, 1)
         self._scales = n.value("scalerange", (0.5, 2.0), 2)
         self._offset = n.value("offset", 1.0, 1)
@@ -76,69 +73,64 @@ class _Grid:
 
     def copies(self) -> list[_Copy]:
         m = self.make
-        st = m.op("multiply", self.coord, numbers(_GRID))
-        skewed = m.op("add", st[:1], m.op("multiply", st[1:], numbers(_SKEW[0])))
-        skewed += m.op("multiply", st[1:], numbers(_SKEW[1]))
+        st = m.mul(self.coord, numbers(_GRID))
+        skewed = m.add(st[:1], m.mul(st[1:], numbers(_SKEW[0])))
+        skewed += m.mul(st[1:], numbers(_SKEW[1]))
         base = m.op("floor", skewed)
-        x, y = ((part,) for part in m.op("subtract", skewed, base))
-        z = m.op("subtract", m.op("subtract", numbers(1.0), x), y)
+        x, y = ((part,) for part in m.sub(skewed, base))
+        z = m.sub(m.sub(1.0, x), y)
         # 1 in the upper triangle of a cell: where z is 0 or less.
-        upper = m.op("select", m.op("less", numbers(0.0), z), numbers(0.0), numbers(1.0))
-        lower = m.op("subtract", numbers(1.0), upper)
-        sign = m.op("subtract", m.op("multiply", upper, numbers(2.0)), numbers(1.0))
+        upper = m.op("select", m.op("less", 0.0, z), 0.0, 1.0)
+        lower = m.sub(1.0, upper)
+        sign = m.sub(m.mul(upper, 2.0), 1.0)
         weights = (
-            m.op("subtract", numbers(0.0), m.op("multiply", z, sign)),
-            m.op("subtract", upper, m.op("multiply", y, sign)),
-            m.op("subtract", upper, m.op("multiply", x, sign)),
+            m.sub(0.0, m.mul(z, sign)),
+            m.sub(upper, m.mul(y, sign)),
+            m.sub(upper, m.mul(x, sign)),
         )
         steps = (upper + upper, upper + lower, lower + upper)
-        cells = (m.op("add", base, step) for step in steps)
+        cells = (m.add(base, step) for step in steps)
         return [self._copy(cell, w) for cell, w in zip(cells, weights, strict=True)]
 
     def _copy(self, cell: Value, weight: Value) -> _Copy:
         m = self.make
-        centre = m.op("add", cell[:1], m.op("multiply", cell[1:], numbers(0.5)))
-        centre += m.op("multiply", cell[1:], numbers(1 / _SKEW[1]))
-        centre = m.op("multiply", centre, numbers(1 / _GRID))
-        chance = _hash(m, m.op("add", cell, numbers(_SEED)))
-        turn = _mix(m, self._turns, m.op("multiply", chance[:1], self._rotation))
+        centre = m.add(cell[:1], m.mul(cell[1:], 0.5))
+        centre += m.mul(cell[1:], numbers(1 / _SKEW[1]))
+        centre = m.mul(centre, numbers(1 / _GRID))
+        chance = _hash(m, m.add(cell, numbers(_SEED)))
+        turn = _mix(m, self._turns, m.mul(chance[:1], self._rotation))
         drawn = _mix(m, self._scales, chance[1:])
-        scale = m.op("mix", numbers(1.0), drawn, self._scale)
-        shift = _mix(m, self._offsets, m.op("multiply", chance[:1], self._offset))
-        shift += _mix(m, self._offsets, m.op("multiply", chance[1:], self._offset))
-        away = m.op("subtract", self.coord, centre)
+        scale = m.op("mix", 1.0, drawn, self._scale)
+        shift = _mix(m, self._offsets, m.mul(chance[:1], self._offset))
+        shift += _mix(m, self._offsets, m.mul(chance[1:], self._offset))
+        away = m.sub(self.coord, centre)
         away = _turned(m, away, m.op("sin", turn), m.op("cos", turn))
-        uv = m.op("add", m.op("add", m.op("divide", away, scale), centre), shift)
+        uv = m.add(m.add(m.div(away, scale), centre), shift)
         return _Copy(uv, turn, weight)
 
     def shares(self, copies: list[_Copy], bright: list[Value] | None = None) -> Value:
         """How much of each copy there is; ``bright``: by which they are weighed, too."""
         m = self.make
         grid = tuple(copy.weight[0] for copy in copies)
-        w = m.op("power", m.op("max", grid, numbers(0.0)), numbers(7.0))
+        w = m.op("power", m.op("max", grid, 0.0), 7.0)
         if bright is not None:
-            w = m.op("multiply", w, tuple(one[0] for one in bright))
+            w = m.mul(w, tuple(one[0] for one in bright))
         w = self._normalised(w)
-        r = m.op("clamp", self._falloff, numbers(0.001), numbers(0.999))
+        r = m.op("clamp", self._falloff, 0.001, 0.999)
         return self._normalised(self._gain(w, r)) if r != numbers(0.5) else w
 
     def _normalised(self, w: Value) -> Value:
-        return self.make.op("divide", w, self.make.op("dot", w, numbers(1.0, 1.0, 1.0)))
+        return self.make.div(w, self.make.op("dot", w, numbers(1.0, 1.0, 1.0)))
 
     def _gain(self, x: Value, r: Value) -> Value:
         """C. Schlick, "Fast Alternatives to Perlin's Bias and Gain Functions", Gems IV, 1994."""
         m = self.make
-        steep = m.op("subtract", m.op("divide", numbers(1.0), r), numbers(2.0))
-        twice = m.op("multiply", x, numbers(2.0))
-        a = m.op("multiply", steep, m.op("subtract", numbers(1.0), twice))
-        low = m.op("divide", x, m.op("add", a, numbers(1.0)))
-        high = m.op("divide", m.op("subtract", a, x), m.op("subtract", a, numbers(1.0)))
-        return m.op("select", m.op("less", x, numbers(0.5)), low, high)
-
-
-def _sum(m: Expressions, values: list[Value], shares: Value) -> Value:
-    parts = [m.op("multiply", v, (s,)) for v, s in zip(values, shares, strict=True)]
-    return m.op("add", m.op("add", parts[0], parts[1]), parts[2])
+        steep = m.sub(m.div(1.0, r), 2.0)
+        twice = m.mul(x, 2.0)
+        a = m.mul(steep, m.sub(1.0, twice))
+        low = m.div(x, m.add(a, 1.0))
+        high = m.div(m.sub(a, x), m.sub(a, 1.0))
+        return m.op("select", m.op("less", x, 0.5), low, high)
 
 
 def _texels(n: NodeCall, grid: _Grid, copies: list[_Copy], is_raw: bool) -> list[Value]:
@@ -154,11 +146,11 @@ def _hextiled_image(n: NodeCall) -> Value:
     if is_constant(texels[0]):  # no file
         return texels[0]
     luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
-    bright = [m.op("mix", numbers(1.0), m.op("dot", t[:3], luma), contrast) for t in texels]
-    colour = _sum(m, [t[:3] for t in texels], grid.shares(copies, bright))
+    bright = [m.op("mix", 1.0, m.op("dot", t[:3], luma), contrast) for t in texels]
+    colour = weighted_sum(m, [t[:3] for t in texels], grid.shares(copies, bright))
     if n.width != 4:
         return colour
-    return colour + _sum(m, [t[3:4] for t in texels], grid.shares(copies))
+    return colour + weighted_sum(m, [t[3:4] for t in texels], grid.shares(copies))
 
 
 @_node("hextilednormalmap")
@@ -174,12 +166,12 @@ def _hextiled_normal_map(n: NodeCall) -> Value:
         return numbers(0.0, 0.0, 1.0)
     slopes = []
     for copy, texel in zip(copies, texels, strict=True):
-        v = m.op("subtract", m.op("multiply", fit(texel, 3), numbers(2.0)), numbers(1.0))
+        v = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
         if flips:
-            v = v[:1] + m.op("subtract", numbers(0.0), v[1:2]) + v[2:]
+            v = v[:1] + m.sub(0.0, v[1:2]) + v[2:]
         # The frame turns by -turn, so that its vectors keep to the copy.
-        back = m.op("subtract", numbers(0.0), copy.turn)
-        across = _turned(m, m.op("multiply", v[:2], strength), m.op("sin", back), m.op("cos", back))
-        steep = m.op("max", m.op("abs", v[2:]), numbers(1e-3))
-        slopes.append(m.op("divide", across, steep))
-    return _sum(m, slopes, grid.shares(copies)) + numbers(1.0)
+        back = m.sub(0.0, copy.turn)
+        across = _turned(m, m.mul(v[:2], strength), m.op("sin", back), m.op("cos", back))
+        steep = m.op("max", m.op("abs", v[2:]), 1e-3)
+        slopes.append(m.div(across, steep))
+    return weighted_sum(m, slopes, grid.shares(copies)) + numbers(1.0)

@@ -85,8 +85,8 @@ def _uv_texture(n: NodeCall) -> Value:
     wraps = [n.text(name, "periodic").replace("periodic", "repeat") for name in ("wrapS", "wrapT")]
     raw = n.text("sourceColorSpace", "auto") == "raw"
     texel = read_image(n, uv, wraps, "fallback", raw)
-    texel = m.op("multiply", texel, n.value("scale", (1.0, 1.0, 1.0, 1.0), 4))
-    texel = m.op("add", texel, n.value("bias", (0.0, 0.0, 0.0, 0.0), 4))
+    texel = m.mul(texel, n.value("scale", (1.0, 1.0, 1.0, 1.0), 4))
+    texel = m.add(texel, n.value("bias", (0.0, 0.0, 0.0, 0.0), 4))
     n.width = {"rgba": 4, "rgb": 3}.get(n.output, 1)
     if n.output in ("r", "g", "b", "a"):
         return (texel["rgba".index(n.output)],)

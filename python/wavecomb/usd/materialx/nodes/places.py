@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes that say where on the surface something is, how it is tilted, and when."""
+"""MaterialX nodes of the hit point: positions, primvars, normal maps, spaces, time, patterns.
+
+With M the linear part of the transform from the object to the world, a hit gives the rows of the
+inverse of M (``normal_x`` ...) and its position in both spaces, and no more. The columns of M are
+the cross products of these rows over their determinant.
+"""
 
 from __future__ import annotations
 
-from wavecomb.usd.graphs.surface import COLOURS, NORMAL, in_working_space
-from wavecomb.usd.graphs.values import Value, fit, numbers
+from wavecomb.usd.graphs.surface import COLOURS, NORMAL, NUMBER, in_working_space
+from wavecomb.usd.graphs.values import Expressions, Value, fit, numbers
+from wavecomb.usd.materialx.nodes.arithmetic import unit, weighted_sum
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
-from wavecomb.usd.materialx.nodes.spaces import tangent_of_object
 from wavecomb.usd.stage.times import frame_number
 
 NODES: dict[str, Handler] = {}
@@ -18,14 +23,8 @@ def _geometric(n: NodeCall) -> Value:
     return n.at_place(n.category, n.text("space", "object"))
 
 
-@_node("viewdirection")
-def _view(n: NodeCall) -> Value:
-    return n.at_place("viewdirection", n.text("space", "world"))
-
-
-@_node("frame")
-def _frame(n: NodeCall) -> Value:
-    return numbers(frame_number(n.networks.time) or 0.0)
+NODES["viewdirection"] = lambda n: n.at_place("viewdirection", n.text("space", "world"))
+NODES["frame"] = lambda n: numbers(frame_number(n.networks.time) or 0.0)
 
 
 @_node("time")
@@ -35,38 +34,39 @@ def _time(n: NodeCall) -> Value:
     return numbers(frame / (stage.GetFramesPerSecond() or 24.0))
 
 
+# ---- primvars ------------------------------------------------------------------------------------
+
+
 @_node("texcoord")
 def _texcoord(n: NodeCall) -> Value:
     index = int(n.number("index", 0.0))
     return _texture_coordinates(n, f"st{index}" if index else "st")
 
 
-@_node("geomcolor")
-def _geomcolor(n: NodeCall) -> Value:
-    return _named(n, "geomprop", "default", "displayColor")
+def _named(name_input: str, fallback: str, usual: str = "") -> Handler:
+    """A handler of nodes that read the primvar that an input names, or ``usual``."""
+
+    def compiled(n: NodeCall) -> Value:
+        name = n.text(name_input, usual)
+        if n.width == 2:
+            return _texture_coordinates(n, name or "st")
+        if not name or n.width == 0:
+            return n.value(fallback)
+        return _primvar(n, name, fallback)
+
+    return compiled
 
 
-@_node("geompropvalue", "geompropvalueuniform")
-def _geompropvalue(n: NodeCall) -> Value:
-    return _named(n, "geomprop", "default", "")
-
-
-@_node("UsdPrimvarReader")
-def _primvar_reader(n: NodeCall) -> Value:
-    return _named(n, "varname", "fallback", "")
-
-
-def _named(n: NodeCall, named: str, fallback: str, usual: str) -> Value:
-    name = n.text(named, usual)
-    if n.width == 2:
-        return _texture_coordinates(n, name or "st")
-    if not name or n.width == 0:
-        return n.value(fallback)
-    return _primvar(n, name, fallback)
+NODES |= {
+    "geomcolor": _named("geomprop", "default", "displayColor"),
+    "geompropvalue": _named("geomprop", "default"),
+    "geompropvalueuniform": _named("geomprop", "default"),
+    "UsdPrimvarReader": _named("varname", "fallback"),
+}
 
 
 def _texture_coordinates(n: NodeCall, name: str) -> Value:
-    """The first set that a material reads is the mesh's; others are read as primvars."""
+    """The mesh's texture coordinates for the first set that a material reads, else a primvar."""
     names = n.networks.uv_names
     if names and names[0] != name:
         return n.networks.primvar(name, numbers(0.0, 0.0))
@@ -75,7 +75,7 @@ def _texture_coordinates(n: NodeCall, name: str) -> Value:
 
 
 def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
-    """A primvar of the mesh; alpha of its colours is displayOpacity."""
+    """A primvar of the mesh; displayOpacity is the alpha of ``geomcolor``."""
     networks = n.networks
     converts, networks.converts = networks.converts, False
     otherwise = n.value(fallback, width=n.width)
@@ -90,15 +90,146 @@ def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
     return value
 
 
+# ---- spaces --------------------------------------------------------------------------------------
+
+
 @_node("normalmap")
 def _normal_map(n: NodeCall) -> Value:
-    """A normal in tangent space; of a map that is flat, the surface's own."""
+    """A normal in tangent space; without a map that of the surface."""
     m, n.width = n.make, 3
     texel = n.inputs.find("in", NORMAL)
     if texel is None:
         return numbers(0.0, 0.0, 1.0)
-    tilted = m.op("subtract", m.op("multiply", fit(texel, 3), numbers(2.0)), numbers(1.0))
+    tilted = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
     if n.text("space", "tangent") != "tangent":
-        return tangent_of_object(m, tilted)
-    scale = n.value("scale", 1.0, 0)
-    return m.op("multiply", tilted[:2], fit(scale, 2)) + tilted[2:]
+        return _tangent_of_object(m, tilted)
+    return m.mul(tilted[:2], fit(n.value("scale", 1.0, 0), 2)) + tilted[2:]
+
+
+def _rows(m: Expressions) -> list[Value]:
+    """Rows of the inverse of M, in the world."""
+    return [m.input(f"normal_{axis}") for axis in "xyz"]
+
+
+def _columns(m: Expressions) -> list[Value]:
+    """Columns of M, in the world."""
+    a, b, c = _rows(m)
+    across = m.op("cross", b, c)
+    size = m.op("dot", a, across)
+    return [m.div(v, size) for v in (across, m.op("cross", c, a), m.op("cross", a, b))]
+
+
+def _dots(m: Expressions, vectors: list[Value], v: Value) -> Value:
+    return tuple(m.op("dot", one, v)[0] for one in vectors)
+
+
+def _tangent_of_object(m: Expressions, normal: Value) -> Value:
+    """A normal of object space in tangent space, on the side of the surface's normal.
+
+    The surface's normal faces the viewer, so the map's normal is turned over with it.
+    """
+    there = unit(m, weighted_sum(m, _rows(m), fit(normal, 3)))
+    frame = [m.input(name) for name in ("tangent", "bitangent", "normal")]
+    tilted = _dots(m, frame, there)
+    return m.mul(tilted, m.op("select", m.op("less", tilted[2:], 0.0), -1.0, 1.0))
+
+
+def _spaces(n: NodeCall) -> tuple[bool, bool]:
+    """Whether a transform starts, and ends, in object space, which is the default."""
+    start, end = (n.text(name, "") or "object" for name in ("fromspace", "tospace"))
+    return start != "world", end != "world"
+
+
+def _transformed(n: NodeCall, default: tuple[float, ...]) -> Value:
+    """The input of a transform. Its kind is a number even if the result is a shading normal."""
+    found = n.inputs.find("in", NUMBER)
+    return fit(numbers(*default) if found is None else found, 3)
+
+
+@_node("transformnormal", "transformvector")
+def _transform(n: NodeCall) -> Value:
+    m, is_normal = n.make, n.category == "transformnormal"
+    starts, ends = _spaces(n)
+    if n.kind == NORMAL and not (starts and not ends):
+        return n.value("in", (0.0, 0.0, 1.0), 3)
+    v = _transformed(n, (0.0, 0.0, 1.0 if is_normal else 0.0))
+    if n.kind == NORMAL:
+        if not is_normal:  # the normal that becomes this vector
+            v = _dots(m, _columns(m), weighted_sum(m, _columns(m), v))
+        return _tangent_of_object(m, v)
+    if starts == ends:
+        return v
+    rows = _rows(m) if is_normal == starts else _columns(m)
+    out = weighted_sum(m, rows, v) if starts else _dots(m, rows, v)
+    return unit(m, out) if is_normal else out
+
+
+@_node("transformpoint")
+def _transform_point(n: NodeCall) -> Value:
+    """Relative to the hit point, whose position is known in both spaces."""
+    m = n.make
+    starts, ends = _spaces(n)
+    p = _transformed(n, (0.0, 0.0, 0.0))
+    if starts == ends:
+        return p
+    world, local = n.world_position(), m.input("local_position")
+    if starts:
+        return m.add(world, weighted_sum(m, _columns(m), m.sub(p, local)))
+    return m.add(local, _dots(m, _rows(m), m.sub(p, world)))
+
+
+# ---- patterns ------------------------------------------------------------------------------------
+
+
+def _point(n: NodeCall) -> Value:
+    """Texture coordinates of a node whose category ends in 2d, else the position."""
+    if n.category.endswith("2d"):
+        return n.coordinates()
+    return n.place("position", "position", "object")
+
+
+@_node("noise2d", "noise3d")
+def _noise(n: NodeCall) -> Value:
+    value = n.make.op(f"noise{n.category[-2]}", _point(n), width=n.width)
+    return n.make.add(n.make.mul(value, n.value("amplitude", 1.0)), n.value("pivot"))
+
+
+@_node("fractal2d", "fractal3d")
+def _fractal(n: NodeCall) -> Value:
+    m, place = n.make, _point(n)
+    lacunarity, diminish = n.value("lacunarity", 2.0, 1), n.value("diminish", 0.5, 1)
+    octaves = min(max(int(n.number("octaves", 3.0)), 0), 32)
+    if n.category == "fractal3d":
+        total = m.op("fractal3", place, lacunarity, diminish, number=octaves, width=n.width)
+        return m.mul(total, n.value("amplitude", 1.0))
+    total, amplitude = numbers(*[0.0] * (n.width or 1)), numbers(1.0)
+    for _ in range(octaves):
+        total = m.add(total, m.mul(m.op("noise2", place, width=n.width), amplitude))
+        amplitude = m.mul(amplitude, diminish)
+        place = m.mul(place, lacunarity)
+    return m.mul(total, n.value("amplitude", 1.0))
+
+
+@_node("cellnoise2d", "cellnoise3d")
+def _cells(n: NodeCall) -> Value:
+    return n.make.op(f"cell{n.category[-2]}", _point(n), width=n.width)
+
+
+@_node("worleynoise2d", "worleynoise3d")
+def _worley(n: NodeCall) -> Value:
+    style, jitter = int(n.number("style", 0.0)), n.value("jitter", 1.0, 1)
+    code = f"worley{n.category[-2]}"
+    return n.make.op(code, _point(n), jitter, number=style, width=n.width)
+
+
+@_node("ramplr", "ramptb", "splitlr", "splittb")
+def _ramp(n: NodeCall) -> Value:
+    """A ramp or split along u, or along v, whose top is at v = 1."""
+    m, (u, v) = n.make, n.coordinates()
+    names, at = (("valuel", "valuer"), (u,)) if n.category[-2:] == "lr" else (
+        ("valueb", "valuet"), (v,)
+    )  # fmt: skip
+    if n.category.startswith("split"):
+        low = m.op("less", at, n.value("center", 0.5))
+        return m.op("select", low, n.value(names[0]), n.value(names[1]))
+    return m.op("mix", n.value(names[0]), n.value(names[1]), m.op("clamp", at, 0.0, 1.0))

@@ -16,7 +16,7 @@ from wavecomb.picture.working_space import LUMINANCE
 from wavecomb.usd.graphs.values import fit, is_constant, numbers
 from wavecomb.usd.looks.network import colour, number, pair, shader_id, source_of, value_of
 from wavecomb.usd.looks.surface import Surface
-from wavecomb.usd.materialx.nodes.hair import color_divisor
+from wavecomb.usd.materialx.nodes.colours import color_divisor
 from wavecomb.usd.materialx.surfaces.openpbr import SurfaceReader
 
 _LOBES = {"R": (0.1, 0.1), "TT": (0.05, 0.05), "TRT": (0.2, 0.2)}
