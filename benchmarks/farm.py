@@ -57,7 +57,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
     have opened the stage before the clock starts. Both write the same files.
     """
     from wavecomb import farm
-    from wavecomb.farm import client, outcome
+    from wavecomb.farm import assemble, client
     from wavecomb.farm.machine_class import machine_class
     from wavecomb.farm.rendering import Renderer
 
@@ -77,7 +77,7 @@ def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
         found["rendering_ms"] = 1e3 * (time.perf_counter() - start) / (len(tasks) - workers)
         started: list[tuple[float, int]] = []
 
-        def show(at: outcome.Outcome) -> None:
+        def show(at: assemble.Outcome) -> None:
             done = at.tasks_done
             if (done >= workers and not started) or (done == len(tasks) and len(started) == 1):
                 started.append((time.perf_counter(), done))

@@ -6,7 +6,7 @@ import OpenImageIO as oiio
 import pytest
 from usd_recorder import load, said
 
-from wavecomb.usd.lights.dome_formats import format_of, to_latlong
+from wavecomb.usd.lights.dome import format_of, to_latlong
 
 SIZE = 256
 

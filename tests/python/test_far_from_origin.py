@@ -16,8 +16,17 @@ from pxr import Gf, Sdf, Usd
 import wavecomb
 from wavecomb import vdb
 from wavecomb.usd.geometry.mesh_arrays import IDENTITY
-from wavecomb.usd.stage.origin import CELL, NEAR, WORLD, around, find_origin, moved_to
-from wavecomb.usd.stage.precision import INSTANCED, POSITIONS, STORED
+from wavecomb.usd.stage.origin import (
+    CELL,
+    INSTANCED,
+    NEAR,
+    POSITIONS,
+    STORED,
+    WORLD,
+    around,
+    find_origin,
+    moved_to,
+)
 
 pytestmark = needs("wavecomb._core")
 

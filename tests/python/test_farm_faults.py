@@ -23,11 +23,11 @@ from parts import needs, not_here
 
 from wavecomb import farm
 from wavecomb.errors import WavecombError
+from wavecomb.farm.assemble import Outcome
 from wavecomb.farm.client import Run, _Batch
 from wavecomb.farm.clusters import Cluster
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task
-from wavecomb.farm.outcome import Outcome
 
 pytestmark = [needs("wavecomb._core", "distributed", "cryptography"), pytest.mark.slow]
 

@@ -17,8 +17,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.frame_names import fill, frame_text, has_place, parse_frames
 from wavecomb.run.sequence import Frames
 from wavecomb.usd import LoadReport, load_stage, open_stage
-from wavecomb.usd.stage.frame_cache import FrameCache
-from wavecomb.usd.stage.varying import Varying
+from wavecomb.usd.stage.frame_cache import FrameCache, Varying
 
 SMALL = {"size": (24, 24), "spp": 1}
 

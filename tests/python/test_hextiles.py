@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from materialx_nodes import Node, points, run
 
-from wavecomb.usd.materialx.nodes import hextiles
+from wavecomb.usd.materialx.nodes import images
 
 
 def reference(uv, tiling, rotation, scales, offsets):
@@ -44,7 +44,7 @@ def test_copies_are_where_materialx_has_them():
         file="a.png", tiling="3,2", rotationrange="0,90", scalerange="0.5,1.5",
         offsetrange="0.1,0.7",
     )  # fmt: skip
-    grid = hextiles._Grid(node.call("out"))
+    grid = images._Grid(node.call("out"))
     at = points(500)
     at[:, :2] = at[:, :2] * 3 - 1
     where, turns, weights = reference(
@@ -64,7 +64,7 @@ def test_copies_are_where_materialx_has_them():
 @pytest.mark.parametrize("falloff", [0.2, 0.8])
 def test_falloff_keeps_shares(falloff):
     node = Node("ND_hextiledimage_color3").give(file="a.png", falloff=falloff)
-    grid = hextiles._Grid(node.call("out"))
+    grid = images._Grid(node.call("out"))
     shares = run(grid.shares(grid.copies()), points())
     assert shares.sum(axis=1) == pytest.approx(np.ones(len(shares)), abs=1e-5)
     assert (shares >= 0).all()

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pxr import Usd
 from test_usd_mtlx import GOLD, write
 
 import wavecomb
@@ -26,9 +27,10 @@ from wavecomb.picture.exr import write_exr
 from wavecomb.run.checkpoint import load_checkpoint, save_checkpoint
 from wavecomb.scenes import meshfile
 from wavecomb.scenes.meshfile import load_dragon
-from wavecomb.usd import LoadReport, load_stage
+from wavecomb.usd import load_stage
 from wavecomb.usd.lights.ies import IesTable
 from wavecomb.usd.materialx.files import MtlxError, read_document
+from wavecomb.usd.stage.context import LoadContext
 
 SOON_S = 5.0
 DEEP = 20_000
@@ -300,7 +302,9 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
         "numbers": head + "1 1000 1 2 1 " + factors + " 7" * (1 << 21),
         "tilt": "TILT=INCLUDE\n1 1000000000 " + factors,
     }
-    table = IesTable(None, report := LoadReport())  # type: ignore[arg-type]
+    stage = Usd.Stage.CreateInMemory()
+    context = LoadContext(stage, Usd.TimeCode.Default(), None)  # type: ignore[arg-type]
+    table, report = IesTable(context), context.report
     start = time.process_time()
     for name, content in files.items():
         path = write(tmp_path, f"{name}.ies", content)

@@ -216,7 +216,7 @@ def test_an_added_row_is_read_from_a_stage_and_is_a_field(with_rows: None) -> No
                                 strict=False):  # fmt: skip
         attribute = prim.CreateAttribute(f"inputs:{row.input}", getattr(Sdf.ValueTypeNames, name))
         attribute.Set(value)
-    values = light_values(prim, Usd.TimeCode.Default(), "Y")
+    values = light_values(prim, Usd.TimeCode.Default())
     assert values is not None
     assert (values["blades"], values["rim"], values["flicker"]) == (7, (0, 1, 2), True)
     fields = {one.name: one for one in inputs_of(prim)}

@@ -16,7 +16,7 @@ from parts import only_where
 
 pytest.importorskip("wavecomb._core")
 import wavecomb
-from wavecomb.cli.suggestions import SYNONYMS
+from wavecomb.cli.group import SYNONYMS
 from wavecomb.errors import WavecombError
 from wavecomb.picture import files
 from wavecomb.picture.exr import write_exr
@@ -141,8 +141,8 @@ def test_a_misspelt_option_has_a_suggestion(given: str, wanted: str) -> None:
 def test_synonyms_stand_for_options_that_there_are() -> None:
     import click
 
+    from wavecomb.cli.group import options_of
     from wavecomb.cli.render import render_command
-    from wavecomb.cli.suggestions import options_of
 
     options = set(options_of(click.Context(render_command)))
     assert set(SYNONYMS.values()) <= options

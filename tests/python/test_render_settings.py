@@ -15,8 +15,7 @@ from usd_recorder import load, said, write
 import wavecomb
 from wavecomb.cli import main
 from wavecomb.picture.image import read_layers, read_metadata
-from wavecomb.usd.stage.render_settings import RenderChoice, read_choices
-from wavecomb.usd.stage.render_vars import aov_of
+from wavecomb.usd.stage.render_settings import RenderChoice, aov_of, read_choices
 from wavecomb.usd.stage.report import LoadReport
 
 WORLD = """

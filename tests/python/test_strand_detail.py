@@ -12,8 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, Vt
 
 import wavecomb
 from wavecomb.usd import load_stage
-from wavecomb.usd.geometry.strand_detail import even
-from wavecomb.usd.geometry.strands import lay_out
+from wavecomb.usd.geometry.strands import even, lay_out
 
 pytest.importorskip("wavecomb._core")
 

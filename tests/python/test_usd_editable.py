@@ -308,15 +308,15 @@ def test_light_values_are_what_the_loader_reads(path, tmp_path):
         loaded, stage = load_stage(name, editable=True), open_stage(name)
         assert len(loaded.light_paths) == count
         for number, at in enumerate(loaded.light_paths):
-            values = light_values(stage.GetPrimAtPath(at), Usd.TimeCode.Default(), "Y")
+            values = light_values(stage.GetPrimAtPath(at), Usd.TimeCode.Default())
             have = loaded.scene.light(number)
             assert {one: as_stored(value) for one, value in values.items()} == {
                 one: as_stored(have[one]) for one in values
             }
     stage = open_stage(path)
-    key = light_values(stage.GetPrimAtPath("/W/Key"), Usd.TimeCode.Default(), "Y")
+    key = light_values(stage.GetPrimAtPath("/W/Key"), Usd.TimeCode.Default())
     assert key["color"] == (3, 3, 3) and key["width"] == 1
-    assert light_values(stage.GetPrimAtPath("/W/Red"), Usd.TimeCode.Default(), "Y") is None
+    assert light_values(stage.GetPrimAtPath("/W/Red"), Usd.TimeCode.Default()) is None
 
 
 def test_the_report_lists_many_places(tmp_path):

@@ -13,7 +13,7 @@ from usd_recorder import Recorder, load, said, write
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
-from wavecomb.usd.volumes.blackbody import radiance
+from wavecomb.usd.volumes.grids import radiance
 
 pytestmark = needs("wavecomb._core")
 with_vdb = only_where(vdb.is_there(), "this build is without OpenVDB")

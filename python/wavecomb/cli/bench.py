@@ -14,7 +14,7 @@ from pathlib import Path
 import click
 
 from wavecomb.cli.options import examples
-from wavecomb.cli.row_options import add_options, option
+from wavecomb.cli.setting_options import add_options, option
 
 _METRICS = (
     *("render_s", "shade_and_order_s", "shade_s", "load_s", "build_s"),

@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import examples, isolate_option
-from wavecomb.cli.row_options import Real, add_options, option
 from wavecomb.cli.sandbox import enter_to_read
+from wavecomb.cli.setting_options import Real, add_options, option
 
 _METRICS = ("psnr", "ssim", "flip-ldr", "flip-hdr")
 _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")

@@ -50,9 +50,8 @@ farm_command.add_command(plan_command)
 def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
     """The folder of a job, with path maps of this machine."""
     from wavecomb.farm.folder import Folder
-    from wavecomb.farm.maps import parse_maps, use_maps
 
-    use_maps(parse_maps(maps))
+    opened_maps(maps)
     return Folder(job)
 
 
@@ -100,7 +99,7 @@ def resume_command(
 @AS_JSON
 def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
     """Show how many tiles and images of JOB are there; each file is read and compared."""
-    from wavecomb.farm.outcome import status
+    from wavecomb.farm.assemble import status
 
     folder = opened(job, maps)
     out = status(folder)
@@ -173,7 +172,7 @@ def assemble_command(names: tuple[str, ...], maps: tuple[str, ...], as_json: boo
 
 def opened_maps(maps: tuple[str, ...]) -> None:
     """Has this process use path maps."""
-    from wavecomb.farm.maps import parse_maps, use_maps
+    from wavecomb.path_maps import parse_maps, use_maps
 
     use_maps(parse_maps(maps))
 

@@ -16,9 +16,9 @@ from wavecomb.errors import WavecombError
 from wavecomb.run.progress import Interrupt, progress_console, time_text
 
 if TYPE_CHECKING:
+    from wavecomb.farm.assemble import Outcome
     from wavecomb.farm.clusters import Where
     from wavecomb.farm.folder import Folder
-    from wavecomb.farm.outcome import Outcome
 
 _SHOW_S = 0.5
 

@@ -18,9 +18,8 @@ from wavecomb.cli.frames import frame_options
 from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.render import picture_options
-from wavecomb.cli.row_options import Real
 from wavecomb.cli.sandbox import enter_to_read, enter_to_render
-from wavecomb.cli.setting_options import SettingCommand
+from wavecomb.cli.setting_options import Real, SettingCommand
 from wavecomb.errors import WavecombError
 
 _PLAN_S = 4 * 3600.0
@@ -85,9 +84,9 @@ def submit_command(
     from wavecomb.farm.clusters import parse_where
     from wavecomb.farm.folder import Folder
     from wavecomb.farm.job import Job
-    from wavecomb.farm.maps import parse_maps
     from wavecomb.farm.planning import default_folder
     from wavecomb.farm.tiling import parse_tiles
+    from wavecomb.path_maps import parse_maps
 
     where = parse_where(on)
     parse_tiles(options["tiles"])
@@ -154,9 +153,9 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
 def plan_command(text: str) -> None:
     """Answer a request of ``ask_plan`` on standard output."""
     from wavecomb.farm.job import Job
-    from wavecomb.farm.maps import parse_maps
     from wavecomb.farm.planning import complete, with_files
     from wavecomb.farm.tiling import parse_tiles
+    from wavecomb.path_maps import parse_maps
 
     request = _tuples(json.loads(text))
     if "again" in request:

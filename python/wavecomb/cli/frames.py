@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from wavecomb.cli.done import Done
 from wavecomb.cli.job import Job, Names, how_far, purpose_at
 from wavecomb.cli.options import StageOptions
 from wavecomb.cli.purpose import PurposeOptions
-from wavecomb.cli.row_options import add_options, option
+from wavecomb.cli.reporting import Done
+from wavecomb.cli.setting_options import add_options, option
 from wavecomb.cli.shots import FrameShot
 from wavecomb.errors import WavecombError
 from wavecomb.run.faults import describe

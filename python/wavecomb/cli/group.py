@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors in one line, exit codes, version."""
+"""Errors in one line with suggestions for misspelt options, exit codes, version."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, NoReturn
 
 import click
 
 from wavecomb import terminal
-from wavecomb.cli.suggestions import message_of
 from wavecomb.errors import WavecombError
 from wavecomb.run.faults import describe
 from wavecomb.run.isolate import supervisor
@@ -155,3 +155,77 @@ def _fail(message: str, more: str | None = None) -> NoReturn:
         line += f" (`{more}` says more)"
     click.echo(f"error: {line}", err=True)
     sys.exit(ERROR)
+
+
+SYNONYMS = {
+    "--samples": "--spp",
+    "--sample-count": "--spp",
+    "--samples-per-pixel": "--spp",
+    "--pixel-samples": "--spp",
+    "--resolution": "--size",
+    "--res": "--size",
+    "--width": "--size",
+    "--height": "--size",
+    "--out": "--output",
+    "--outfile": "--output",
+    "--destination": "--output",
+    "--image": "--output",
+    "--bounces": "--max-depth",
+    "--max-bounces": "--max-depth",
+    "--depth": "--max-depth",
+    "--ray-depth": "--max-depth",
+    "--crop-window": "--region",
+    "--layers": "--aov",
+    "--aovs": "--aov",
+    "--passes": "--aov",
+    "--frame-range": "--frames",
+    "--range": "--frames",
+    "--start-frame": "--frames",
+    "--time": "--frame",
+    "--timeout": "--time-limit",
+    "--max-time": "--time-limit",
+    "--denoiser": "--denoise",
+    "--jobs": "--threads",
+    "--cores": "--threads",
+    "--cam": "--camera",
+    "--variance": "--noise",
+    "--noise-threshold": "--noise",
+    "--error-threshold": "--noise",
+    "--snapshot": "--checkpoint",
+    "--continue": "--resume",
+    "--statistics": "--stats",
+    "--silent": "--quiet",
+}
+"""Names that other renderers and tools use, and the option of the same meaning."""
+
+
+def message_of(error: click.ClickException) -> str:
+    """The message of an error of the command line, with suggestions for a misspelt option."""
+    if not isinstance(error, click.NoSuchOption) or error.ctx is None:
+        return error.format_message()
+    wanted = suggestions(error.option_name, options_of(error.ctx))
+    if not wanted:
+        return error.message
+    return f"{error.message.rstrip('.')}; did you mean {' or '.join(wanted)}?"
+
+
+def options_of(context: click.Context) -> list[str]:
+    """All options of a command."""
+    shown = [one for one in context.command.get_params(context) if not getattr(one, "hidden", 0)]
+    return [name for one in shown for name in (*one.opts, *one.secondary_opts)]
+
+
+def suggestions(name: str, options: list[str]) -> list[str]:
+    """Options that a misspelt one may stand for, the likeliest first; three at most.
+
+    >>> suggestions("--smaples", ["--spp", "--size", "--shutter"])
+    ['--spp']
+    >>> suggestions("--ouput", ["-o", "--output"])
+    ['--output']
+    """
+    words = {option: option for option in options if option.startswith("--")}
+    words |= {word: one for word, one in SYNONYMS.items() if one in words and word not in words}
+    if name in words:
+        return [words[name]]
+    found = get_close_matches(name, words, n=6, cutoff=0.6)
+    return list(dict.fromkeys(words[word] for word in found))[:3]

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.cli.aovs import AovOptions
-from wavecomb.cli.done import Done
 from wavecomb.cli.options import StageOptions, stage_warnings, warn
 from wavecomb.cli.purpose import PurposeOptions
+from wavecomb.cli.reporting import Done
 from wavecomb.cli.shots import Shot
 from wavecomb.run import aovs as aov_names
 from wavecomb.run.frame_names import fill

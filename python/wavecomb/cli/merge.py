@@ -10,8 +10,8 @@ import click
 
 from wavecomb.cli.aovs import AovOptions, file_options
 from wavecomb.cli.options import examples, isolate_option
-from wavecomb.cli.row_options import option
 from wavecomb.cli.sandbox import enter_to_read
+from wavecomb.cli.setting_options import option
 
 
 @click.command(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from wavecomb.cli.row_options import Real, row_option
+from wavecomb.cli.setting_options import Real, row_option
 from wavecomb.load_options import Row, given, rows
 
 if TYPE_CHECKING:

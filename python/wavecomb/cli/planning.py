@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from wavecomb.cli.aovs import AovOptions
@@ -85,14 +85,8 @@ class Asked:
         source = StageOptions.take(options)
         purpose = PurposeOptions.take(options)
         layers = AovOptions.take(options)
-        own = {
-            name: options.pop(name)
-            for name in (
-                "stage", "output", "output_dir", "png", "deep", "stats_file", "size", "spp",
-                "exposure", "tone_map", "quiet", "costs", "learn_from", "learn_to", "frames",
-                "skip_existing", "film_memory",
-            )
-        }  # fmt: skip
+        names = [field.name for field in fields(cls)]
+        own = {name: options.pop(name) for name in names if name in options}
         chosen = {name: value for name, value in options.items() if value is not None}
         return cls(source=source, purpose=purpose, layers=layers, chosen=chosen, **own)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from wavecomb.cli.row_options import add_options, option
+from wavecomb.cli.setting_options import add_options, option
 from wavecomb.errors import WavecombError
 
 if TYPE_CHECKING:

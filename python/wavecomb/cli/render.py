@@ -8,16 +8,15 @@ from typing import Any
 import click
 
 from wavecomb.cli.aovs import aov_options
-from wavecomb.cli.done import Done
 from wavecomb.cli.farm_tiles import TILE, check_tile, render_tile, tile_name
 from wavecomb.cli.frames import frame_options, open_frames, render_sequence
 from wavecomb.cli.job import how_far
 from wavecomb.cli.options import examples, isolation_options, stage_options
 from wavecomb.cli.planning import Asked, prepare
 from wavecomb.cli.purpose import purpose_options
-from wavecomb.cli.row_options import add_options, option
+from wavecomb.cli.reporting import Done
 from wavecomb.cli.sandbox import enter_to_render
-from wavecomb.cli.setting_options import SettingCommand, setting_options
+from wavecomb.cli.setting_options import SettingCommand, add_options, option, setting_options
 from wavecomb.cli.shots import Shot, Still
 from wavecomb.run.learned import save_learned
 

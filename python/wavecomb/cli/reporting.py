@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How ``wavecomb render`` shows what it does: a bar and a summary, lines of JSON, or nothing."""
+"""How ``wavecomb render`` shows what it does and what came of it: a bar, JSON lines, nothing."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,7 +24,7 @@ from wavecomb.run.progress import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from wavecomb.cli.done import Done
+    from wavecomb.picture.rendered import Picture
     from wavecomb.usd import LoadReport
 
 TIMES = ("load", "build", "render")
@@ -137,3 +138,29 @@ def make_reporter(progress: str | None, quiet: bool) -> Reporter:
     if quiet:
         return Reporter()
     return Summary(None if progress == "off" else progress_console())
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of a render.
+
+    Attributes:
+        stats: As ``make_stats`` gives them.
+        costs: A profile for other renders.
+        report: What to say of the stage.
+        stopped: Number of the signal that stopped it; None: it went to its end.
+        picture: To be written; None: it was written band by band.
+        files: Those that were written so.
+    """
+
+    stats: dict[str, Any]
+    costs: Any
+    report: LoadReport
+    stopped: int | None
+    picture: Picture | None = None
+    files: tuple[str, ...] = ()
+
+    @property
+    def samples(self) -> int:
+        """All, with those of a checkpoint."""
+        return int(self.stats["counts"]["samples"] + self.stats["resumed_samples"])

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import examples
-from wavecomb.cli.row_options import Real, add_options, option
+from wavecomb.cli.setting_options import Real, add_options, option
 
 
 def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:

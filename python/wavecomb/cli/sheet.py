@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from wavecomb.cli.options import examples, isolate_option
-from wavecomb.cli.row_options import Real
 from wavecomb.cli.sandbox import enter_to_read
+from wavecomb.cli.setting_options import Real
 
 
 @click.command(

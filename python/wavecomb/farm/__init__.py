@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from wavecomb.farm.api import run, submit
+    from wavecomb.farm.assemble import status
     from wavecomb.farm.folder import Folder
-    from wavecomb.farm.outcome import status
 
 __all__ = ["Folder", "run", "status", "submit"]
 
 _HOMES = {
     "Folder": "wavecomb.farm.folder",
     "run": "wavecomb.farm.api",
-    "status": "wavecomb.farm.outcome",
+    "status": "wavecomb.farm.assemble",
     "submit": "wavecomb.farm.api",
 }
 

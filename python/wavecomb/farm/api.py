@@ -11,10 +11,10 @@ from typing import Any
 from wavecomb.errors import WavecombError
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Job, Task
-from wavecomb.farm.maps import parse_maps
 from wavecomb.farm.planning import complete, default_folder, shot_of
 from wavecomb.farm.tiling import parse_tile, parse_tiles
 from wavecomb.load_options import LoadOptions, split
+from wavecomb.path_maps import parse_maps
 
 
 def submit(

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.assemble import is_finished, machine_of
+from wavecomb.farm.assemble import Outcome, is_finished, machine_of
 from wavecomb.farm.clusters import Cluster, Where, connected
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import Task, hashed
 from wavecomb.farm.machine_class import PREFIX
-from wavecomb.farm.outcome import Outcome
 from wavecomb.farm.part import has_part
 
 _TURN_S = 0.2
@@ -83,13 +82,13 @@ class Run:
     def work(self, images: list[int]) -> None:
         """Renders what is missing of these images, and writes them."""
         from wavecomb.farm.rendering import looks_for
-        from wavecomb.farm.tasks import FarmPlugin
+        from wavecomb.farm.tasks import FarmPlugin, restart_stale
 
         self._cluster.client.register_plugin(FarmPlugin(self._job.isa, self._job.hang_s))
         if not self._wait_for_workers():
             return
         self._machine = self._choose_machine(images)
-        self._restart_stale()
+        restart_stale(self._cluster.client, self._cluster.what, self._job)
         for image in images:
             shot, tiles = self._job.shot(image), self._job.rectangles(image)
             self._looks[image] = looks_for(shot) if len(tiles) > 1 else 0
@@ -164,24 +163,6 @@ class Run:
                 "their pixels would differ in the last bits; they are not used"
             )
         return best
-
-    def _restart_stale(self) -> None:
-        """Restarts workers that have read other bytes of the stage's files before."""
-        from wavecomb.farm.tasks import has_stale_files
-
-        files = [(one.path, one.sha256) for one in self._job.files]
-        client = self._cluster.client
-        told = client.run(has_stale_files, files, self._common[1], on_error="return")
-        stale = [worker for worker, is_stale in told.items() if is_stale is True]
-        if not stale:
-            return
-        try:
-            client.restart_workers(stale)
-        except ValueError:
-            raise WavecombError(
-                f"{self._cluster.what}: {stale[0]} holds an older version of the stage and has no "
-                "nanny that could restart it: restart that worker"
-            ) from None
 
     # ---- loop ------------------------------------------------------------------------------------
 

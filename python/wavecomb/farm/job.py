@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.maps import Pair, here, place
 from wavecomb.farm.tiling import MOST_TILES, Rectangle, tiles_of
+from wavecomb.path_maps import Pair, here, mapped
 from wavecomb.run.frame_names import fill, frame_text
 from wavecomb.version import version
 
@@ -179,7 +179,7 @@ class Job:
 
     def place(self, name: str) -> str:
         """Where a file of the job lies on this machine."""
-        return place(os.path.join(self.folder, name), here(self.maps))
+        return mapped(os.path.join(self.folder, name), here(self.maps))
 
     def title(self, image: int, tile: int | None = None) -> str:
         """An image, or a tile of it, in messages: "frame 12, tile 3 of 8"."""

@@ -13,8 +13,13 @@ from typing import Any
 from wavecomb.errors import WavecombError
 from wavecomb.farm.folder import Folder
 from wavecomb.farm.job import MAX_TASKS, Job, Shot
-from wavecomb.farm.refusals import check_reproducible, check_tiles, is_better_whole, needs_whole
-from wavecomb.farm.tiling import choose_tiles
+from wavecomb.farm.tiling import (
+    check_reproducible,
+    check_tiles,
+    choose_tiles,
+    is_better_whole,
+    needs_whole,
+)
 
 _UNKNOWN_WORKERS = 4
 """How many are expected where nobody says."""

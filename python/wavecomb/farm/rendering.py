@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from wavecomb.errors import WavecombError
 from wavecomb.farm.assemble import file_hash
 from wavecomb.farm.job import Job, Shot, StageFile, Task
-from wavecomb.farm.maps import here, use_maps
 from wavecomb.farm.tiling import Rectangle, border, grown, most_looks
+from wavecomb.path_maps import here, use_maps
 from wavecomb.picture.rendered import Picture, picture_of
 from wavecomb.run.bands import without_samples
 from wavecomb.run.sequence import Frames

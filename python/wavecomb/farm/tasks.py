@@ -20,7 +20,7 @@ from distributed import WorkerPlugin, get_worker
 from distributed.utils import sync
 
 from wavecomb.errors import WavecombError
-from wavecomb.farm.maps import VARIABLE, Pair, here, place, use_maps
+from wavecomb.path_maps import VARIABLE, Pair, here, mapped, use_maps
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LEAST_FREE = 1 << 16
@@ -193,7 +193,33 @@ def assemble_image(
 
 def has_stale_files(files: Iterable[tuple[str, str]], maps: list[Pair]) -> bool:
     """Whether this process read other bytes of a file: USD may hold them, so it must restart."""
-    return any(_read.get(place(path, here(maps)), sha256) != sha256 for path, sha256 in files)
+    return any(_read.get(mapped(path, here(maps)), sha256) != sha256 for path, sha256 in files)
+
+
+def restart_stale(client: Any, cluster: str, job: Any) -> None:
+    """Restarts workers that have read other bytes of a job's files before.
+
+    Args:
+        client: Dask's.
+        cluster: Its name, for messages.
+        job: The job.
+
+    Raises:
+        WavecombError: Such a worker cannot be restarted.
+    """
+    files = [(one.path, one.sha256) for one in job.files]
+    maps = [list(pair) for pair in job.maps]
+    told = client.run(has_stale_files, files, maps, on_error="return")
+    stale = [worker for worker, is_stale in told.items() if is_stale is True]
+    if not stale:
+        return
+    try:
+        client.restart_workers(stale)
+    except ValueError:
+        raise WavecombError(
+            f"{cluster}: {stale[0]} holds an older version of the stage and has no nanny that "
+            "could restart it: restart that worker"
+        ) from None
 
 
 def is_full(error: OSError, path: Path) -> bool:
@@ -230,7 +256,7 @@ def _folder(folder: str, maps: list[Pair], job: str) -> Any:
     if _own_maps is not None:
         os.environ[VARIABLE] = _own_maps
     use_maps(here(maps))
-    found = Folder(place(folder, here(maps)))
+    found = Folder(mapped(folder, here(maps)))
     if found.job.id != job:
         raise WavecombError(f"{found.path}: the job was changed: `wavecomb farm resume` continues")
     return found

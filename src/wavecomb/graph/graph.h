@@ -3,7 +3,7 @@
 ///
 /// A register holds one float per SIMD lane; a vector of 2 to 4 components occupies consecutive
 /// registers. Python compiles the shader networks of a stage to such programs
-/// (wavecomb/usd/graphs/expressions.py); this folder only runs them.
+/// (wavecomb/usd/graphs/values.py); this folder only runs them.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd
 
 from wavecomb.gui.scene.light_inputs import BRIGHTNESS, LightInput, inputs_of, light_inputs
 from wavecomb.gui.scene.stage_edits import Key, StageEdits, Step
@@ -196,8 +196,7 @@ class RenderSync:
             return
         on_stage = None
         if not self.light_reason(path):
-            up = str(UsdGeom.GetStageUpAxis(self.stage_edits.stage))
-            on_stage = light_values(self.prim(path), self.time, up)
+            on_stage = light_values(self.prim(path), self.time)
         for number, one in enumerate(stage.light_paths):
             if one != path or number >= scene.light_count:
                 continue

@@ -21,8 +21,8 @@ from wavecomb.usd.cameras.lens import lens_values, read_map
 from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.looks.network import number, pair, word
 from wavecomb.usd.stage.choice import CONFORMS
+from wavecomb.usd.stage.population import every
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.search import every
 
 Matrix = NDArray[np.float64]
 
@@ -224,8 +224,7 @@ def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadRepo
     prim = camera.GetPrim()
 
     def value(name: str, default: float) -> float:
-        attribute = prim.GetAttribute(name)
-        return number(attribute.Get(time), default) if attribute else default
+        return number(prim.GetAttribute(name).Get(time), default)
 
     stops = value("exposure", 0.0)
     iso, seconds = value("exposure:iso", 100.0), value("exposure:time", 1.0)

@@ -144,6 +144,25 @@ def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[s
     return rules
 
 
+SHARP = 1.0
+"""Crease sharpness from which an edge of polygons is drawn as an edge."""
+
+
+def sharp_edges(
+    prim: Usd.Prim, point_count: int, time: Usd.TimeCode, report: LoadReport
+) -> NDArray[np.int64] | None:
+    """Edges (k, 2) of a mesh drawn as polygons whose creases are sharp; None: it has no creases."""
+    get = prim.GetAttribute
+    indices = as_integers(get("creaseIndices").Get(time))
+    lengths = as_integers(get("creaseLengths").Get(time))
+    sharpness = as_array(get("creaseSharpnesses").Get(time))
+    if sharpness is None or not ((indices >= 0) & (indices < point_count)).all():
+        report.warn("creases that name no points of the mesh: ignored", prim.GetPath())
+        return None
+    creases = crease_pairs(indices, lengths, sharpness[:, 0])
+    return None if creases is None else creases[0][creases[1] >= SHARP].astype(np.int64)
+
+
 def crease_pairs(
     indices: Ints, lengths: Ints, sharpness: Floats
 ) -> tuple[NDArray[np.int32], Floats] | None:

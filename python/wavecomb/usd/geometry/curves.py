@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from pxr import Gf, Usd
 
 from wavecomb.usd.geometry.bad_points import WHY, bad_points, steadied
-from wavecomb.usd.geometry.deforming import points_at, points_now, step_times
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
     UV_NAMES,
@@ -27,12 +26,14 @@ from wavecomb.usd.geometry.primvar import (
     Primvar,
     PrimvarError,
     as_array,
-    find_primvar,
+    finite_uvs,
+    first_primvar,
+    plain_attribute,
     read_primvar,
 )
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.geometry.strand_detail import StrandDetail
-from wavecomb.usd.geometry.strands import Strands, lay_out
+from wavecomb.usd.geometry.skeleton import points_at, points_now, step_times
+from wavecomb.usd.geometry.strands import StrandDetail, Strands, lay_out
 from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
@@ -285,13 +286,7 @@ def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
     with contextlib.suppress(PrimvarError):
         primvar = read_primvar(prim, name, time)
     if primvar is None:
-        attribute = prim.GetAttribute(name)
-        if not attribute or not attribute.HasAuthoredValue():
-            return None
-        values = as_array(attribute.Get(time))
-        if values is None:
-            return None
-        primvar = Primvar(values, attribute.GetMetadata("interpolation") or "vertex", name)
+        return plain_attribute(prim, name, time)
     return primvar if len(primvar.values) else None
 
 
@@ -327,8 +322,7 @@ def read_uvs(
 ) -> tuple[NDArray[Any], str] | None:
     """Texture coordinates (n, 2) and their interpolation; None where there are none that fit."""
     try:
-        found = (find_primvar(prim, name, inherited, time) for name in names)
-        primvar = next((p for p in found if p is not None), None)
+        primvar = first_primvar(prim, names, inherited, time)
         if primvar is None:
             if names is not UV_NAMES:
                 what = f"no primvar {names[0]!r} for the textures of curves: made up"
@@ -338,7 +332,4 @@ def read_uvs(
     except PrimvarError as error:
         report.warn(f"{error}: ignored", prim.GetPath())
         return None
-    if not np.isfinite(values).all():
-        report.warn("texture coordinates that are not finite: set to 0", prim.GetPath())
-        values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-    return values, kind
+    return finite_uvs(values, report, prim.GetPath()), kind

@@ -6,25 +6,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pxr import Usd
+from pxr import Tf, Usd
 
+from wavecomb.run.isolate import memory, patience, trail
 from wavecomb.usd.geometry.curves import CurveArrays, CurveReader, over_shutter
-from wavecomb.usd.geometry.deforming import deforms
 from wavecomb.usd.geometry.mesh import MeshReader
 from wavecomb.usd.geometry.mesh_arrays import UV_NAMES, MeshArrays
 from wavecomb.usd.geometry.nurbs_patch import PatchReader
-from wavecomb.usd.geometry.points import PointReader
-from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.geometry.skeleton import Skeletons
-from wavecomb.usd.geometry.splats import SplatArrays, SplatReader
-from wavecomb.usd.geometry.strand_detail import StrandDetail
+from wavecomb.usd.geometry.skeleton import Skeletons, deforms
+from wavecomb.usd.geometry.splats import PointReader, SplatArrays, SplatReader
+from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces
+from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.looks.assign import Draw
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.frame_cache import MeshCache
+from wavecomb.usd.stage.origin import problem_of
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
     from wavecomb import _core
+
+WORDS = {
+    "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
+    "splats": "splats",
+}  # fmt: skip
+"""What messages call gprims, by ``Draw.kind``."""
+COUNTS = {
+    "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
+    "splats": "splats",
+}  # fmt: skip
+"""Counts of ``LoadReport`` for gprims, by ``Draw.kind``."""
 
 
 class GprimReader:
@@ -32,30 +44,20 @@ class GprimReader:
 
     def __init__(
         self,
-        time: Usd.TimeCode,
-        report: LoadReport,
+        context: LoadContext,
         surfaces: Surfaces,
         skeletons: Skeletons,
-        motion: Motion | None = None,
         cache: MeshCache | None = None,
     ) -> None:
-        """Reads at ``time``.
+        """``surfaces`` say what is subdivided or displaced; ``skeletons`` deform what they hold.
 
-        Args:
-            time: The frame.
-            report: For what is odd.
-            surfaces: Say what is subdivided or displaced.
-            skeletons: Deform what is bound to them.
-            motion: Shapes are taken over its shutter; None: at ``time`` only.
-            cache: Arrays to take from and leave there.
+        ``cache``: arrays to take from and leave there.
         """
-        self.time = time
-        self.report = report
+        self.time, self.report, self.motion = context.time, context.report, context.motion
         self.surfaces = surfaces
         self.skeletons = skeletons
-        self.motion = motion
         self.cache = cache
-        self._meshes = self._mesh_reader(report)
+        self._meshes = self._mesh_reader(self.report)
 
     def _mesh_reader(self, report: LoadReport) -> MeshReader:
         return MeshReader(self.time, report, self.surfaces.subdivide, self.skeletons, self.motion)
@@ -69,25 +71,46 @@ class GprimReader:
         return kind not in ("shape", "splats") and deforms(prim, self.skeletons.of(prim))
 
     def read(
-        self,
-        kind: str,
-        draw: Draw,
-        names: Sequence[str],
-        detail: StrandDetail | None = None,
+        self, draw: Draw, names: Sequence[str], in_world: bool, detail: StrandDetail | None = None
     ) -> MeshArrays | CurveArrays | None:
-        """The arrays of a gprim in its group's space; None where there is nothing to draw.
+        """The arrays of a gprim in its group's space; None, and reported, where nothing is drawn.
 
         Those of the frame before where they are the same.
 
         Args:
-            kind: mesh, patch, shape, curves, points or splats.
             draw: The gprim.
             names: Primvars to take texture coordinates from, the first there is.
+            in_world: Its group is the world.
             detail: Of curves; what it makes of them is of one view, and not kept.
 
         Raises:
-            MeshError: It cannot be drawn.
+            MemoryError: Nothing else could be read either.
         """
+        kind, path = draw.kind, str(draw.prim.GetPath())
+        trail.note("reading", path)
+        try:
+            shape = self._read(kind, draw, names, detail if kind == "curves" else None)
+        except MeshError as error:
+            self.report.warn(f"{WORDS[kind]} left out: {error}", path)
+            return None
+        except (Tf.ErrorException, MemoryError) as error:
+            if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
+                raise MemoryError from error
+            what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
+            self.report.warn(f"{WORDS[kind]} left out: {what}", path)
+            return None
+        if shape is None:
+            what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
+            self.report.note(what, path)
+            return None
+        coarse = problem_of(shape.bounds, draw.matrix, in_world=in_world)
+        if coarse is not None:
+            self.report.warn(coarse, path)
+        return shape
+
+    def _read(
+        self, kind: str, draw: Draw, names: Sequence[str], detail: StrandDetail | None
+    ) -> MeshArrays | CurveArrays | None:
         displaced = kind == "mesh" and self.surfaces.is_displaced(draw)
 
         def read(report: LoadReport) -> MeshArrays | CurveArrays | None:

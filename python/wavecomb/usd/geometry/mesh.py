@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from wavecomb.usd.geometry.bad_points import bad_points, steadied, without_bad
-from wavecomb.usd.geometry.cage import SCHEMES, Cage, crease_pairs, read_rules
-from wavecomb.usd.geometry.deforming import matrix_at, points_at, points_now, step_times
-from wavecomb.usd.geometry.faces import TETRAHEDRA, read_faces
+from wavecomb.usd.geometry.cage import SCHEMES, Cage, read_rules, sharp_edges
 from wavecomb.usd.geometry.mesh_arrays import (
     IDENTITY,
+    TETRAHEDRA,
     UV_NAMES,
     Array,
     MeshArrays,
@@ -24,30 +23,44 @@ from wavecomb.usd.geometry.mesh_arrays import (
     bake_normals,
     check_matrix,
     extent,
+    is_translation,
     place,
     plain,
+    read_faces,
 )
-from wavecomb.usd.geometry.normals import smooth_normals
 from wavecomb.usd.geometry.primvar import (
     Primvar,
     PrimvarError,
     as_array,
     as_integers,
     authored_names,
-    find_primvar,
+    finite_uvs,
+    first_primvar,
     from_attribute,
+    plain_attribute,
     read_primvar,
     spread,
 )
 from wavecomb.usd.geometry.shapes import read_shape
 from wavecomb.usd.geometry.shutter import Motion, Track
-from wavecomb.usd.geometry.skeleton import Skeletons, Skin, SkinError, skinned_points
-from wavecomb.usd.geometry.triangulate import MeshError, Topology, triangulate
+from wavecomb.usd.geometry.skeleton import (
+    Skeletons,
+    Skin,
+    SkinError,
+    matrix_at,
+    points_at,
+    points_now,
+    skinned_points,
+    step_times,
+)
+from wavecomb.usd.geometry.triangulate import (
+    MeshError,
+    Topology,
+    smooth_normals,
+    triangulate,
+)
 from wavecomb.usd.looks.network import word
 from wavecomb.usd.stage.report import LoadReport
-
-SHARP = 1.0
-"""Crease sharpness from which an edge of polygons is drawn as an edge."""
 
 
 def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | None:
@@ -57,14 +70,7 @@ def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | 
     return word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
 
 
-def _moves_only(matrix: Gf.Matrix4d) -> bool:
-    """Whether a transform is a translation."""
-    return bool(matrix.ExtractRotationMatrix() == _NO_TURN)
-
-
 _NORMALS = ("primvars:normals", "normals")
-
-_NO_TURN = Gf.Matrix3d(1.0)
 
 
 class MeshReader:
@@ -157,7 +163,7 @@ class MeshReader:
         normals = self._normals(prim, points, topology, scheme, names)
         primvar = self._coordinates(prim, topology, uv_names, inherited) if uv_names else None
         uvs, primvar = self._uvs(prim, topology, primvar)
-        if normals is not None and not _moves_only(matrix):
+        if normals is not None and not is_translation(matrix):
             normals = bake_normals(normals, matrix)
         cage = None
         if subdivided or displaced:
@@ -269,25 +275,12 @@ class MeshReader:
         authored = None if self.subdivide else self._authored_normals(prim, points, topology, names)
         if authored is not None or scheme == "bilinear":
             return authored
-        return smooth_normals(points, topology, self._creases(prim, topology, names))
-
-    def _creases(
-        self, prim: Usd.Prim, topology: Topology, names: frozenset[str]
-    ) -> NDArray[np.int64] | None:
-        get, time = prim.GetAttribute, self.time
-        if "creaseIndices" not in names:
-            return None
-        indices = as_integers(get("creaseIndices").Get(time))
-        lengths = as_integers(get("creaseLengths").Get(time))
-        sharpness = as_array(get("creaseSharpnesses").Get(time))
-        inside = (indices >= 0) & (indices < topology.point_count)
-        if sharpness is None or not inside.all():
-            if not self.subdivide:  # else said of the surface
-                what = "creases that name no points of the mesh: ignored"
-                self.report.warn(what, prim.GetPath())
-            return None
-        creases = crease_pairs(indices, lengths, sharpness[:, 0])
-        return None if creases is None else creases[0][creases[1] >= SHARP].astype(np.int64)
+        edges = None
+        if "creaseIndices" in names:
+            # Where the mesh is subdivided, reading the surface reports creases that are wrong.
+            report = LoadReport() if self.subdivide else self.report
+            edges = sharp_edges(prim, topology.point_count, self.time, report)
+        return smooth_normals(points, topology, edges)
 
     def _authored_normals(
         self, prim: Usd.Prim, points: Array, topology: Topology, names: frozenset[str]
@@ -298,14 +291,9 @@ class MeshReader:
         try:
             primvar = read_primvar(prim, "normals", self.time)
             if primvar is None:
-                attribute = prim.GetAttribute("normals")
-                if not attribute.HasAuthoredValue():
-                    return None
-                values = as_array(attribute.Get(self.time))
-                if values is None or len(values) == 0:
-                    return None
-                kind = attribute.GetMetadata("interpolation") or "vertex"
-                primvar = Primvar(values, kind, "normals")
+                primvar = plain_attribute(prim, "normals", self.time)
+            if primvar is None:
+                return None
             primvar = self._skinned_normals(prim, primvar, topology)
             normals, at = spread(primvar, topology, 3)
         except PrimvarError as error:
@@ -351,9 +339,7 @@ class MeshReader:
     ) -> Primvar | None:
         """The primvar to take texture coordinates from; all at (0, 0) where it is not there."""
         try:
-            primvar = next(
-                (p for p in (self._find(prim, name, inherited) for name in names) if p), None
-            )
+            primvar = first_primvar(prim, names, inherited, self.time)
             if primvar is None:
                 primvar = self._any_coordinates(prim)
                 if primvar is None and names is not UV_NAMES:
@@ -380,15 +366,10 @@ class MeshReader:
         except PrimvarError as error:
             self.report.warn(f"{error}: ignored", prim.GetPath())
             return None, None
-        if not np.isfinite(uvs).all():
-            self.report.warn("texture coordinates that are not finite: set to 0", prim.GetPath())
-            uvs = np.nan_to_num(uvs, nan=0.0, posinf=0.0, neginf=0.0)
+        uvs = finite_uvs(uvs, self.report, prim.GetPath())
         if at == "constant":
             uvs = np.repeat(uvs, topology.point_count, axis=0)
         return uvs, primvar
-
-    def _find(self, prim: Usd.Prim, name: str, inherited: Sequence[Any]) -> Primvar | None:
-        return find_primvar(prim, name, inherited, self.time)
 
     def _any_coordinates(self, prim: Usd.Prim) -> Primvar | None:
         """The first primvar whose type says texture coordinates."""

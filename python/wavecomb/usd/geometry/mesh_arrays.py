@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf
+from pxr import Gf, Usd, UsdGeom
 
 from wavecomb import _core
 from wavecomb.usd.geometry.cage import Cage
+from wavecomb.usd.geometry.primvar import as_array, as_integers
 from wavecomb.usd.geometry.triangulate import MeshError, Topology
 
 Array = NDArray[np.float32]
@@ -24,6 +25,7 @@ UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
 """Texture coordinates that are looked for where no material says which."""
 
 _CHUNK = 1 << 18
+_NO_TURN = Gf.Matrix3d(1.0)
 
 _NOWHERE = "a point is not finite or absurdly far away"
 
@@ -49,6 +51,11 @@ class MeshArrays:
     bounds: Array
     topology: Topology | None = None
     cage: Cage | None = None
+
+
+def is_translation(matrix: Gf.Matrix4d) -> bool:
+    """Whether a transform only moves."""
+    return bool(matrix.ExtractRotationMatrix() == _NO_TURN)
 
 
 def check_matrix(matrix: Gf.Matrix4d) -> bool:
@@ -141,3 +148,39 @@ def extent(positions: Array) -> Array:
     if not (a > -LIMIT and b > -LIMIT and c > -LIMIT and x < LIMIT and y < LIMIT and z < LIMIT):
         raise MeshError(_NOWHERE)
     return bounds
+
+
+Ints = NDArray[np.int32]
+
+TETRAHEDRA = "TetMesh"
+"""Type name of the prims that have tetrahedra in place of faces."""
+
+
+def read_faces(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Ints, Ints]:
+    """Corners of each face, and the points at all corners, of a Mesh or a TetMesh.
+
+    Raises:
+        MeshError: Tetrahedra name points that are not there.
+    """
+    get = prim.GetAttribute
+    if prim.GetTypeName() == TETRAHEDRA:
+        indices = _surface(prim, time)
+        return np.full(len(indices) // 3, 3, np.int32), indices
+    counts = as_integers(get("faceVertexCounts").Get(time))
+    return counts, as_integers(get("faceVertexIndices").Get(time)) if len(counts) else counts
+
+
+def _surface(prim: Usd.Prim, time: Usd.TimeCode) -> Ints:
+    """Triangles of the outside of tetrahedra: as authored, else those that only one of them has."""
+    values = as_array(prim.GetAttribute("surfaceFaceVertexIndices").Get(time))
+    if values is None or len(values) == 0:
+        tetrahedra = as_array(prim.GetAttribute("tetVertexIndices").Get(time))
+        if tetrahedra is None or tetrahedra.shape != (len(tetrahedra), 4):
+            return np.empty(0, np.int32)
+        points = prim.GetAttribute("points").Get(time)
+        if tetrahedra.min() < 0 or tetrahedra.max() >= len(points or ()):
+            raise MeshError("tetVertexIndices name points that are not there")
+        values = as_array(UsdGeom.TetMesh.ComputeSurfaceFaces(UsdGeom.TetMesh(prim), time))
+    if values is None or values.shape != (len(values), 3):
+        return np.empty(0, np.int32)
+    return np.ascontiguousarray(values.reshape(-1), np.int32)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.deforming import points_at, points_now, step_times
 from wavecomb.usd.geometry.mesh_arrays import (
     UV_NAMES,
     Array,
@@ -21,11 +20,11 @@ from wavecomb.usd.geometry.mesh_arrays import (
     check_matrix,
     extent,
 )
-from wavecomb.usd.geometry.normals import smooth_normals
-from wavecomb.usd.geometry.nurbs import Floats, Spline
-from wavecomb.usd.geometry.primvar import PrimvarError, as_array, find_primvar
+from wavecomb.usd.geometry.nurbs_curves import Floats, Spline
+from wavecomb.usd.geometry.primvar import PrimvarError, as_array, first_primvar
 from wavecomb.usd.geometry.shutter import Motion
-from wavecomb.usd.geometry.triangulate import MeshError, Topology
+from wavecomb.usd.geometry.skeleton import points_at, points_now, step_times
+from wavecomb.usd.geometry.triangulate import MeshError, Topology, smooth_normals
 from wavecomb.usd.looks.network import number, word
 from wavecomb.usd.stage.report import LoadReport
 
@@ -186,8 +185,7 @@ class PatchReader:
         """(n, 2): of a primvar of the control points, else the parameters."""
         u, v = axes
         try:
-            found = (find_primvar(prim, name, inherited, self.time) for name in names)
-            primvar = next((p for p in found if p is not None), None)
+            primvar = first_primvar(prim, names, inherited, self.time)
             if primvar is not None:
                 values = primvar.values[:, :2]
                 if values.shape == (len(heavy), 2) and np.isfinite(values).all():

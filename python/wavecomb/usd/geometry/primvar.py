@@ -112,9 +112,7 @@ def in_linear(primvar: Primvar, report: LoadReport, place: object) -> Primvar:
 def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
     """The primvar ``name`` authored on a prim itself, or None."""
     attribute = prim.GetAttribute("primvars:" + name)
-    if not attribute or not attribute.HasAuthoredValue():
-        return None
-    return from_attribute(attribute, name, time)
+    return from_attribute(attribute, name, time) if attribute.HasAuthoredValue() else None
 
 
 def find_primvar(
@@ -128,6 +126,31 @@ def find_primvar(
         if primvar.GetPrimvarName() == name:
             return from_attribute(primvar.GetAttr(), name, time)
     return None
+
+
+def first_primvar(
+    prim: Usd.Prim, names: Sequence[str], inherited: Sequence[Any], time: Usd.TimeCode
+) -> Primvar | None:
+    """The first of some primvars that a prim has or inherits."""
+    found = (find_primvar(prim, name, inherited, time) for name in names)
+    return next((primvar for primvar in found if primvar is not None), None)
+
+
+def plain_attribute(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
+    """An attribute that is no primvar, as one of points; None where it has no values."""
+    attribute = prim.GetAttribute(name)
+    values = as_array(attribute.Get(time)) if attribute.HasAuthoredValue() else None
+    if values is None or len(values) == 0:
+        return None
+    return Primvar(values, attribute.GetMetadata("interpolation") or "vertex", name)
+
+
+def finite_uvs(uvs: NDArray[Any], report: LoadReport, place: object) -> NDArray[Any]:
+    """Texture coordinates, and a warning where some have to be set to 0."""
+    if np.isfinite(uvs).all():
+        return uvs
+    report.warn("texture coordinates that are not finite: set to 0", place)
+    return np.nan_to_num(uvs, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:

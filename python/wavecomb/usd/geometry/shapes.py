@@ -52,13 +52,10 @@ def read_shape(prim: Usd.Prim, time: Usd.TimeCode, names: frozenset[str]) -> Sha
         return None
 
     def number(name: str, default: float) -> float:
-        attribute = prim.GetAttribute(name)
-        value = attribute.Get(time) if attribute else None
-        return abs(number_of(value, default))
+        return abs(number_of(prim.GetAttribute(name).Get(time), default))
 
     def token(name: str, default: str) -> str:
-        attribute = prim.GetAttribute(name)
-        value = attribute.Get(time) if attribute else None
+        value = prim.GetAttribute(name).Get(time)
         return word(value) if word(value) in ("X", "Y", "Z") else default
 
     shape = _READERS[kind](number, token)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdVol's ParticleField3DGaussianSplat as arrays for the core."""
+"""UsdGeomPoints as spheres, and Gaussian splats."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd
 
-from wavecomb.usd.geometry.curves import Array, CurveArrays, thick_extent
-from wavecomb.usd.geometry.mesh_arrays import bake, check_matrix
+from wavecomb.usd.geometry.bad_points import bad_points
+from wavecomb.usd.geometry.curves import (
+    Array,
+    CurveArrays,
+    read_points,
+    read_uvs,
+    read_widths,
+    thick_extent,
+    uniform_scale,
+)
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, bake, check_matrix
 from wavecomb.usd.geometry.primvar import as_array
 from wavecomb.usd.geometry.strands import lay_out_points
+from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
 SPLATS = "ParticleField3DGaussianSplat"
@@ -105,8 +116,7 @@ class SplatReader:
     def _values(self, prim: Usd.Prim, name: str, width: int) -> NDArray[Any] | None:
         """(n, width) of an attribute in floats, else in halves; None where neither has values."""
         for full in (name, f"{name}h"):
-            attribute = prim.GetAttribute(full)
-            values = as_array(attribute.Get(self.time)) if attribute else None
+            values = as_array(prim.GetAttribute(full).Get(self.time))
             if values is not None and len(values) and values.shape[1] == width:
                 return np.asarray(values, np.float32)
         return None
@@ -151,3 +161,54 @@ class SplatReader:
 
 def _plain(values: NDArray[Any]) -> Array:
     return np.ascontiguousarray(values, np.float32)
+
+
+class PointReader:
+    """Reads points of one stage."""
+
+    def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
+        self.time = time
+        self.report = report
+
+    def points(
+        self,
+        prim: Usd.Prim,
+        matrix: Gf.Matrix4d,
+        uv_names: Sequence[str],
+        inherited: Sequence[Any] = (),
+    ) -> CurveArrays | None:
+        """Points in their group's space; None where there are none.
+
+        Arguments and errors are those of ``CurveReader.curves``.
+        """
+        check_matrix(matrix)
+        positions = read_points(prim, self.time)
+        if positions is None:
+            return None
+        layout = lay_out_points(len(positions))
+        bad = bad_points(positions)
+        if bad.all():
+            raise MeshError("their places are not finite or absurdly far away")
+        if matrix != IDENTITY:
+            positions = bake(positions, matrix)
+        widths, _ = read_widths(prim, layout, self.time, self.report)
+        radii = np.asarray(widths[:, 0] * (0.5 * (uniform_scale(matrix) or 1.0)), np.float32)
+        if len(radii) == 1:
+            radii = np.repeat(radii, len(positions))
+        if bad.any():
+            what = f"{int(bad.sum())} of {len(bad)} points left out"
+            where = prim.GetPath()
+            self.report.warn(f"{what}: they are not finite or absurdly far away", where)
+            positions, radii = positions.copy(), radii.copy()
+            positions[bad], radii[bad] = positions[np.flatnonzero(~bad)[0]], 0.0
+        bounds = thick_extent(positions, radii)
+        uvs = None
+        if uv_names:
+            found = read_uvs(prim, layout, uv_names, inherited, self.time, self.report)
+            if found is not None:
+                pairs = np.asarray(found[0], np.float32)
+                wanted = np.broadcast_to(pairs, (len(positions), 2))
+                uvs = np.ascontiguousarray(wanted)
+        return CurveArrays(
+            "sphere", positions, None, np.ascontiguousarray(radii), None, uvs, bounds, layout
+        )

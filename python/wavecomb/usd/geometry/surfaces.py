@@ -18,14 +18,14 @@ from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.attributes import RefinedAttributes
 from wavecomb.usd.geometry.cage import Cage
 from wavecomb.usd.geometry.mesh_arrays import MeshArrays
-from wavecomb.usd.geometry.placements import placements
 from wavecomb.usd.geometry.primvar import as_integers, spread
 from wavecomb.usd.geometry.view_size import ViewSize
 from wavecomb.usd.looks.assign import Draw, Worn
+from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.group import placements
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
-    from wavecomb import _core
     from wavecomb.usd.looks.material import MaterialTable
     from wavecomb.usd.stage.frame_cache import RefinedCache
     from wavecomb.usd.stage.group import Group
@@ -110,23 +110,11 @@ class Surface:
 class Surfaces:
     """The subdivision surfaces and displaced meshes of a stage."""
 
-    def __init__(
-        self,
-        builder: _core.SceneBuilder,
-        materials: MaterialTable,
-        report: LoadReport,
-        *,
-        subdivision: str | int = "auto",
-        size: tuple[int, int] = (600, 600),
-        threads: int = 0,
-    ) -> None:
-        """``size``: of the picture that automatic levels are for."""
-        self.builder = builder
+    def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
+        self.builder, self.report = context.builder, context.report
+        self.choice = parse_level(context.options.subdivision)
+        self.size, self.threads = context.options.size, context.options.threads
         self.materials = materials
-        self.report = report
-        self.choice = subdivision
-        self.size = size
-        self.threads = threads
         self.cache: RefinedCache | None = None
         self._all: list[Surface] = []
 

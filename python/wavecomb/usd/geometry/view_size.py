@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from wavecomb.picture.output import camera_window, pixel_aspect
 from wavecomb.usd.cameras.camera import View
 from wavecomb.usd.geometry.cage import Cage
+
+if TYPE_CHECKING:
+    pass
 
 Matrices = NDArray[np.float64]
 

@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What filters of lights are, and their inputs, by who wrote them."""
+"""Filters of lights: what they are, their inputs by who wrote them, and gels.
+
+Gels multiply all the light of a lamp, whatever its kind: Karma's ``kma_lfilter_gel`` and what its
+barn doors and gobos say beside, RenderMan's PxrIntMult.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pxr import Usd
 
+from wavecomb.picture.working_space import LUMINANCE
 from wavecomb.usd.looks.colour_space import Colour
 from wavecomb.usd.looks.network import colour, number, read_colour, word
 from wavecomb.usd.stage.report import LoadReport
@@ -34,9 +40,7 @@ class FilterInputs:
         for name in names:
             for prefix in self.prefixes:
                 attribute = self.prim.GetAttribute(prefix + name)
-                if attribute and (
-                    attribute.HasAuthoredValue() or attribute.HasAuthoredConnections()
-                ):
+                if attribute.HasAuthoredValue() or attribute.HasAuthoredConnections():
                     return attribute
         return None
 
@@ -76,11 +80,78 @@ def kind_of(prim: Usd.Prim) -> str:
     """What a filter is: its prim's type, or what a LightFilter's ``shaderId`` says."""
     name = str(prim.GetTypeName())
     if name in ("LightFilter", "PluginLightFilter", ""):
-        attribute = prim.GetAttribute("lightFilter:shaderId")
-        name = word(attribute.Get(), "") if attribute else ""
+        name = word(prim.GetAttribute("lightFilter:shaderId").Get())
     return name
 
 
 def plain_kind(prim: Usd.Prim) -> str:
     """That in small letters, without what comes before a colon, and without underscores."""
     return kind_of(prim).lower().replace("_", "").rsplit(":", 1)[-1]
+
+
+GELS = frozenset({"kmalfiltergel", "pxrintmultlightfilter", "pxrintmult"})
+"""Kinds of filters that are nothing but gels."""
+
+_WITH_GEL = GELS | {"kmalfilterbarndoor", "kmalfiltergobo"}
+
+
+@dataclass(frozen=True)
+class Gel:
+    """What a light's gels do together.
+
+    Attributes:
+        tint: Factor of the light's colour, linear Rec. 709.
+        saturation: Of what comes of that: 0 is grey of its luminance.
+        diffuse, specular: Factors of the light's own multipliers.
+    """
+
+    tint: Colour = (1.0, 1.0, 1.0)
+    saturation: float = 1.0
+    diffuse: float = 1.0
+    specular: float = 1.0
+
+    def over(self, rgb: Colour) -> Colour:
+        """A light's colour through it."""
+        r, g, b = (c * t for c, t in zip(rgb, self.tint, strict=True))
+        if self.saturation == 1:
+            return (r, g, b)
+        grey = sum(w * c for w, c in zip(LUMINANCE, (r, g, b), strict=True))
+        r, g, b = (max(grey + self.saturation * (c - grey), 0.0) for c in (r, g, b))
+        return (r, g, b)
+
+    def multiplied(self, options: Mapping[str, Any]) -> dict[str, float]:
+        """The multipliers of a light whose other options are known, where they change."""
+        return {
+            name: factor * float(options.get(name, 1.0))
+            for name, factor in (("diffuse", self.diffuse), ("specular", self.specular))
+            if factor != 1
+        }
+
+
+def gel_of(light: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> Gel:
+    """The gels among a light's filters, together; also of what is listed as not supported."""
+    gel = Gel()
+    for _, prim in filter_prims(light):
+        if prim is not None and plain_kind(prim) in _WITH_GEL:
+            gel = _together(gel, _read(FilterInputs(prim, time), report))
+    return gel
+
+
+def _read(inputs: FilterInputs, report: LoadReport) -> Gel:
+    exposure = min(inputs.number("exposure", 0.0), 200.0)
+    power = max(inputs.number("intensity", 1.0), 0.0) * 2.0**exposure
+    tint = inputs.colour("tint", (1.0, 1.0, 1.0), report)
+    r, g, b = (power * max(c, 0.0) for c in tint)
+    return Gel(
+        (r, g, b),
+        max(inputs.number("saturation", 1.0), 0.0),
+        max(inputs.number("diffuse", 1.0, "diffusescale", "diffuse_scale"), 0.0),
+        max(inputs.number("specular", 1.0, "specularscale", "specular_scale"), 0.0),
+    )
+
+
+def _together(a: Gel, b: Gel) -> Gel:
+    r, g, c = (x * y for x, y in zip(a.tint, b.tint, strict=True))
+    return Gel(
+        (r, g, c), a.saturation * b.saturation, a.diffuse * b.diffuse, a.specular * b.specular
+    )

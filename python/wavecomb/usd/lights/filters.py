@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.lights.filter_inputs import (
+    GELS,
     OF_LIGHTS,
     FilterInputs,
     filter_prims,
     kind_of,
     plain_kind,
 )
-from wavecomb.usd.lights.gels import GELS
 from wavecomb.usd.looks.network import asset_file, number, space_of
 from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.usd.stage.context import LoadContext
 
 if TYPE_CHECKING:
     from wavecomb import _core
@@ -83,13 +83,10 @@ def add_filters(
 class FilterReader:
     """Reads the filters of the lights of one stage."""
 
-    def __init__(
-        self, time: Usd.TimeCode, textures: TextureTable | None, report: LoadReport
-    ) -> None:
-        self._time = time
+    def __init__(self, context: LoadContext, textures: TextureTable | None) -> None:
+        self._time, self._report = context.time, context.report
         self._textures = textures
-        self._report = report
-        self._collections = Collections(report)
+        self._collections = Collections(self._report)
         self._readers: dict[str, Callable[[FilterInputs, Usd.Prim], Filter | None]] = {
             "pxrbarnlightfilter": self._barn, "pxrbarn": self._barn,
             "pxrcookielightfilter": self._cookie, "pxrcookie": self._cookie,
@@ -250,8 +247,7 @@ class FilterReader:
 
     def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
         """A distance at which the light is small; half the side of the square around its cone."""
-        attribute = light.GetAttribute("inputs:shaping:cone:angle")
-        angle = number(attribute.Get(self._time), 90.0) if attribute else 90.0
+        angle = number(light.GetAttribute("inputs:shaping:cone:angle").Get(self._time), 90.0)
         if not angle < 89.0:
             self._report.missing(
                 "doors of lights without a cone (as of 45 degrees)", inputs.prim.GetPath()
@@ -269,8 +265,7 @@ class FilterReader:
             sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(attribute))
             node = sources[0].GetPrim() if sources else None
             attribute = node and FilterInputs(node, self._time).attribute("filename", "file")
-        value = attribute.Get(self._time) if attribute is not None else None
-        path = asset_file(value, attribute) if value is not None else ""
+        path = asset_file(attribute.Get(self._time), attribute) if attribute is not None else ""
         if not path or self._textures is None:
             self._report.missing(
                 f"light filter without a file for {names[0]}", inputs.prim.GetPath()

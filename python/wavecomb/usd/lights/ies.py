@@ -8,15 +8,11 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wavecomb.usd.stage.report import LoadReport
-
-if TYPE_CHECKING:
-    from wavecomb import _core
+from wavecomb.usd.stage.context import LoadContext
 
 Floats = NDArray[np.float64]
 
@@ -202,9 +198,8 @@ def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) 
 class IesTable:
     """Adds profiles to the scene, each file once."""
 
-    def __init__(self, builder: _core.SceneBuilder, report: LoadReport) -> None:
-        self._builder = builder
-        self._report = report
+    def __init__(self, context: LoadContext) -> None:
+        self._builder, self._report = context.builder, context.report
         self._found: dict[str, int | IesError] = {}
 
     def add(self, path: str, prim: object) -> int | None:

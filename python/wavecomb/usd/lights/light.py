@@ -21,9 +21,8 @@ from wavecomb.light_table import (
 )
 from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd.lights.dome import DomeReader
+from wavecomb.usd.lights.filter_inputs import Gel, gel_of
 from wavecomb.usd.lights.filters import Filter, FilterReader
-from wavecomb.usd.lights.gels import Gel, gel_of
-from wavecomb.usd.lights.links import LinkTable
 from wavecomb.usd.looks.colour_space import Colour
 from wavecomb.usd.looks.network import (
     UDIM,
@@ -36,8 +35,9 @@ from wavecomb.usd.looks.network import (
 )
 from wavecomb.usd.looks.pixels import Image
 from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.stage.collections import Collections, Rules
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
-from wavecomb.usd.stage.report import LoadReport
 
 KINDS = kind_of_prims()
 """Lights that are drawn, by prim type."""
@@ -94,28 +94,21 @@ class LightReader:
 
     def __init__(
         self,
-        time: Usd.TimeCode,
-        up_axis: str,
+        context: LoadContext,
         textures: TextureTable | None,
         groups: LightGroups,
-        report: LoadReport,
         profiles: Profiles | None = None,
-        hidden: bool = False,
         links: LinkTable | None = None,
     ) -> None:
-        """``textures``, ``profiles``, ``links``: None: lights are read without theirs.
-
-        ``hidden``: no ray meets their shapes.
-        """
-        self.time = time
+        """``textures``, ``profiles``, ``links``: None: lights are read without theirs."""
+        self.time, self.report = context.time, context.report
+        self.hidden = context.hides_lights
         self.textures = textures
         self.groups = groups
-        self.report = report
         self.profiles = profiles
-        self.hidden = hidden
         self.links = links
-        self.domes = DomeReader(time, up_axis, textures, report)
-        self.filters = FilterReader(time, textures, report)
+        self.domes = DomeReader(context, textures)
+        self.filters = FilterReader(context, textures)
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
         """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
@@ -199,8 +192,6 @@ class LightReader:
 
     def _get(self, prim: Usd.Prim, name: str, default: Any) -> Any:
         attribute = prim.GetAttribute(f"inputs:{name}")
-        if not attribute:
-            return default
         if attribute.HasAuthoredConnections():
             self.report.missing(f"light input {name} from a shader", prim.GetPath())
         value = attribute.Get(self.time)
@@ -286,13 +277,11 @@ class LightReader:
 
     def _profile_file(self, prim: Usd.Prim) -> str:
         attribute = prim.GetAttribute("inputs:shaping:ies:file")
-        value = attribute.Get(self.time) if attribute else None
-        return asset_file(value, attribute) if value is not None else ""
+        return asset_file(attribute.Get(self.time), attribute)
 
     def _texture(self, prim: Usd.Prim) -> int | None:
         attribute = prim.GetAttribute("inputs:texture:file")
-        value = attribute.Get(self.time) if attribute else None
-        path = asset_file(value, attribute) if value is not None else ""
+        path = asset_file(attribute.Get(self.time), attribute)
         if UDIM in path:
             self.report.missing("UDIM textures of lights (first tile used)", prim.GetPath())
             path = next((file for _, file in tile_files(path)), path)
@@ -309,3 +298,27 @@ class LightReader:
                 return made
         wraps = ("clamp", "clamp") if rect else ("repeat", "clamp")
         return self.textures.add(path, image, tag, *wraps, is_colour=True)
+
+
+class LinkTable:
+    """Adds the sets of geometry that lights are linked to, equal ones once."""
+
+    def __init__(self, context: LoadContext) -> None:
+        self._builder = context.builder
+        self._collections = Collections(context.report)
+        self._known: dict[tuple[tuple[str, str], ...], int] = {}
+
+    def set_of(self, prim: Usd.Prim, name: str) -> int | None:
+        """The set of a light's collection, lightLink or shadowLink; None: it names everything."""
+        rules = self._collections.rules(prim, name)
+        return None if rules is None else self._set(rules)
+
+    def nothing(self) -> int:
+        """The set that nothing is in."""
+        return self._set({})
+
+    def _set(self, rules: Rules) -> int:
+        key = tuple(sorted(rules.items()))
+        if key not in self._known:
+            self._known[key] = self._builder.add_geometry_set(rules)
+        return self._known[key]

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Sdf, UsdLux
@@ -14,10 +13,7 @@ from wavecomb.usd.looks.assign import Draw
 from wavecomb.usd.looks.material import MaterialTable
 from wavecomb.usd.looks.network import word
 from wavecomb.usd.looks.surface import Surface
-from wavecomb.usd.stage.report import LoadReport
-
-if TYPE_CHECKING:
-    from wavecomb import _core
+from wavecomb.usd.stage.context import LoadContext
 
 NO_RESPONSE = "noMaterialResponse"
 SYNC_MODES = ("materialGlowTintsLight", "independent", NO_RESPONSE)
@@ -46,18 +42,11 @@ class MeshLights:
         any: Whether there is one.
     """
 
-    def __init__(
-        self,
-        builder: _core.SceneBuilder,
-        lights: LightReader,
-        materials: MaterialTable,
-        report: LoadReport,
-    ) -> None:
+    def __init__(self, context: LoadContext, lights: LightReader, materials: MaterialTable) -> None:
         self.any = False
-        self._builder = builder
+        self._builder, self._report = context.builder, context.report
         self._lights = lights
         self._materials = materials
-        self._report = report
 
     def of(self, draw: Draw, kind: str) -> MeshLight | None:
         """The light that a gprim is; None: it is none.

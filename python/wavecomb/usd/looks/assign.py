@@ -22,6 +22,7 @@ from wavecomb.usd.graphs.values import PARAMETERS, GraphTooLarge
 from wavecomb.usd.looks.material import DEFAULT_COLOUR, MaterialTable
 from wavecomb.usd.looks.network import colour, number
 from wavecomb.usd.looks.surface import COLOUR_PARAMETERS, Surface
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 
 FaceIds = NDArray[np.uint32]
@@ -87,10 +88,9 @@ class Worn:
 class Assigner:
     """Gives meshes their materials."""
 
-    def __init__(self, table: MaterialTable, time: Usd.TimeCode, report: LoadReport) -> None:
+    def __init__(self, context: LoadContext, table: MaterialTable) -> None:
+        self.time, self.report = context.time, context.report
         self.table = table
-        self.time = time
-        self.report = report
         self._last: tuple[Draw, dict[Sdf.Path, Surface]] | None = None
         self._bound_graphs: dict[tuple[Any, ...], tuple[Surface, Surface]] = {}
 
@@ -374,7 +374,7 @@ class _Primvars:
 def _text_of(draw: Draw, name: str, time: Usd.TimeCode) -> str | None:
     """The text of a constant primvar; None where it is none."""
     attribute = draw.prim.GetAttribute(f"primvars:{name}")
-    if not attribute or not attribute.HasAuthoredValue():
+    if not attribute.HasAuthoredValue():
         inherited = [p.GetAttr() for p in draw.inherited if p.GetPrimvarName() == name]
         if not inherited:
             return None

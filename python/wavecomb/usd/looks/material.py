@@ -14,9 +14,8 @@ from pxr import Sdf, Tf, Usd, UsdShade
 
 from wavecomb.picture.working_space import LUMINANCE, from_rec709
 from wavecomb.usd import mtlx
-from wavecomb.usd.graphs.surface import graphs_of, in_working_space
+from wavecomb.usd.graphs.surface import graphs_of, in_working_space, sampled
 from wavecomb.usd.graphs.values import PARAMETERS, Expressions, GraphTooLarge, fit, numbers
-from wavecomb.usd.looks.emission import mean_emission
 from wavecomb.usd.looks.network import shader_id, shader_name, surface_outputs
 from wavecomb.usd.looks.preview import PreviewReader
 from wavecomb.usd.looks.surface import (
@@ -28,11 +27,11 @@ from wavecomb.usd.looks.surface import (
     is_cloudy,
 )
 from wavecomb.usd.looks.texture import TextureTable
+from wavecomb.usd.stage.context import BINDING_PURPOSES, LoadContext
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.inside import filling
+from wavecomb.usd.volumes.material import filling
 
 if TYPE_CHECKING:
-    from wavecomb import _core
     from wavecomb.usd.graphs.values import Graph
 
 INHERIT_MATERIAL = 0xFFFFFFFF
@@ -41,9 +40,6 @@ INHERIT_MATERIAL = 0xFFFFFFFF
 DEFAULT_COLOUR = (0.5, 0.5, 0.5)
 """The colour of what has neither a material nor a display colour."""
 
-
-BINDING_PURPOSES = ("full", "preview")
-"""Purposes of bindings where render settings name none; each has all purposes after it."""
 
 PREVIEW = "preview"
 """``surface_source`` of UsdPreviewSurface."""
@@ -124,21 +120,13 @@ class BindingScan:
 class MaterialTable:
     """Adds materials to the scene, equal ones once."""
 
-    def __init__(
-        self,
-        builder: _core.SceneBuilder,
-        textures: TextureTable,
-        time: Usd.TimeCode,
-        report: LoadReport,
-        apart: bool = False,
-    ) -> None:
+    def __init__(self, context: LoadContext, textures: TextureTable, apart: bool = False) -> None:
         """``apart``: those of different prims stay apart even where they are equal."""
         self._apart = apart
         self._names: list[str] = []
-        self._builder = builder
+        self._builder, self._report = context.builder, context.report
+        self.time = context.time
         self._textures = textures
-        self.time = time
-        self._report = report
         self._surfaces: dict[Sdf.Path, Surface] = {}
         self._by_object: dict[int, tuple[UsdShade.Material, Surface]] = {}
         self._of_objects: dict[tuple[Any, ...], Surface] = {}
@@ -385,3 +373,22 @@ def with_attributes(surface: Surface, varying: Sequence[str], working: str) -> S
         outputs[parameter] = value
     rest = {key: name for key, name in surface.primvars.items() if key not in varying}
     return replace(surface, primvars=rest, graph=graphs_of(outputs, names))
+
+
+def mean_emission(surface: Surface, textures: TextureTable) -> NDArray[np.float64]:
+    """(3,) What a surface emits, as a mean over texture coordinates; estimated for graphs."""
+    graph = surface.graph
+    if graph is not None and graph.emission is not None:
+        value = dict(graph.outputs)["emission"]
+        white = np.broadcast_to(sampled(value).mean(axis=0, dtype=np.float64), 3)
+        means = [textures.mean(texture)[:3] for texture, _ in graph.emission.images]
+        return np.asarray(white * np.mean(means, axis=0) if means else white)
+    use = surface.textures.get("emission")
+    if use is None:
+        emission = surface.parameters.get("emission", (0.0, 0.0, 0.0))
+        return np.asarray(emission, np.float64)
+    texel = textures.mean(use["texture"])
+    value = texel * np.array(use["scale"]) + np.array(use["bias"])
+    if use["channel"] == "rgb":
+        return np.asarray(value[:3])
+    return np.full(3, value["rgba".index(use["channel"])])

@@ -35,6 +35,7 @@ from wavecomb.usd.looks.network import (
 )
 from wavecomb.usd.looks.preview import INPUTS, constant, program_of
 from wavecomb.usd.looks.surface import COLOUR, COLOUR_PARAMETERS, SWITCH, InputDefinition
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
@@ -223,7 +224,7 @@ class _AnyProfile:
         return 0
 
 
-def light_values(prim: Usd.Prim, time: Usd.TimeCode, up_axis: str) -> dict[str, Any] | None:
+def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
     """What the loader gives ``SceneBuilder.add_light`` for a light outside of instances.
 
     Numbers, colours and switches, by the names of ``wavecomb.light_table``, all that the kind of
@@ -243,8 +244,8 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode, up_axis: str) -> dict[str, 
         elif own != IDENTITY:
             matrix = own * matrix
     scale = abs(matrix.GetDeterminant3()) ** (1.0 / 3.0)
-    report = LoadReport()
-    reader = LightReader(time, up_axis, None, LightGroups(report), report, _AnyProfile())
+    context = LoadContext(prim.GetStage(), time, None)  # type: ignore[arg-type]
+    reader = LightReader(context, None, LightGroups(context.report), _AnyProfile())
     light = reader.read(prim, scale)
     return {
         row.name: light.options.get(row.name, row.default)

@@ -68,8 +68,7 @@ _IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> str:
     """The program that ``wavecomb:program`` of a material asks for, else principled."""
-    attribute = material.GetAttribute("wavecomb:program")
-    name = attribute.Get(time) if attribute else None
+    name = material.GetAttribute("wavecomb:program").Get(time)
     if name is None:
         return "principled"
     if word(name) not in preview_programs():
@@ -142,7 +141,7 @@ class PreviewReader:
                 parameters[parameter] = colour(attribute.Get(self.time), (0.0, 0.0, 0.0))
         for row in own_parameters(program):
             attribute = self.material.GetAttribute(row.attribute)
-            if attribute and attribute.HasAuthoredValue():
+            if attribute.HasAuthoredValue():
                 parameters[row.name] = row.in_range(number(attribute.Get(self.time), row.default))
         displacement = self._displacement(shader)
         return Surface(

@@ -28,6 +28,7 @@ from wavecomb.usd.looks.colour_space import (
 )
 from wavecomb.usd.looks.network import UDIM, image_files, tile_files
 from wavecomb.usd.looks.pixels import Image, ReadAhead, TextureError, read_image, stamp_of
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 
 if TYPE_CHECKING:
@@ -131,28 +132,26 @@ class TextureTable:
 
     def __init__(
         self,
-        builder: _core.SceneBuilder,
-        report: LoadReport,
-        threads: int = 0,
+        context: LoadContext,
         reuse: TextureCache | None = None,
-        working: str = "rec709",
         store: _core.TextureStore | None = None,
     ) -> None:
         """``reuse``: textures to share where their files are what they were.
 
-        ``working``: the space that colours are converted to, of ``WORKING_SPACES``. ``store``: that
-        of the builder. ``drops`` may be set to say how many of its finest levels a texture leaves
-        out, and ``origin`` to the world position that the scene is built around, for graphs.
+        ``store``: that of the builder. ``drops`` may be set to say how many of its finest levels a
+        texture leaves out, and ``origin`` to the world position that the scene is built around,
+        for graphs. The stage of the context is not kept: a table may outlive it.
         """
         self.store = store
-        self.working = working
+        self.working = context.options.working_space
         self.origin = (0.0, 0.0, 0.0)
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
-        self._builder = builder
-        self._report = report
+        self._builder, self._report = context.builder, context.report
         # What lies ready is memory of textures too.
-        self._ahead = ReadAhead(threads, None if store is None else store.limit_bytes // 4)
+        self._ahead = ReadAhead(
+            context.options.threads, None if store is None else store.limit_bytes // 4
+        )
         self._images: dict[str, Image | TextureError] = {}
         self._ids: dict[tuple[Any, ...], int] = {}
         self._taken: dict[str, Image] = {}

@@ -12,7 +12,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from wavecomb.usd.lights.light import KINDS, LightReader
 from wavecomb.usd.looks.material import MaterialTable, bound_materials
 from wavecomb.usd.looks.pixels import Image, TextureError, read_header
 from wavecomb.usd.looks.texture import MEGABYTE, Key, TextureTable, stored_type
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
@@ -82,8 +83,8 @@ class _Entry:
 class _Plan(TextureTable):
     """A table that reads headers only and notes what would be added."""
 
-    def __init__(self, report: LoadReport, working: str) -> None:
-        super().__init__(_NoBuilder(), report, threads=1, working=working)  # type: ignore[arg-type]
+    def __init__(self, context: LoadContext) -> None:
+        super().__init__(context)
         self.entries: dict[int, _Entry] = {}
         self._headers: dict[str, Image | None] = {}
 
@@ -129,19 +130,15 @@ class _NoBuilder:
         return number
 
 
-def plan_levels(
-    stage: Usd.Stage,
-    time: Usd.TimeCode,
-    view: ViewSize,
-    limit_bytes: float,
-    report: LoadReport,
-    working: str = "rec709",
-) -> dict[Key, int]:
+def plan_levels(context: LoadContext, view: ViewSize, limit_bytes: float) -> dict[Key, int]:
     """How many of its finest levels each texture leaves out, by its key in ``TextureTable``."""
-    quiet = LoadReport()
-    plan = _Plan(quiet, working)
-    _note_lights(stage, time, plan, quiet)
-    _note_materials(stage, time, plan, view, quiet)
+    report = context.report
+    options = replace(context.options, threads=1)
+    builder: Any = _NoBuilder()
+    quiet = replace(context, builder=builder, report=LoadReport(), options=options)
+    plan = _Plan(quiet)
+    _note_lights(quiet, plan)
+    _note_materials(quiet, plan, view)
     entries = list(plan.entries.values())
     before = total = sum(entry.bytes for entry in entries)
     heap = [(-entry.surplus(), -entry.bytes, i) for i, entry in enumerate(entries)]
@@ -171,20 +168,19 @@ def plan_levels(
     return {entry.key: entry.drop for entry in reduced}
 
 
-def _note_lights(stage: Usd.Stage, time: Usd.TimeCode, plan: _Plan, quiet: LoadReport) -> None:
-    reader = LightReader(time, "Y", plan, LightGroups(quiet), quiet)
-    for prim in _prims(stage):
+def _note_lights(context: LoadContext, plan: _Plan) -> None:
+    reader = LightReader(context, plan, LightGroups(context.report))
+    for prim in _prims(context.stage):
         if str(prim.GetTypeName()) in KINDS:
             reader.read(prim)
 
 
-def _note_materials(
-    stage: Usd.Stage, time: Usd.TimeCode, plan: _Plan, view: ViewSize, quiet: LoadReport
-) -> None:
+def _note_materials(context: LoadContext, plan: _Plan, view: ViewSize) -> None:
     """Notes the textures of all that is bound, and how many texels across each could show."""
-    materials = MaterialTable(None, plan, time, quiet)  # type: ignore[arg-type]
+    time = context.time
+    materials = MaterialTable(context, plan)
     bounds = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
-    prims = [p for p in _prims(stage) if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)]
+    prims = [p for p in _prims(context.stage) if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)]
     for at, (prim, material) in enumerate(zip(prims, bound_materials(prims), strict=True)):
         if material is None:
             continue

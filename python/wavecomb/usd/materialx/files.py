@@ -12,9 +12,9 @@ from xml.parsers import expat
 
 from pxr import Ar, UsdShade
 
+from wavecomb.path_maps import mapped, own_maps
 from wavecomb.picture.files import kind_of
 from wavecomb.usd.materialx.library import library
-from wavecomb.usd.stage import path_maps
 
 MAX_DEPTH = 64
 """Elements inside of each other; MaterialX reads them with as many calls inside of each other."""
@@ -169,7 +169,7 @@ def resolve(name: str, anchor: str) -> str:
 def beside(name: str, anchor: str) -> str:
     """What a name in a file means: relative to that file unless it is absolute."""
     if os.path.isabs(name) or "://" in name:
-        return path_maps.mapped(name, path_maps.maps())
+        return mapped(name, own_maps())
     if Ar.IsPackageRelativePath(anchor):
         package, inner = Ar.SplitPackageRelativePathInner(anchor)
         inner = posixpath.normpath(posixpath.join(posixpath.dirname(inner), name))

@@ -19,8 +19,7 @@ from pxr import Ar, Sdf, Tf, Usd
 from wavecomb.run.isolate import trail
 from wavecomb.usd.materialx.files import MtlxError, read_document
 from wavecomb.usd.materialx.graphs import Graphs
-from wavecomb.usd.materialx.looks import write_looks
-from wavecomb.usd.materialx.materials import Materials
+from wavecomb.usd.materialx.looks import Materials, write_looks
 from wavecomb.usd.materialx.prims import Prims
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.unread import unread_mtlx

@@ -70,7 +70,7 @@ class DrawModes:
     def applies(self, prim: Usd.Prim) -> bool:
         """Whether a mode that is none of the whole model is applied to a prim."""
         attribute = prim.GetAttribute("model:applyDrawMode")
-        if attribute and attribute.HasAuthoredValue():
+        if attribute.HasAuthoredValue():
             return prim.IsModel() and bool(attribute.Get())
         kind = Usd.ModelAPI(prim).GetKind()
         return prim.IsModel() and Kind.Registry.IsA(kind, Kind.Tokens.component)
@@ -116,8 +116,7 @@ class DrawModes:
         return box if good and bool((box[0] < box[1]).any()) else None
 
     def _colour(self, prim: Usd.Prim) -> Gf.Vec3f:
-        attribute = prim.GetAttribute("model:drawModeColor")
-        value = attribute.Get(self._time) if attribute else None
+        value = prim.GetAttribute("model:drawModeColor").Get(self._time)
         return Gf.Vec3f(*colour(value, (0.18, 0.18, 0.18)))
 
     def _bounds(self, prim: Usd.Prim, box: np.ndarray) -> StandIn:
@@ -144,14 +143,13 @@ class DrawModes:
         found = {}
         for number, card in enumerate(_CARDS):
             attribute = prim.GetAttribute(f"model:cardTexture{card}")
-            value = attribute.Get(self._time) if attribute else None
+            value = attribute.Get(self._time)
             if isinstance(value, Sdf.AssetPath) and value.path:
                 found[number] = value.resolvedPath or value.path
         return found
 
     def _cards(self, prim: Usd.Prim, box: np.ndarray) -> StandIn:
-        attribute = prim.GetAttribute("model:cardGeometry")
-        geometry = word(attribute.Get(self._time) if attribute else None, "cross")
+        geometry = word(prim.GetAttribute("model:cardGeometry").Get(self._time), "cross")
         if geometry not in ("cross", "box"):
             self._report.missing(f"cards of geometry {geometry} (drawn as a cross)", prim.GetPath())
         if word(prim.GetAttribute("model:cardVisibility").Get(), "inherited") != "inherited":

@@ -5,20 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from wavecomb.run.isolate import memory, patience, trail
 from wavecomb.usd.geometry.attributes import on_shape
 from wavecomb.usd.geometry.curves import CurveArrays, uniform_scale
-from wavecomb.usd.geometry.gprims import GprimReader, add_shape
-from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays
-from wavecomb.usd.geometry.strand_detail import StrandDetail
+from wavecomb.usd.geometry.gprims import COUNTS, WORDS, GprimReader, add_shape
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, UV_NAMES, MeshArrays, is_translation
+from wavecomb.usd.geometry.strands import StrandDetail
 from wavecomb.usd.geometry.surfaces import Surfaces
-from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.looks.assign import Assigner, Draw, Worn
 from wavecomb.usd.looks.material import (
@@ -27,23 +24,17 @@ from wavecomb.usd.looks.material import (
     MaterialTable,
     bound_materials,
 )
-from wavecomb.usd.stage.emitters import emitter_of
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.frame_cache import MeshCache
-from wavecomb.usd.stage.group import Group, Matrices, Scope
+from wavecomb.usd.stage.group import Group, Matrices, Scope, emitter_of
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.instance_looks import InstanceLooks, InstanceMaterials, Look
 from wavecomb.usd.stage.instancing import moved_instances, read_instances
 from wavecomb.usd.stage.origin import around
 from wavecomb.usd.stage.placing import GroupPlacer, outline_of
-from wavecomb.usd.stage.precision import problem_of
-from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.room import Room
 from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
 from wavecomb.usd.stage.volumes import VolumePlacer
-from wavecomb.usd.volumes.volume import VolumeReader
-
-if TYPE_CHECKING:
-    from wavecomb import _core
 
 LoadProgress = Callable[[int, int], None]
 """Called as progress(prims drawn, prims found so far), now and then."""
@@ -52,19 +43,6 @@ STEP = 512
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
-
-
-_WORDS = {
-    "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
-    "splats": "splats",
-}  # fmt: skip
-_COUNTS = {
-    "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
-    "splats": "splats",
-}  # fmt: skip
-DRAWN_COUNTS = (*_COUNTS.values(), "volumes")
-"""Counts of ``LoadReport`` for what is drawn."""
-
 
 MAX_NESTING = 100
 """Instances in instances, each a call of ``GroupBuilder`` within another."""
@@ -75,54 +53,43 @@ class GroupBuilder:
 
     def __init__(
         self,
-        stage: Usd.Stage,
+        context: LoadContext,
         traversal: Traversal,
-        builder: _core.SceneBuilder,
         materials: MaterialTable,
         light_groups: LightGroups,
-        report: LoadReport,
         surfaces: Surfaces,
         cache: MeshCache | None = None,
         progress: LoadProgress | None = None,
-        framed: NDArray[np.float64] | None = None,
         detail: StrandDetail | None = None,
         notes_emitters: bool = False,
     ) -> None:
-        """Makes one for a stage.
+        """Makes one for a load.
 
-        ``cache``: arrays of meshes to take from and leave there; ``progress``: is told;
-        ``framed``: directions (k, 3) in which a view asks how far the world reaches; groups keep
-        outlines for it; ``detail``: of curves that are in the world itself; ``notes_emitters``:
-        groups keep their emissive meshes. ``emits_otherwise`` says whether there is emission that
-        is not among these: of curves, points, splats, or of materials of instances.
+        ``cache``: arrays of meshes to take from and leave there; ``progress``: is told; ``detail``:
+        of curves that are in the world itself; ``notes_emitters``: groups keep their emissive
+        meshes. ``emits_otherwise`` says whether there is emission that is not among these: of
+        curves, points, splats, or of materials of instances.
         """
         self.notes_emitters = notes_emitters
         self.emits_otherwise = False
-        self.stage = stage
+        self.context = context
+        self.builder, self.report = context.builder, context.report
         self.traversal = traversal
-        self.time = traversal.time
-        self.builder = builder
         self.materials = materials
         self.light_groups = light_groups
-        self.report = report
         self.surfaces = surfaces
-        self.motion = traversal.motion
-        self.gprims = GprimReader(
-            self.time, report, surfaces, traversal.skeletons, self.motion, cache
-        )
-        self.room = Room(stage, self.time)
+        self.gprims = GprimReader(context, surfaces, traversal.skeletons, cache)
+        self.room = Room(context.stage, context.time)
         self.progress = progress
-        self.framed = framed
         self.detail = detail
         self.found, self.drawn = 0, 0
-        self.assigner = Assigner(materials, self.time, report)
-        self.mesh_lights = MeshLights(builder, traversal.lights, materials, report)
+        self.assigner = Assigner(context, materials)
+        self.mesh_lights = MeshLights(context, traversal.lights, materials)
         self.bindings = BindingScan()
-        self.placer = GroupPlacer(builder, self.mesh_lights, report, framed)
-        self.worn = InstanceMaterials(traversal, materials, report)
-        self.looks = InstanceLooks(traversal, materials, report)
-        reads = VolumeReader(stage, builder, self.time, materials.working, report, self.motion)
-        self.volumes = VolumePlacer(reads, report, framed)
+        self.placer = GroupPlacer(context, self.mesh_lights)
+        self.worn = InstanceMaterials(context, materials)
+        self.looks = InstanceLooks(context, materials)
+        self.volumes = VolumePlacer(context)
         self._groups: dict[Hashable, Group] = {}
         self._known: dict[Sdf.Path, UsdShade.Material] = {}
         self._building: set[Hashable] = set()
@@ -130,8 +97,8 @@ class GroupBuilder:
     def world(self) -> Group:
         """Reads the whole stage into group 0."""
         group = Group("world", number=0)
-        roots = list(self.stage.GetPseudoRoot().GetChildren())
-        self._fill(group, roots, Scope(), "default", base=around(self.traversal.origin))
+        roots = list(self.context.stage.GetPseudoRoot().GetChildren())
+        self._fill(group, roots, Scope(), "default", base=around(self.context.origin))
         return group
 
     def _fill(
@@ -174,35 +141,22 @@ class GroupBuilder:
         """Looks all bindings of a group up at once."""
         if scope.override:
             return
-        prims = [draw.prim for draw in found.draws]
-        prims += [draw.prim for draw in found.volumes]
-        prims += [placed.prim for placed in found.instances]
-        prims += [subset for draw in found.draws for subset in draw.subsets]
+        prims = found.binding_prims()
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
         # One object for each material, by which tables find it quicker than by its path.
         known = self._known
-        materials = iter(
+        bound = found.bind(
             None if material is None else known.setdefault(material.GetPath(), material)
-            for material in bound_materials(prims, self.traversal.binding_purposes)
+            for material in bound_materials(prims, self.context.binding_purposes)
         )
-        for draw in (*found.draws, *found.volumes):
-            draw.material = next(materials)
-        for placed in found.instances:
-            placed.material = next(materials)
-        for draw in found.draws:
-            if draw.subsets:
-                draw.subset_materials = [next(materials) for _ in draw.subsets]
-                # A subset without a binding of its own computes the mesh's.
-        bound = [m for draw in found.draws for m in (draw.material, *draw.subset_materials)]
-        bound += [placed.material for placed in found.instances]
         used = {id(material): material for material in bound if material is not None}
         for material in used.values():
             self.materials.expect(material)
 
     def _proxy(self, prim: Usd.Prim, alias: tuple[Sdf.Path, Sdf.Path]) -> Usd.Prim:
         path = prim.GetPath().ReplacePrefix(*alias)
-        return self.stage.GetPrimAtPath(path) or prim
+        return self.context.stage.GetPrimAtPath(path) or prim
 
     def _draw(self, group: Group, draw: Draw, scope: Scope) -> None:
         """Adds one gprim to a group."""
@@ -214,13 +168,11 @@ class GroupBuilder:
             if steps is None:
                 return self._draw(group, still, scope)
             return self._draw_alone(group, still, draw.matrix, scope, steps)
-        if kind in STRANDS.values() and uniform_scale(draw.matrix) is None:
+        is_turned = kind == "splats" and not is_translation(draw.matrix)
+        if is_turned or (kind in STRANDS.values() and uniform_scale(draw.matrix) is None):
             own = replace(draw, matrix=IDENTITY)
             return self._draw_alone(group, own, draw.matrix, scope)
         if kind == "splats":
-            if not _only_moves(draw.matrix):
-                own = replace(draw, matrix=IDENTITY)
-                return self._draw_alone(group, own, draw.matrix, scope)
             if draw.material is not None:
                 self.report.missing("materials of splats (they have colours)", draw.prim.GetPath())
             draw = replace(draw, material=None, subsets=(), subset_materials=[])
@@ -233,26 +185,10 @@ class GroupBuilder:
         if scope.inside and draw.material is None and not names:
             names = UV_NAMES
         path = str(draw.prim.GetPath())
-        trail.note("reading", path)
-        try:
-            detail = self.detail if kind == "curves" and group.number == 0 else None
-            shape = self.gprims.read(kind, draw, names, detail)
-        except MeshError as error:
-            self.report.warn(f"{_WORDS[kind]} left out: {error}", path)
-            return
-        except (Tf.ErrorException, MemoryError) as error:
-            if memory.ran_out(error, lambda: patience.loaded_layers()[1]):
-                raise MemoryError from error
-            what = "out of memory" if isinstance(error, MemoryError) else "USD cannot read it"
-            self.report.warn(f"{_WORDS[kind]} left out: {what}", path)
-            return
+        in_world = group.number == 0
+        shape = self.gprims.read(draw, names, in_world, self.detail if in_world else None)
         if shape is None:
-            what = "mesh without faces" if kind == "mesh" else f"{kind} without points"
-            self.report.note(what, path)
             return
-        coarse = problem_of(shape.bounds, draw.matrix, in_world=group.number == 0)
-        if coarse is not None:
-            self.report.warn(coarse, path)
         if lamp is not None and lamp.material is not None:
             worn = Worn(lamp.material)
         elif kind == "splats":
@@ -292,16 +228,16 @@ class GroupBuilder:
         try:
             number = add_shape(self.builder, shape, options)
         except ValueError as error:
-            self.report.warn(f"{_WORDS[kind]} left out: {error}")
+            self.report.warn(f"{WORDS[kind]} left out: {error}")
             return
         self.builder.add_to_group(self.placer.number(group), number)
         group.grow(shape.bounds)
-        if self.framed is not None:
-            more = self.framed if group.number == 0 else None
+        if self.context.framed is not None:
+            more = self.context.framed if group.number == 0 else None
             group.reach(outline_of(shape, self.surfaces, more), more)
         if isinstance(shape, MeshArrays) and shape.cage is not None:
             self.surfaces.add(group, number, draw, shape, worn)
-        self.report.tally(_COUNTS[kind])
+        self.report.tally(COUNTS[kind])
 
     def _draw_alone(
         self,
@@ -363,9 +299,7 @@ class GroupBuilder:
 
     def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
         """Adds native instances, all of one prototype at a time."""
-        batches: dict[
-            tuple[int, int], tuple[Group, list[Any], list[int], list[Any], list[Any]]
-        ] = {}
+        batches: dict[tuple[int, int], tuple[Group, list[tuple[Any, ...]]]] = {}
         for placed in instances:
             child = self._instance_group(placed, scope)
             if child is None:
@@ -375,16 +309,13 @@ class GroupBuilder:
                 self.emits_otherwise = True
             steps = None if placed.track is None else placed.track.steps()
             count = 0 if steps is None else len(steps)
-            batch = batches.setdefault((id(child), count), (child, [], [], [], []))
-            batch[4].append(steps)
-            batch[1].append(np.array(placed.matrix))
-            batch[2].append(material)
-            batch[3].append(placed.prim)
-        for (_, count), (child, matrices, materials, prims, moves) in batches.items():
-            transforms = np.stack(matrices)
-            motion = np.stack(moves) if count else None
+            _, batch = batches.setdefault((id(child), count), (child, []))
+            batch.append((np.array(placed.matrix), material, placed.prim, steps))
+        for (_, count), (child, batch) in batches.items():
+            matrices, materials, prims, moves = zip(*batch, strict=True)
             ids = np.array(materials, np.uint32)
-            self.placer.add(parent, child, transforms, ids, prims, motion=motion)
+            motion = np.stack(moves) if count else None
+            self.placer.add(parent, child, np.stack(matrices), ids, prims, motion=motion)
         self.report.tally("instances", len(instances))
 
     def _instance_group(self, placed: Placed, scope: Scope) -> Group | None:
@@ -411,21 +342,21 @@ class GroupBuilder:
         path = prim.GetPath()
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
         self.report.tally("point instancers")
-        instances = read_instances(prim, self.time, len(targets), self.report)
+        instances = read_instances(prim, self.context.time, len(targets), self.report)
         if instances is None or len(instances.kept) == 0:
             return
         materials = self.worn.of_instancer(placed, instances.authored, scope)[instances.kept]
         order = np.argsort(instances.prototypes, kind="stable")
         ranked = instances.prototypes[order]
         outer = None if placed.matrix == IDENTITY else np.array(placed.matrix)
-        moved = None
-        if self.motion is not None:
-            moved = moved_instances(prim, self.motion, placed.track, outer, instances, self.report)
+        moved, shutter = None, self.context.motion
+        if shutter is not None:
+            moved = moved_instances(prim, shutter, placed.track, outer, instances, self.report)
         for index, target in enumerate(targets):
             first, last = np.searchsorted(ranked, [index, index + 1])
             if first == last:
                 continue
-            root = self.stage.GetPrimAtPath(target)
+            root = self.context.stage.GetPrimAtPath(target)
             if not root:
                 self.report.warn(f"point instancer prototype {target} is not there", path)
                 continue
@@ -467,8 +398,3 @@ class GroupBuilder:
             "point", path, inner.bound, inner.override, placed.purpose, inner.alias, look.key, worn,
         )  # fmt: skip
         return self._group(key, str(path), path, [root], inner, placed.purpose, _ANY)
-
-
-def _only_moves(matrix: Gf.Matrix4d) -> bool:
-    """Whether a transform is a translation."""
-    return all(matrix.GetRow3(k) == IDENTITY.GetRow3(k) for k in range(3))

@@ -43,14 +43,12 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(PRIMVAR)
         value = primvar.Get() if primvar and primvar.HasValue() else None
     else:
-        own = prim.GetAttribute(f"primvars:{PRIMVAR}")
-        value = own.Get() if own else None
+        value = prim.GetAttribute(f"primvars:{PRIMVAR}").Get()
         for primvar in inherited if value is None else ():
             if primvar.GetPrimvarName() == PRIMVAR:
                 value = primvar.Get()
     for name in _LIGHT_GROUPS if value is None else ():
-        attribute = prim.GetAttribute(name)
-        value = attribute.Get() if attribute else None
+        value = prim.GetAttribute(name).Get()
         if value:
             break
     return str(value) if value else ""

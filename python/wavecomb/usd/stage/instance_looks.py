@@ -25,9 +25,9 @@ from wavecomb.usd.looks.material import (
     bound_materials,
 )
 from wavecomb.usd.looks.network import colour
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.group import Scope
-from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.traverse import Placed, Traversal
+from wavecomb.usd.stage.traverse import Placed, inherit
 
 MAX_COLOURS = 256
 """Materials that one varying colour may turn into."""
@@ -57,11 +57,10 @@ def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int
 class InstanceMaterials:
     """Finds the materials of native instances and of point instancers."""
 
-    def __init__(self, traversal: Traversal, materials: MaterialTable, report: LoadReport) -> None:
-        self.traversal = traversal
-        self.time = traversal.time
+    def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
+        self.time, self.report = context.time, context.report
+        self.binding_purposes = context.binding_purposes
         self.materials = materials
-        self.report = report
 
     def of_proxies(self, instance: Usd.Prim) -> tuple[str, ...]:
         """Material paths of all below an instance: tells which instances may share a group."""
@@ -70,7 +69,7 @@ class InstanceMaterials:
             for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
             if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.Subset)
         ]
-        bound = bound_materials(prims, self.traversal.binding_purposes)
+        bound = bound_materials(prims, self.binding_purposes)
         return tuple(str(m.GetPath()) if m else "" for m in bound)
 
     def of_instance(self, placed: Placed, scope: Scope) -> int:
@@ -92,7 +91,7 @@ class InstanceMaterials:
         """(count,) ids for the instances of a point instancer: by its displayColor."""
         if scope.bound or scope.override:
             return np.full(count, INHERIT_MATERIAL, np.uint32)
-        inherited = self.traversal.inherit(placed.prim, placed.inherited)
+        inherited = inherit(placed.prim, placed.inherited)
         attribute = placed.prim.GetAttribute("primvars:displayColor")
         if attribute.HasAuthoredValue():
             attributes = [attribute]
@@ -158,11 +157,10 @@ PLAIN = Look()
 class InstanceLooks:
     """Finds what instances bring."""
 
-    def __init__(self, traversal: Traversal, materials: MaterialTable, report: LoadReport) -> None:
-        self._traversal = traversal
-        self._time = traversal.time
+    def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
+        self._time, self._report = context.time, context.report
+        self._binding_purposes = context.binding_purposes
         self._materials = materials
-        self._report = report
         self._reads: dict[Hashable, frozenset[str]] = {}
         self._known: dict[Sdf.Path, set[Hashable]] = {}
         self._made: dict[Hashable, Any] = {}
@@ -192,7 +190,7 @@ class InstanceLooks:
             count: Of authored instances.
             predicate: Of prims in prototypes.
         """
-        inherited = self._traversal.inherit(placed.prim, placed.inherited)
+        inherited = inherit(placed.prim, placed.inherited)
         varying = [
             primvar
             for primvar in UsdGeom.PrimvarsAPI(placed.prim).GetPrimvarsWithAuthoredValues()
@@ -246,7 +244,7 @@ class InstanceLooks:
         known = self._reads.get(key)
         if known is None:
             prims = [p for p in inside if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)]
-            found = bound_materials(prims, self._traversal.binding_purposes)
+            found = bound_materials(prims, self._binding_purposes)
             by_path = {m.GetPath(): m for m in found if m is not None}
             names = (self._names(m) for m in by_path.values())
             known = self._reads[key] = frozenset().union(*names)

@@ -13,7 +13,7 @@ from pxr import Usd, UsdGeom
 from wavecomb.usd.geometry.primvar import as_array, as_integers
 from wavecomb.usd.geometry.shutter import Motion, Track
 from wavecomb.usd.geometry.triangulate import cross
-from wavecomb.usd.stage.precision import POSITIONS, positions_are_coarse
+from wavecomb.usd.stage.origin import POSITIONS, positions_are_coarse
 from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]
@@ -179,8 +179,7 @@ def _linear(
     out: Matrices = np.eye(3)
     turns = None
     for name in ("orientationsf", "orientations"):
-        attribute = instancer.GetPrim().GetAttribute(name)
-        turns = as_array(attribute.Get(time)) if attribute else None
+        turns = as_array(instancer.GetPrim().GetAttribute(name).Get(time))
         if turns is not None and len(turns):
             break
     if turns is not None and len(turns):

@@ -3,26 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender, UsdUtils
 
 from wavecomb.errors import WavecombError
+from wavecomb.path_maps import mapped, own_maps
 from wavecomb.picture.files import check_name, check_regular
 from wavecomb.run.isolate import patience, trail
 from wavecomb.usd import mtlx
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
-from wavecomb.usd.stage import path_maps
 from wavecomb.usd.stage.diagnostics import captured, commentary
 from wavecomb.usd.stage.fifos import refused_fifos
-from wavecomb.usd.stage.payloads import load_payloads
-from wavecomb.usd.stage.population import populate
+from wavecomb.usd.stage.population import every, load_payloads, populate
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.stage.search import every
 
 MAX_SURVEYED = 4096
 """Cameras and lights that are listed; instances may multiply them."""
@@ -118,7 +116,7 @@ def _layers(
             root = Sdf.Layer.FindOrOpen(str(file))
             if not root:
                 raise WavecombError(f"{file}: cannot be read as USD")
-            path_maps.change_layers((root, session))
+            change_layers((root, session))
             yield root, session
     except Tf.ErrorException as error:
         raise WavecombError(f"{file}: cannot be read as USD: {commentary(error)}") from None
@@ -259,3 +257,33 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
             known = ", ".join(variant_set.GetVariantNames()) or "none"
             raise WavecombError(f"variant {key}={choice}: there are {known}")
         variant_set.SetVariantSelection(choice)
+
+
+_changed: dict[str, Sdf.Layer] = {}
+"""By identifier. Held as long as the process: a layer that is let go would be read anew."""
+
+
+def change_layers(layers: Iterable[Sdf.Layer]) -> None:
+    """Changes names in layers, and in all that they name, where this process has maps.
+
+    Layers are changed in memory only, before they are composed: each absolute name in them, of
+    layers, textures and all other files. Names that are relative need nothing.
+    """
+    pairs = own_maps()
+    if not pairs:
+        return
+    left = list(layers)
+    while left:
+        layer = left.pop()
+        if layer.identifier in _changed:
+            continue
+        _changed[layer.identifier] = layer
+        if layer.permissionToEdit:
+            UsdUtils.ModifyAssetPaths(layer, lambda path: mapped(path, pairs))
+        for name in layer.GetCompositionAssetDependencies():
+            if name and not name.lower().endswith(".mtlx"):
+                # Of one that cannot be read the stage tells when it is composed.
+                with suppress(Tf.ErrorException):
+                    other = Sdf.Layer.FindOrOpenRelativeToLayer(layer, name)
+                    if other:
+                        left.append(other)

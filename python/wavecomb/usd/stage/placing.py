@@ -16,27 +16,19 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.surfaces import Surfaces
 from wavecomb.usd.lights.mesh_light import MeshLights
 from wavecomb.usd.looks.assign import Parent
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.group import Group, Matrices, Place, middle_of
 from wavecomb.usd.stage.identity import Assets
 from wavecomb.usd.stage.instancing import sound
-from wavecomb.usd.stage.report import LoadReport
 
 
 class GroupPlacer:
     """Gives groups numbers in the scene, and places them in one another."""
 
-    def __init__(
-        self,
-        builder: _core.SceneBuilder,
-        mesh_lights: MeshLights,
-        report: LoadReport,
-        framed: NDArray[np.float64] | None,
-    ) -> None:
-        """``framed``: as of ``GroupBuilder``."""
-        self.builder = builder
+    def __init__(self, context: LoadContext, mesh_lights: MeshLights) -> None:
+        self.builder, self.report = context.builder, context.report
+        self.framed = context.framed
         self.mesh_lights = mesh_lights
-        self.report = report
-        self.framed = framed
         self.assets = Assets()
 
     def asset_length(

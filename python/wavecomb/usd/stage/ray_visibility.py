@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which kinds of rays see a prim, and holdouts, as renderers author them (docs/visibility.md)."""
+"""Which kinds of rays see a prim, holdouts and shadow catchers (docs/visibility.md)."""
 
 from __future__ import annotations
 
 import re
-from typing import Any
+from collections.abc import Iterable
 
-from pxr import Usd
+from pxr import Sdf, Usd
 
 from wavecomb import _core
-from wavecomb.usd.stage.report import LoadReport
+from wavecomb.errors import WavecombError
+from wavecomb.load_options import LoadOptions
+from wavecomb.usd.stage.context import LoadContext
 
 _FLAGS = {
     "primvars:wavecomb:visibility:camera": "camera",
@@ -51,15 +53,9 @@ class RayVisibility:
         catchers: Paths of prims that are shadow catchers.
     """
 
-    def __init__(
-        self,
-        builder: _core.SceneBuilder,
-        report: LoadReport,
-        ignored: frozenset[str] = frozenset(),
-    ) -> None:
+    def __init__(self, context: LoadContext, ignored: frozenset[str] = frozenset()) -> None:
         """``ignored``: kinds of rays of which prims have no say."""
-        self._builder = builder
-        self._report = report
+        self._builder, self._report = context.builder, context.report
         self._ignored = ignored
         self.catchers: list[str] = []
 
@@ -68,19 +64,23 @@ class RayVisibility:
         rays = {
             kind: bool(value)
             for name, kind in _FLAGS.items()
-            if (value := _value(prim, name)) is not None
+            if (value := prim.GetAttribute(name).Get()) is not None
         }
-        bounces = [value for name in _ARNOLD_BOUNCES if (value := _value(prim, name)) is not None]
+        bounces = [
+            value
+            for name in _ARNOLD_BOUNCES
+            if (value := prim.GetAttribute(name).Get()) is not None
+        ]
         if bounces:
             whole = len(bounces) == len(_ARNOLD_BOUNCES) and not any(bounces)
             if not whole and not all(bounces):
                 self._report.missing("visibility by kinds of bounces", prim.GetPath())
             rays["bounces"] = not whole
-        mask = _value(prim, _KARMA)
+        mask = prim.GetAttribute(_KARMA).Get()
         if mask is not None:
             rays |= self._karma(str(mask), prim)
         rays = {kind: seen for kind, seen in rays.items() if kind not in self._ignored}
-        if _value(prim, _CATCHER):
+        if prim.GetAttribute(_CATCHER).Get():
             self.catchers.append(self._report.place(str(prim.GetPath())))
         if rays:
             self._builder.add_visibility(self._report.place(str(prim.GetPath())), rays)
@@ -102,6 +102,48 @@ class RayVisibility:
         return {"camera": seen["primary"], "shadow": seen["shadow"], "bounces": any(bounces)}
 
 
-def _value(prim: Usd.Prim, name: str) -> Any:
-    attribute = prim.GetAttribute(name)
-    return attribute.Get() if attribute else None
+IGNORED = {
+    "through": frozenset[str](),
+    "lit": frozenset({"holdout"}),
+    "bare": frozenset({"holdout", "shadow", "bounces"}),
+}
+"""Kinds of rays of which prims have no say, by ``LoadOptions.catch``."""
+
+
+def check_there(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:
+    """Raises WavecombError for a path of an option that leads to no prim."""
+    for path in paths:
+        if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
+            raise WavecombError(f"{option} {path}: there is no such prim")
+
+
+def set_catchers(
+    stage: Usd.Stage, options: LoadOptions, authored: list[str], builder: _core.SceneBuilder
+) -> tuple[str, ...]:
+    """Tells the scene which rays see what; gives the paths of catchers.
+
+    Args:
+        stage: That was read.
+        options: How.
+        authored: Paths that the stage names.
+        builder: Of the scene; it was told what prims say.
+
+    Raises:
+        WavecombError: A path that an option gives leads to no prim.
+    """
+    check_there(stage, "--catcher", options.catchers)
+    paths = tuple(dict.fromkeys((*authored, *options.catchers)))
+    if not paths:
+        return ()
+    if options.catch == "through":
+        of_catchers = {"camera": False}
+    else:
+        rest, of_catchers = {"holdout": True}, {"holdout": False, "camera": True}
+        if options.catch == "bare":
+            rest |= {"shadow": False, "bounces": False}
+            of_catchers |= {"shadow": True, "bounces": True}
+        for prim in stage.GetPseudoRoot().GetAllChildren():
+            builder.add_visibility(str(prim.GetPath()), rest)
+    for path in paths:
+        builder.add_visibility(path, of_catchers)
+    return paths

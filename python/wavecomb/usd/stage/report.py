@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 MAX_PLACES = 3
 """Prims named for each finding in a line; the rest is counted."""
+
+LEVELS = ("warning", "not supported", "note")
+"""Kinds of findings, in the order of a log."""
 
 MAX_KEPT = 500
 """Prims kept for each finding, for who lists them all."""
@@ -65,39 +67,9 @@ class LoadReport:
     """
 
     def __init__(self) -> None:
-        self._notes: dict[str, Finding] = {}
-        self._warnings: dict[str, Finding] = {}
-        self._unsupported: dict[str, Finding] = {}
+        self._found: dict[str, dict[str, Finding]] = {level: {} for level in LEVELS}
         self.counts: dict[str, int] = {}
         self._aliases: dict[str, str] = {}
-
-    @classmethod
-    def of(
-        cls,
-        notes: Iterable[Finding] = (),
-        warnings: Iterable[Finding] = (),
-        unsupported: Iterable[Finding] = (),
-        counts: Mapping[str, int] | None = None,
-        aliases: Mapping[str, str] | None = None,
-    ) -> LoadReport:
-        """A report that another process was told."""
-        report = cls()
-        for to, findings in (
-            (report._notes, notes),
-            (report._warnings, warnings),
-            (report._unsupported, unsupported),
-        ):
-            for finding in findings:
-                finding._known.update(finding.all_places[:MAX_KEPT])
-                to[finding.what] = finding
-        report.counts.update(counts or {})
-        report._aliases.update(aliases or {})
-        return report
-
-    @property
-    def aliases(self) -> dict[str, str]:
-        """Names of prototypes of USD's own: those of their first instances."""
-        return dict(self._aliases)
 
     def alias(self, prototype: object, instance: object) -> None:
         """Makes places in a prototype of USD's own be named by the first instance of it."""
@@ -111,44 +83,41 @@ class LoadReport:
         head, slash, tail = path[1:].partition("/")
         return self._aliases.get(f"/{head}", f"/{head}") + slash + tail
 
+    def _add(self, level: str, what: str, place: object, count: int = 1) -> None:
+        self._found[level].setdefault(what, Finding(what)).add(self.place(place), count)
+
     def note(self, what: str, place: object = "", count: int = 1) -> None:
         """Adds a note."""
-        self._notes.setdefault(what, Finding(what)).add(self.place(place), count)
+        self._add("note", what, place, count)
 
     def warn(self, what: str, place: object = "", count: int = 1) -> None:
         """Adds a warning about a prim or a file."""
-        self._warnings.setdefault(what, Finding(what)).add(self.place(place), count)
+        self._add("warning", what, place, count)
 
     def missing(self, what: str, place: object = "", count: int = 1) -> None:
         """Adds something that is not supported."""
-        self._unsupported.setdefault(what, Finding(what)).add(self.place(place), count)
+        self._add("not supported", what, place, count)
 
     def absorb(self, other: LoadReport) -> None:
         """Adds all that another report was told, its prototypes named as here."""
-        for add, findings in (
-            (self.note, other.notes),
-            (self.warn, other.warnings),
-            (self.missing, other.unsupported),
-        ):
-            for finding in findings:
+        for level, findings in other._found.items():
+            for finding in findings.values():
                 first, *others = finding.all_places or [""]
-                add(finding.what, first, finding.count - len(others))
+                self._add(level, finding.what, first, finding.count - len(others))
                 for place in others:
-                    add(finding.what, place)
+                    self._add(level, finding.what, place)
         for kind, count in other.counts.items():
             self.tally(kind, count)
 
     def absorb_new(self, other: LoadReport) -> None:
         """Adds what another report was told, of places where this one was not told the same."""
-        for known, add, findings in (
-            (self._notes, self.note, other.notes),
-            (self._warnings, self.warn, other.warnings),
-            (self._unsupported, self.missing, other.unsupported),
-        ):
-            for finding in findings:
-                there = known[finding.what]._known if finding.what in known else set()
-                for place in [one for one in finding.all_places if one not in there]:
-                    add(finding.what, place)
+        for level, findings in other._found.items():
+            for what, finding in findings.items():
+                known = self._found[level].get(what)
+                there = set() if known is None else set(known._known)
+                for place in finding.all_places:
+                    if place not in there:
+                        self._add(level, what, place)
 
     def tally(self, kind: str, count: int = 1) -> None:
         """Counts prims of a kind."""
@@ -158,24 +127,24 @@ class LoadReport:
     @property
     def notes(self) -> list[Finding]:
         """What was chosen or approximated."""
-        return list(self._notes.values())
+        return list(self._found["note"].values())
 
     @property
     def warnings(self) -> list[Finding]:
         """What is wrong in the stage."""
-        return list(self._warnings.values())
+        return list(self._found["warning"].values())
 
     @property
     def unsupported(self) -> list[Finding]:
         """What was asked for and is not done."""
-        return list(self._unsupported.values())
+        return list(self._found["not supported"].values())
 
     def lines(self) -> list[str]:
         """All findings as lines for a log, warnings first."""
         return [
-            *(f"warning: {finding.line()}" for finding in self.warnings),
-            *(f"not supported: {finding.line()}" for finding in self.unsupported),
-            *(f"note: {finding.line()}" for finding in self.notes),
+            f"{level}: {finding.line()}"
+            for level, findings in self._found.items()
+            for finding in findings.values()
         ]
 
     def as_dict(self) -> dict[str, Any]:

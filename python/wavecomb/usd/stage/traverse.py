@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,25 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdVol
 
-from wavecomb.usd.geometry.faces import TETRAHEDRA
-from wavecomb.usd.geometry.mesh_arrays import IDENTITY
+from wavecomb.usd.geometry.mesh_arrays import IDENTITY, TETRAHEDRA
 from wavecomb.usd.geometry.primvar import authored_names
 from wavecomb.usd.geometry.shapes import SHAPES
-from wavecomb.usd.geometry.shutter import Motion, Track
+from wavecomb.usd.geometry.shutter import Track
 from wavecomb.usd.geometry.skeleton import Skeletons
 from wavecomb.usd.geometry.splats import SPLATS
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.lights.light import Light, LightReader
 from wavecomb.usd.looks.assign import Draw, Parent
-from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.looks.network import word
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.draw_modes import DrawModes
 from wavecomb.usd.stage.group import Place
 from wavecomb.usd.stage.instancing import sound
-from wavecomb.usd.stage.origin import WORLD, Origin
 from wavecomb.usd.stage.ray_visibility import NAMES as RAY_NAMES
 from wavecomb.usd.stage.ray_visibility import RayVisibility
-from wavecomb.usd.stage.report import LoadReport
 
 Matrices = NDArray[np.float64]
 
@@ -63,36 +60,39 @@ class Gathered:
     lights: list[tuple[Light, Place]] = field(default_factory=list)
     stand_ins: list[Draw] = field(default_factory=list)
 
+    def binding_prims(self) -> list[Usd.Prim]:
+        """All prims whose bindings count, in the order in which ``bind`` takes materials."""
+        prims = [draw.prim for draw in (*self.draws, *self.volumes)]
+        prims += [placed.prim for placed in self.instances]
+        return prims + [subset for draw in self.draws for subset in draw.subsets]
+
+    def bind(self, materials: Iterable[UsdShade.Material | None]) -> list[UsdShade.Material | None]:
+        """Gives all that was found the materials of ``binding_prims``; those of surfaces."""
+        materials = iter(materials)
+        for draw in (*self.draws, *self.volumes):
+            draw.material = next(materials)
+        for placed in self.instances:
+            placed.material = next(materials)
+        for draw in self.draws:
+            if draw.subsets:
+                # A subset without a binding of its own computes the mesh's.
+                draw.subset_materials = [next(materials) for _ in draw.subsets]
+        bound = [m for draw in self.draws for m in (draw.material, *draw.subset_materials)]
+        return bound + [placed.material for placed in self.instances]
+
 
 class Traversal:
     """Finds the prims to draw, one group at a time."""
 
-    def __init__(
-        self,
-        time: Usd.TimeCode,
-        purposes: Sequence[str],
-        lights: LightReader,
-        report: LoadReport,
-        motion: Motion | None = None,
-        binding_purposes: Sequence[str] = BINDING_PURPOSES,
-        rays: RayVisibility | None = None,
-        origin: Origin = WORLD,
-    ) -> None:
-        """``motion``: what is followed while the shutter is open. ``rays``: who is told of them.
-
-        ``origin``: world position that the scene is built around.
-        """
-        self.time = time
-        self.binding_purposes = tuple(binding_purposes)
-        self.purposes = frozenset(purposes)
+    def __init__(self, context: LoadContext, lights: LightReader, rays: RayVisibility) -> None:
+        """``rays``: is told of prims that say which rays see them."""
+        self.time, self.report, self.motion = context.time, context.report, context.motion
+        self.purposes = frozenset(context.purposes)
         self.lights = lights
-        self.report = report
-        self.motion = motion
         self.rays = rays
-        self.origin = origin
-        self.skeletons = Skeletons(report)
-        self.xforms = UsdGeom.XformCache(time)
-        self.modes = DrawModes(time, report)
+        self.skeletons = Skeletons(self.report)
+        self.xforms = UsdGeom.XformCache(self.time)
+        self.modes = DrawModes(self.time, self.report)
         self._kinds: dict[str, str] = {}
         self._counts: dict[Sdf.Path, int] = {}
         self._names: dict[tuple[str, ...], frozenset[str]] = {}
@@ -180,7 +180,7 @@ class Traversal:
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
                 ):
                     continue
-                if self.rays is not None and not RAY_NAMES.isdisjoint(names):
+                if not RAY_NAMES.isdisjoint(names):
                     self.rays.read(prim)
                 if "purpose" in names:
                     authored = prim.GetAttribute("purpose")
@@ -206,7 +206,7 @@ class Traversal:
                 prototype = prim.GetPrototype()
                 if self._shared(prototype) and not self.skeletons.keeps_apart(prim, prototype):
                     self.report.alias(prototype.GetPath(), prim.GetPath())
-                    inherited = self.inherit(prim, inherited)
+                    inherited = inherit(prim, inherited)
                     placed = Placed(prim, matrix, purpose, inherited, track=track)
                     found.instances.append(placed)
                     continue
@@ -248,7 +248,7 @@ class Traversal:
                 and kind in ("xform", "scope")
                 and any(name.startswith("primvars:") for name in names)
             ):
-                inherited = self.inherit(prim, inherited)
+                inherited = inherit(prim, inherited)
             if children:
                 above = Parent(prim)
                 for child in reversed(children):
@@ -274,11 +274,6 @@ class Traversal:
             known = self._counts[path] = len(prototype.GetInstances())
         return known > 1
 
-    def inherit(self, prim: Usd.Prim, inherited: Sequence[Any]) -> Sequence[Any]:
-        """Primvars that the children of a prim inherit."""
-        more = UsdGeom.PrimvarsAPI(prim).FindIncrementallyInheritablePrimvars(list(inherited))
-        return more if more else inherited
-
     def _light(
         self, found: Gathered, prim: Usd.Prim, matrix: Gf.Matrix4d, steps: Matrices | None
     ) -> None:
@@ -292,6 +287,12 @@ class Traversal:
             return
         self.report.tally("lights")
         found.lights.append((light, Place(transform, steps)))
+
+
+def inherit(prim: Usd.Prim, inherited: Sequence[Any]) -> Sequence[Any]:
+    """Primvars that the children of a prim inherit."""
+    more = UsdGeom.PrimvarsAPI(prim).FindIncrementallyInheritablePrimvars(list(inherited))
+    return more if more else inherited
 
 
 def _binds(prim: Usd.Prim) -> bool:

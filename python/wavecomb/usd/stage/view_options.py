@@ -11,8 +11,8 @@ from wavecomb.load_options import PURPOSES, LoadOptions
 from wavecomb.usd.cameras.camera import Lens, find_camera
 from wavecomb.usd.cameras.lens import check_names
 from wavecomb.usd.geometry.shutter import Blur
-from wavecomb.usd.looks.material import BINDING_PURPOSES
 from wavecomb.usd.stage.choice import RenderChoice
+from wavecomb.usd.stage.context import BINDING_PURPOSES
 from wavecomb.usd.stage.render_settings import read_choices
 from wavecomb.usd.stage.report import LoadReport
 

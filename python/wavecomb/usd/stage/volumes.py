@@ -3,22 +3,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from wavecomb.usd.looks.assign import Draw
 from wavecomb.usd.looks.texture import MEGABYTE
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.group import Group, Scope, placed_volumes
 from wavecomb.usd.stage.instancing import sound
-from wavecomb.usd.stage.origin import Origin
 from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import GridFacts, VolumeFacts
 from wavecomb.usd.volumes.volume import VolumeReader
-
-if TYPE_CHECKING:
-    from wavecomb import _core
 
 MAX_VOLUMES = 4096
 """Volumes that are placed; instances may multiply them."""
@@ -27,13 +22,9 @@ MAX_VOLUMES = 4096
 class VolumePlacer:
     """Puts volumes into groups."""
 
-    def __init__(
-        self, reader: VolumeReader, report: LoadReport, framed: NDArray[np.float64] | None
-    ) -> None:
-        """``framed``: as of ``GroupBuilder``."""
-        self._reader = reader
-        self._report = report
-        self._framed = framed
+    def __init__(self, context: LoadContext) -> None:
+        self._reader = VolumeReader(context)
+        self._report, self._framed = context.report, context.framed
 
     @property
     def glow(self) -> bool:
@@ -65,13 +56,9 @@ class VolumePlacer:
         self._report.tally("volumes")
 
 
-def add_volumes(
-    world: Group, builder: _core.SceneBuilder, report: LoadReport, origin: Origin
-) -> tuple[VolumeFacts, ...]:
-    """Adds all volumes; says what each is, once for all its places.
-
-    ``origin``: world position that the scene is built around.
-    """
+def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
+    """Adds all volumes; says what each is, once for all its places."""
+    report = context.report
     volumes = placed_volumes(world, MAX_VOLUMES + 1)
     if len(volumes) > MAX_VOLUMES:
         report.warn(f"more than {MAX_VOLUMES} volumes: the rest is left out")
@@ -83,9 +70,9 @@ def add_volumes(
         if not bool(sound(transform[None])[0]):
             report.warn("volume left out: its transform has no inverse", name)
             continue
-        builder.add_volume(**volume.options, to_world=transform)
+        context.builder.add_volume(**volume.options, to_world=transform)
         corners = volume.corners @ transform[:3, :3] + transform[3, :3]
-        places.setdefault(name, []).append(corners + origin)
+        places.setdefault(name, []).append(corners + context.origin)
         grids[name] = volume.grids
     return tuple(_facts(name, corners, grids[name]) for name, corners in places.items())
 

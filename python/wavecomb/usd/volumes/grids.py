@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grids of fields as the core takes them: read, checked and handed over once each."""
+"""Fields of volumes, and their grids as the core takes them: read and checked once each."""
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pxr import Usd, UsdVol
 
 from wavecomb import vdb
 from wavecomb.errors import WavecombError
 from wavecomb.picture.files import kind_of
 from wavecomb.picture.working_space import from_rec709
 from wavecomb.run.isolate import trail
+from wavecomb.usd.lights.light import blackbody
+from wavecomb.usd.looks.network import asset_file, word
+from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.blackbody import radiance
-from wavecomb.usd.volumes.fields import Field
 from wavecomb.usd.volumes.info import GridFacts
-
-if TYPE_CHECKING:
-    from wavecomb import _core
 
 _SLIGHTLY = 1e-3
 """Share of its greatest value by which a grid may go below 0: what filters leave behind."""
@@ -52,11 +52,9 @@ class Grid:
 class GridTable:
     """Reads grids for one scene."""
 
-    def __init__(self, builder: _core.SceneBuilder, working: str, report: LoadReport) -> None:
-        """``working``: the space of colours."""
-        self._builder = builder
-        self._working = working
-        self._report = report
+    def __init__(self, context: LoadContext) -> None:
+        self._builder, self._report = context.builder, context.report
+        self._working = context.options.working_space
         self._tables: dict[str, list[vdb.GridHead] | None] = {}
         self._known: dict[tuple[Any, ...], Grid | None] = {}
 
@@ -255,3 +253,87 @@ def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.
                       for k in (0, 1)])  # fmt: skip
     corners: NDArray[np.float64] = index @ matrix[:3, :3] + matrix[3, :3]
     return corners
+
+
+STEFAN_BOLTZMANN = 5.670374e-8
+"""W m^-2 K^-4."""
+
+_HOTTEST = 1e5
+_FIRST, _LAST, _COUNT = 1000.0, 15000.0, 512
+
+
+def radiance(kelvin: NDArray[Any]) -> NDArray[np.float32]:
+    """Linear Rec.709 (..., 3): the colour of the black body, of luminance sigma T^4 / pi in MW.
+
+    That is Cycles' unit, 1 at 2729 K and 11.3 at 5000 K. Colours below 1000 K are that of 1000 K.
+    """
+    hot = np.clip(np.asarray(kelvin, np.float64), 0.0, _HOTTEST)
+    strength = (STEFAN_BOLTZMANN * 1e-6 / np.pi) * hot**4
+    at, table = _colours()
+    colours = [np.interp(hot, at, table[:, channel]) for channel in range(3)]
+    return np.asarray(np.stack(colours, axis=-1) * strength[..., None], np.float32)
+
+
+@functools.cache
+def _colours() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Temperatures, and the colours of luminance 1 of these."""
+    at = np.linspace(_FIRST, _LAST, _COUNT)
+    return at, np.array([blackbody(float(kelvin)) for kelvin in at])
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a volume.
+
+    Attributes:
+        name: Of the relationship, without ``field:``.
+        file: A .vdb file.
+        grid: Its name in the file; "": that of the relationship, or the only one.
+        index: Among the grids of that name.
+        prim: Path of the asset.
+        changes: Whether the file changes over time.
+    """
+
+    name: str
+    file: str
+    grid: str = ""
+    index: int = 0
+    prim: str = ""
+    changes: bool = False
+
+
+def read_fields(volume: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[str, Field]:
+    """The fields of a volume by name, in its order; those that cannot be read are said."""
+    found: dict[str, Field] = {}
+    stage = volume.GetStage()
+    for name, path in sorted(UsdVol.Volume(volume).GetFieldPaths().items()):
+        prim = stage.GetPrimAtPath(path)
+        if not prim:
+            report.warn(f"volume field without its asset {path}: left out", volume.GetPath())
+            continue
+        if prim.GetTypeName() != "OpenVDBAsset":
+            kind = str(prim.GetTypeName()) or "prim without a type"
+            report.missing(f"{kind} as a volume field (left out)", prim.GetPath())
+            continue
+        field = _asset(str(name), prim, time)
+        if not field.file:
+            report.warn("volume field that names no file: left out", prim.GetPath())
+            continue
+        if prim.GetAttribute("xformOpOrder").HasAuthoredValue():
+            report.missing("transforms of volume fields of their own (left out)", prim.GetPath())
+        found[str(name)] = field
+    return found
+
+
+def _asset(name: str, prim: Usd.Prim, time: Usd.TimeCode) -> Field:
+    asset = UsdVol.OpenVDBAsset(prim)
+    file = asset.GetFilePathAttr()
+    index = asset.GetFieldIndexAttr().Get(time)
+    return Field(
+        name,
+        asset_file(file.Get(time), file),
+        word(asset.GetFieldNameAttr().Get(time)),
+        index if isinstance(index, int) and index >= 0 else 0,
+        str(prim.GetPath()),
+        file.ValueMightBeTimeVarying(),
+    )

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The volume terminal of a material as a look."""
+"""The volume terminal of a material as a look, and meshes that bound what it says."""
 
 from __future__ import annotations
 
-from pxr import Sdf, Tf, Usd, UsdShade
+import math
+
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from wavecomb.usd.looks.network import shader_id
+from wavecomb.usd.looks.surface import Surface
 from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes import closures, standard_volume
-from wavecomb.usd.volumes.inputs import Inputs
-from wavecomb.usd.volumes.look import DEFAULT_LOOK, VolumeLook
+from wavecomb.usd.volumes.look import DEFAULT_LOOK, WHITE, Colour, VolumeLook
+from wavecomb.usd.volumes.shaders import (
+    CLOSURES,
+    STANDARD,
+    ClosureReader,
+    Inputs,
+    read_standard,
+)
 
 _CONTEXTS = ("mtlx", "", "arnold")
 """Render contexts whose terminals are looked at, in this order."""
@@ -17,7 +25,7 @@ _CONTEXTS = ("mtlx", "", "arnold")
 
 def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
     """The shader of a material's volume terminal, where it is one that is known."""
-    known = standard_volume.IDENTIFIERS + closures.IDENTIFIERS
+    known = STANDARD + CLOSURES
     for context in _CONTEXTS:
         shader = material.ComputeVolumeSource(context)[0]
         if shader_id(shader) in known:
@@ -58,10 +66,10 @@ class VolumeLooks:
         for context in _CONTEXTS:
             shader = material.ComputeVolumeSource(context)[0]
             kind = shader_id(shader)
-            if kind in standard_volume.IDENTIFIERS:
-                return standard_volume.read(shader, inputs)
-            if kind in closures.IDENTIFIERS:
-                return closures.ClosureReader(inputs, self._metres).read(shader)
+            if kind in STANDARD:
+                return read_standard(shader, inputs)
+            if kind in CLOSURES:
+                return ClosureReader(inputs, self._metres).read(shader)
             unknown = unknown or kind
         if unknown:
             self._report.missing(f"volume shader {unknown} (default taken)", material.GetPath())
@@ -69,3 +77,41 @@ class VolumeLooks:
             what = "volume with a material without a volume shader: default taken"
             self._report.warn(what, volume.GetPath())
         return DEFAULT_LOOK
+
+
+def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport) -> Surface | None:
+    """A surface that does nothing but bound the medium of a material's volume terminal.
+
+    None where it has no such terminal that is known.
+    """
+    prim = material.GetPrim()
+    if volume_shader(material) is None:
+        return None
+    metres = UsdGeom.GetStageMetersPerUnit(prim.GetStage())
+    look = VolumeLooks(time, metres, report).of(material, prim)
+    if any(look.emission):
+        report.missing("emission of a volume in a mesh (left out)", prim.GetPath())
+    if look.density or look.colour:
+        report.missing("fields of a volume in a mesh (taken for 1)", prim.GetPath())
+    most = max(look.extinction)
+    depth = 1.0 / most if most > 0 else 1.0
+    red, green, blue = (math.exp(-e * depth) for e in look.extinction)
+    scatter: Colour = (
+        look.extinction[0] * look.albedo[0] * depth,
+        look.extinction[1] * look.albedo[1] * depth,
+        look.extinction[2] * look.albedo[2] * depth,
+    )
+    layers = {
+        "transmission_weight": 1.0,
+        "transmission_color": (red, green, blue),
+        "transmission_depth": depth,
+        "transmission_scatter": scatter,
+        "transmission_scatter_anisotropy": look.anisotropy,
+    }
+    parameters = {
+        "ior": 1.0,
+        "roughness": 0.0,
+        "specular_color": WHITE,
+        "openpbr": layers,
+    }
+    return Surface(str(prim.GetPath()), "openpbr", parameters)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdVol volumes as the core takes them."""
+"""UsdVol volumes as the core takes them, and how they move while the shutter is open."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +13,13 @@ from pxr import Usd, UsdGeom, UsdVol
 
 from wavecomb import vdb
 from wavecomb.picture.working_space import from_rec709
-from wavecomb.usd.geometry.shutter import Motion
 from wavecomb.usd.looks.assign import Draw
-from wavecomb.usd.stage.report import LoadReport
-from wavecomb.usd.volumes.fields import Field, read_fields
-from wavecomb.usd.volumes.grids import Grid, GridTable
+from wavecomb.usd.looks.network import number
+from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.volumes.grids import Field, Grid, GridTable, read_fields
 from wavecomb.usd.volumes.info import GridFacts
 from wavecomb.usd.volumes.look import BLACK, Colour, VolumeLook
 from wavecomb.usd.volumes.material import VolumeLooks
-from wavecomb.usd.volumes.motion import VelocityReader
-
-if TYPE_CHECKING:
-    from wavecomb import _core
 
 GLOW = 1e-4
 """Emission times the size of a volume from which it is taken for a lamp."""
@@ -55,22 +51,13 @@ class VolumeReader:
         glow: Whether one of them may light the scene.
     """
 
-    def __init__(
-        self,
-        stage: Usd.Stage,
-        builder: _core.SceneBuilder,
-        time: Usd.TimeCode,
-        working: str,
-        report: LoadReport,
-        motion: Motion | None = None,
-    ) -> None:
-        """``motion``: None where the shutter is open for no time."""
-        self._time = time
-        self._working = working
-        self._report = report
-        self._velocities = VelocityReader(stage, motion, report)
-        self._grids = GridTable(builder, working, report)
-        self._looks = VolumeLooks(time, UsdGeom.GetStageMetersPerUnit(stage), report)
+    def __init__(self, context: LoadContext) -> None:
+        self._time, self._report = context.time, context.report
+        self._working = context.options.working_space
+        self._velocities = VelocityReader(context)
+        self._grids = GridTable(context)
+        metres = UsdGeom.GetStageMetersPerUnit(context.stage)
+        self._looks = VolumeLooks(self._time, metres, self._report)
         self.glow = False
 
     def read(self, draw: Draw) -> Volume | None:
@@ -158,3 +145,67 @@ class VolumeReader:
             what = f"anisotropy {look.anisotropy:g} of a volume: {limited:g} taken"
             self._report.warn(what, look.name or prim.GetPath())
         return limited
+
+
+_NAMES = ("velocity", "vel", "v")
+_PARTS = {name + sign + axis for name in _NAMES for sign in ("", "_", ".") for axis in "xyz"}
+_SCALES = ("primvars:arnold:velocity_scale", "arnold:velocity_scale")
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """What moves a volume.
+
+    Attributes:
+        grid: Of vectors, in object space over a second.
+        seconds: When the shutter opens and closes, from the frame, times the volume's scale.
+    """
+
+    grid: Grid
+    seconds: tuple[float, float]
+
+
+class VelocityReader:
+    """Finds what moves the volumes of one stage."""
+
+    def __init__(self, context: LoadContext) -> None:
+        per_second, motion = context.stage.GetTimeCodesPerSecond(), context.motion
+        self._seconds = (0.0, 0.0)
+        if motion is not None and per_second > 0:
+            opens, closes = motion.shutter
+            self._seconds = (opens / per_second, closes / per_second)
+        self._is_blurred = motion is not None
+        self._report = context.report
+
+    def find(
+        self, prim: Usd.Prim, fields: Mapping[str, Field], grids: GridTable, time: Usd.TimeCode
+    ) -> Velocity | None:
+        """The velocities of a volume; None where it stands still. Says what cannot be blurred.
+
+        Raises:
+            WavecombError: The file is broken, or holds what no velocity can be.
+        """
+        if not self._is_blurred:
+            return None
+        if any(field.changes for field in fields.values()):
+            what = "volumes whose files change while the shutter is open (still)"
+            self._report.missing(what, prim.GetPath())
+        field = grids.first_vector(fields, _NAMES)
+        if field is None:
+            if any(name.lower() in _PARTS for name in fields):
+                what = "velocities of volumes in three grids (still)"
+                self._report.missing(what, prim.GetPath())
+            return None
+        scale = self._scale(prim, time)
+        seconds = (self._seconds[0] * scale, self._seconds[1] * scale)
+        if seconds == (0.0, 0.0):
+            return None
+        grid = grids.get(field, "velocity")
+        return None if grid is None else Velocity(grid, seconds)
+
+    def _scale(self, prim: Usd.Prim, time: Usd.TimeCode) -> float:
+        for name in _SCALES:
+            attribute = prim.GetAttribute(name)
+            if attribute.HasAuthoredValue():
+                return number(attribute.Get(time), 1.0)
+        return 1.0

@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes that read images."""
+"""MaterialX nodes that read images, and those that scatter copies of one over a hexagonal grid.
+
+The grid: M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the weights and the
+hash of MaterialX's own code: at each place three copies, turned, scaled and shifted at random, are
+mixed.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from wavecomb.usd.graphs.surface import COLOURS, NORMAL, uv_matrix
-from wavecomb.usd.graphs.values import Value, fit, numbers
+from wavecomb.usd.graphs.values import Expressions, Value, fit, is_constant, numbers
 from wavecomb.usd.looks.network import asset_file, space_of
+from wavecomb.usd.materialx.nodes.arithmetic import fract, weighted_sum
 from wavecomb.usd.materialx.nodes.call import Handler, NodeCall, adder
+from wavecomb.usd.materialx.nodes.colours import LUMA
 
 NODES: dict[str, Handler] = {}
 _node = adder(NODES)
@@ -91,3 +99,160 @@ def _uv_texture(n: NodeCall) -> Value:
     if n.output in ("r", "g", "b", "a"):
         return (texel["rgba".index(n.output)],)
     return texel[: n.width]
+
+
+_GRID = 2.0 * math.sqrt(3.0)
+"""Scale of the grid, by which a copy fits what it covers."""
+_SKEW = (-0.57735027, 1.15470054)
+"""What v gives the skewed coordinates: -tan 30 degrees, twice its opposite."""
+_SEED = 0.12345
+"""Added to the numbers of a copy before they are hashed."""
+_PERIODIC = ["repeat", "repeat"]
+
+
+@dataclass(frozen=True)
+class _Copy:
+    """One of the three at a place: where it is read, how far it is turned, how near it is."""
+
+    uv: Value
+    turn: Value
+    weight: Value
+
+
+def _hash(m: Expressions, p: Value) -> Value:
+    """Two numbers of two, in [0, 1)."""
+    a = fract(m, m.mul((p[0], p[1], p[0]), numbers(0.1031, 0.1030, 0.0973)))
+    turned = m.add((a[1], a[2], a[0]), 33.33)
+    a = m.add(a, m.op("dot", a, turned))
+    return fract(m, m.mul(m.add((a[0], a[0]), (a[1], a[2])), (a[2], a[1])))
+
+
+def _mix(m: Expressions, ends: Value, at: Value) -> Value:
+    return m.op("mix", (ends[0],), (ends[1],), at)
+
+
+def _turned(m: Expressions, v: Value, sin: Value, cos: Value) -> Value:
+    x = m.sub(m.mul(v[:1], cos), m.mul(v[1:2], sin))
+    y = m.add(m.mul(v[:1], sin), m.mul(v[1:2], cos))
+    return x + y
+
+
+class _Grid:
+    """The copies at a place of a node."""
+
+    def __init__(self, n: NodeCall) -> None:
+        m = self.make = n.make
+        self.coord = m.mul(n.coordinates(), n.value("tiling", 1.0, 2))
+        self._rotation = n.value("rotation", 1.0, 1)
+        degrees = n.value("rotationrange", (0.0, 360.0), 2)
+        self._turns = m.mul(degrees, numbers(math.pi / 180))
+        self._scale = n.value("scale", 1.0, 1)
+        self._scales = n.value("scalerange", (0.5, 2.0), 2)
+        self._offset = n.value("offset", 1.0, 1)
+        self._offsets = n.value("offsetrange", (0.0, 1.0), 2)
+        self._falloff = n.value("falloff", 0.5, 1)
+
+    def copies(self) -> list[_Copy]:
+        m = self.make
+        st = m.mul(self.coord, numbers(_GRID))
+        skewed = m.add(st[:1], m.mul(st[1:], numbers(_SKEW[0])))
+        skewed += m.mul(st[1:], numbers(_SKEW[1]))
+        base = m.op("floor", skewed)
+        x, y = ((part,) for part in m.sub(skewed, base))
+        z = m.sub(m.sub(1.0, x), y)
+        # 1 in the upper triangle of a cell: where z is 0 or less.
+        upper = m.op("select", m.op("less", 0.0, z), 0.0, 1.0)
+        lower = m.sub(1.0, upper)
+        sign = m.sub(m.mul(upper, 2.0), 1.0)
+        weights = (
+            m.sub(0.0, m.mul(z, sign)),
+            m.sub(upper, m.mul(y, sign)),
+            m.sub(upper, m.mul(x, sign)),
+        )
+        steps = (upper + upper, upper + lower, lower + upper)
+        cells = (m.add(base, step) for step in steps)
+        return [self._copy(cell, w) for cell, w in zip(cells, weights, strict=True)]
+
+    def _copy(self, cell: Value, weight: Value) -> _Copy:
+        m = self.make
+        centre = m.add(cell[:1], m.mul(cell[1:], 0.5))
+        centre += m.mul(cell[1:], numbers(1 / _SKEW[1]))
+        centre = m.mul(centre, numbers(1 / _GRID))
+        chance = _hash(m, m.add(cell, numbers(_SEED)))
+        turn = _mix(m, self._turns, m.mul(chance[:1], self._rotation))
+        drawn = _mix(m, self._scales, chance[1:])
+        scale = m.op("mix", 1.0, drawn, self._scale)
+        shift = _mix(m, self._offsets, m.mul(chance[:1], self._offset))
+        shift += _mix(m, self._offsets, m.mul(chance[1:], self._offset))
+        away = m.sub(self.coord, centre)
+        away = _turned(m, away, m.op("sin", turn), m.op("cos", turn))
+        uv = m.add(m.add(m.div(away, scale), centre), shift)
+        return _Copy(uv, turn, weight)
+
+    def shares(self, copies: list[_Copy], bright: list[Value] | None = None) -> Value:
+        """How much of each copy there is; ``bright``: by which they are weighed, too."""
+        m = self.make
+        grid = tuple(copy.weight[0] for copy in copies)
+        w = m.op("power", m.op("max", grid, 0.0), 7.0)
+        if bright is not None:
+            w = m.mul(w, tuple(one[0] for one in bright))
+        w = self._normalised(w)
+        r = m.op("clamp", self._falloff, 0.001, 0.999)
+        return self._normalised(self._gain(w, r)) if r != numbers(0.5) else w
+
+    def _normalised(self, w: Value) -> Value:
+        return self.make.div(w, self.make.op("dot", w, numbers(1.0, 1.0, 1.0)))
+
+    def _gain(self, x: Value, r: Value) -> Value:
+        """C. Schlick, "Fast Alternatives to Perlin's Bias and Gain Functions", Gems IV, 1994."""
+        m = self.make
+        steep = m.sub(m.div(1.0, r), 2.0)
+        twice = m.mul(x, 2.0)
+        a = m.mul(steep, m.sub(1.0, twice))
+        low = m.div(x, m.add(a, 1.0))
+        high = m.div(m.sub(a, x), m.sub(a, 1.0))
+        return m.op("select", m.op("less", x, 0.5), low, high)
+
+
+def _texels(n: NodeCall, grid: _Grid, copies: list[_Copy], is_raw: bool) -> list[Value]:
+    stretch = stretch_of(grid.coord)
+    return [read_image(n, c.uv, _PERIODIC, "default", is_raw, stretch) for c in copies]
+
+
+@_node("hextiledimage")
+def _hextiled_image(n: NodeCall) -> Value:
+    m, grid = n.make, _Grid(n)
+    copies = grid.copies()
+    texels = _texels(n, grid, copies, is_raw=False)
+    if is_constant(texels[0]):  # no file
+        return texels[0]
+    luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
+    bright = [m.op("mix", 1.0, m.op("dot", t[:3], luma), contrast) for t in texels]
+    colour = weighted_sum(m, [t[:3] for t in texels], grid.shares(copies, bright))
+    if n.width != 4:
+        return colour
+    return colour + weighted_sum(m, [t[3:4] for t in texels], grid.shares(copies))
+
+
+@_node("hextilednormalmap")
+def _hextiled_normal_map(n: NodeCall) -> Value:
+    """In tangent space; gradients are mixed (M. Mikkelsen, JCGT 9(3), 2020)."""
+    m, grid, n.width = n.make, _Grid(n), 3
+    kind, n.kind = n.kind, NORMAL
+    copies = grid.copies()
+    texels = _texels(n, grid, copies, is_raw=True)
+    strength, flips = n.value("strength", 1.0, 1), n.number("flip_g", 0.0) != 0
+    n.kind = kind
+    if is_constant(texels[0]):
+        return numbers(0.0, 0.0, 1.0)
+    slopes = []
+    for copy, texel in zip(copies, texels, strict=True):
+        v = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
+        if flips:
+            v = v[:1] + m.sub(0.0, v[1:2]) + v[2:]
+        # The frame turns by -turn, so that its vectors keep to the copy.
+        back = m.sub(0.0, copy.turn)
+        across = _turned(m, m.mul(v[:2], strength), m.op("sin", back), m.op("cos", back))
+        steep = m.op("max", m.op("abs", v[2:]), 1e-3)
+        slopes.append(m.div(across, steep))
+    return weighted_sum(m, slopes, grid.shares(copies)) + numbers(1.0)

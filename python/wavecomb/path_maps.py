@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Path maps: folders that lie elsewhere on a worker's machine than on that of the job."""
+"""Path maps: folders that lie elsewhere on this machine than a job and its stage name them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Pair = tuple[str, str]
 """A folder as a job and its stage name it, and where it lies here; both absolute."""
 
 VARIABLE = "WAVECOMB_PATH_MAPS"
-"""Maps of a process as JSON; ``usd.stage.path_maps`` reads them."""
+"""JSON: pairs of folders. Set for the workers of a farm; nothing else sets it."""
 
 
 def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
@@ -53,17 +53,27 @@ def here(pairs: Iterable[Pair]) -> list[Pair]:
     return found + [p for p in pairs if p not in found and not os.path.exists(p[0])]
 
 
-def place(path: str, pairs: Iterable[Pair]) -> str:
-    """Where a file lies; the longest folder that fits decides.
+def mapped(path: str, pairs: Iterable[Pair]) -> str:
+    """Where a file lies; the longest folder that fits decides. Relative names stay as they are.
 
-    >>> place("/a/b/c.png", [("/a", "/x"), ("/a/b", "/y")])
-    '/y/c.png'
+    >>> mapped("/a/b/c.png", [("/a", "/x"), ("/a/b", "/y")]), mapped("/ab/c", [("/a", "/x")])
+    ('/y/c.png', '/ab/c')
     """
+    if not os.path.isabs(path):
+        return path
     best = max(
-        (pair for pair in pairs if path == pair[0] or path.startswith(pair[0].rstrip("/") + "/")),
-        key=lambda pair: len(pair[0]),
+        (pair for pair in pairs if _is_in(path, pair[0])),
+        key=lambda pair: len(pair[0].rstrip("/")),
         default=None,
     )
     if best is None:
         return path
-    return best[1].rstrip("/") + "/" + path[len(best[0].rstrip("/")) + 1 :]
+    named, lies = (folder.rstrip("/") for folder in best)
+    rest = path[len(named) :]
+    # What was mapped already is not mapped again.
+    return path if named == "" and _is_in(path, lies) else (lies + rest) or "/"
+
+
+def _is_in(path: str, folder: str) -> bool:
+    folder = folder.rstrip("/")
+    return path == folder or path.startswith(folder + "/")
