@@ -104,6 +104,21 @@ def test_sources_name_pages_that_are_there() -> None:
     assert not missing, missing
 
 
+def test_pages_name_sources_that_are_there() -> None:
+    """Of `folder/file.h` and the like in pages, from the root or from a package."""
+    folders = ("", "src/wavecomb", "src/wavecomb/integrate", "src/wavecomb/material", "python",
+               "python/wavecomb", "tests/cpp", "tests/python", "tests/statistics")  # fmt: skip
+    name = re.compile(r"`((?:[a-z_]+/)+[a-z_.]+\.(?:h|cpp|inl|py|in|toml|txt|usda))`")
+    made_up = ("CHANGELOG.md", "writing-a-policy.md", "writing-a-material.md")
+    missing = []
+    for page in PAGES:
+        if page.name not in made_up:
+            for file in name.findall(page.read_text(encoding="utf-8")):
+                if not any((ROOT / folder / file).exists() for folder in folders):
+                    missing.append(f"{page.name}: {file}")
+    assert not missing, missing
+
+
 def test_every_page_has_a_place_in_the_site() -> None:
     listed = set(
         re.findall(r"^\s+- (?:[\w ]+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), flags=re.M)
