@@ -192,8 +192,7 @@ def ply_bytes(form: str) -> bytes:
 
 @cache
 def left_over(what: str) -> bytes:
-    """Returns a file that a render of ``BALL`` writes: "ckpt", "exr" (seed 1), "exr2" (seed 2) or
-    "json"."""
+    """Returns a file that a render of ``BALL`` writes. "exr" has seed 1 and "exr2" seed 2."""
     import wavecomb
     from wavecomb.run.costs import save_costs
 
@@ -414,7 +413,7 @@ BY_COMMAND = ("product names",)
 
 
 def words_for(case: Path) -> list[str]:
-    """Returns arguments of ``wavecomb`` that make it read a case. Its output follows ``-o``."""
+    """Returns arguments of ``wavecomb`` that make it read a case. Output goes to ``-o``."""
     out, stage = str(case.with_name("out.exr")), str(case.with_name("stage.usda"))
     small = ["--size", "8", "8", "--spp", "1", "--quiet"]
     if case.name.startswith("mesh."):

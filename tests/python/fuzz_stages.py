@@ -52,7 +52,7 @@ class Verdict:
     Attributes:
         kind: One of ``KINDS``.
         number: Number of the case within its kind.
-        outcome: rendered, warned, refused; contained (a library crashed, and the user got one
+        outcome: rendered, warned, refused or contained (a library crashed, and the user got one
             line); wrong or hang, which are faults.
         said: The message, or a description of the fault.
         seconds: Time of the worker or of the command.
@@ -264,7 +264,7 @@ def run(
     keep: Path | None = None,
     until: float = math.inf,
 ) -> list[Verdict]:
-    """Checks cases with several workers until a deadline. Copies files of faults to ``keep``."""
+    """Checks cases with several workers until a deadline. Copies faulty cases to ``keep``."""
     queue: SimpleQueue[tuple[int, tuple[str, int]]] = SimpleQueue()
     for case in enumerate(cases):
         queue.put(case)

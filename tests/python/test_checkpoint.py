@@ -108,8 +108,7 @@ def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
 
 @pytest.mark.slow
 def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
-    """A render without a time limit began a pass of 2^14 samples; a resumed one with a limit ends
-    it."""
+    """A render resumed with a time limit keeps to it within a pass of 2^14 samples."""
     settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15}
     begun = StopAt(0)
     _core.render(cornell.scene, _core.Settings(**settings), watcher=begun)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections between camera paths and light paths: equal images for all schedules and crops, and
-the beauty by technique."""
+"""Connections of camera paths with light paths: schedules, crops, the beauty by technique."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _plain: dict[Any, wavecomb.Picture] = {}
 
 
 def texture_scene() -> Any:
-    """Returns 24 textured tiles with four programs before a mirror. Two tiles share a texture."""
+    """Returns 24 tiles with four programs before a mirror. Each texture is on two tiles."""
     rng = np.random.default_rng(7)
     builder = wavecomb.SceneBuilder()
     textures = [

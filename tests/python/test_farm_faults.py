@@ -84,7 +84,7 @@ def parts_of(folder: Folder) -> list[Path]:
 
 
 def disturb(stage: Path, place: Path, spp: int, count: int) -> None:
-    """Kills or halts random workers, nannies and clients (whose process has the scheduler)."""
+    """Kills or halts random workers, nannies and clients (which contain the scheduler)."""
     folder, chance, done = made(stage, place, spp), random.Random(7), 0
     client = client_of(folder)
     try:

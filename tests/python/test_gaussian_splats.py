@@ -38,8 +38,7 @@ def tuples(values: Any) -> str:
 
 
 def particles(name: str = "S", **values: Any) -> str:
-    """Returns a prim with positions, scales, orientations (w first), opacities, harmonics (n, k, 3)
-    and the text ``more``."""
+    """Returns a prim with these attributes. Quaternions have w first, harmonics are (n, k, 3)."""
     harmonics = np.asarray(values["harmonics"], float)
     n = len(values["positions"])
     lines = [
@@ -85,7 +84,7 @@ def read(folder: Path, *lines: str) -> tuple[Any, str]:
     return (scene.mesh("S") if scene.meshes else None), told
 
 
-# What is read
+# Reading
 
 
 def test_attributes_are_taken_as_usdvol_has_them(tmp_path: Path) -> None:
@@ -234,7 +233,7 @@ def test_colours_of_captures_are_decoded() -> None:
 
 
 def sidak(tests: int, level: float = 1e-4) -> float:
-    """Returns the number of deviations that any of ``tests`` means exceeds at that level."""
+    """Returns the deviation that any of ``tests`` means exceeds with this probability."""
     from scipy.stats import norm
 
     return float(norm.isf(0.5 * (1.0 - (1.0 - level) ** (1.0 / tests))))

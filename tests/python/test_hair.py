@@ -181,8 +181,7 @@ def test_one_picture_for_all_schedules(tmp_path: Path) -> None:
 def strands(
     kind: str, count: int, material: dict[str, Any], lamps: Sequence[tuple[Any, ...]] = ()
 ) -> Any:
-    """A bundle of hair before the camera, under a white sky or (position, radius, colour) of
-    lights."""
+    """Returns a bundle of hair under a white sky, or lights (position, radius, colour)."""
     builder = wavecomb.SceneBuilder()
     hair = builder.add_material("hair", **{"base_color": (1, 1, 1), "ior": 1.55, **material})
     rng = np.random.default_rng(5)

@@ -142,7 +142,7 @@ def test_archives_are_looked_at_before_they_are_read(
 
 
 def test_parts_that_overlap(whole: Path, tmp_path: Path) -> None:
-    """All directory entries refer to the same bytes, so they add up to more than the file."""
+    """All directory entries refer to the same bytes, so they exceed the size of the file."""
     with zipfile.ZipFile(whole) as source:
         info, data = source.infolist()[0], source.read(source.infolist()[0])
     file = tmp_path / "a.ckpt"

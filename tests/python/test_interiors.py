@@ -83,7 +83,7 @@ def test_a_camera_in_fog_knows_where_it_is() -> None:
     [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
 )
 def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
-    """Two slabs overlap by a quarter. The higher priority wins; of equal ones, the last entered."""
+    """Where two slabs overlap, the higher priority or else the last entered one counts."""
     builder = wavecomb.SceneBuilder()
     other = SIGMA[::-1]
     for (low, high), sigma, priority in zip(
@@ -97,9 +97,7 @@ def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths
 
 
 def test_indices_are_those_of_both_sides() -> None:
-    """Without absorption, stacked interfaces of air, glass, an overlapping liquid and air transmit
-    1 / (1 + sum R / (1 - R)) (Stokes 1862).
-    """
+    """Interfaces of stacked clear media transmit 1 / (1 + sum R / (1 - R)) (Stokes 1862)."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -1.0, 0.0, filled(builder, 2.0, nested_priority=1.0))
     slab(builder, -2.0, -0.75, filled(builder, 1.25))
@@ -499,7 +497,7 @@ def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
 
 
 def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
-    """A warning that light scattered in cloudy glass misses volumes, only if there are any."""
+    """If there are volumes, a warning says that light scattered in cloudy glass misses them."""
     from usd_recorder import load, said
 
     volume = 'def Volume "V" { float3[] extent = [(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)] }\n'

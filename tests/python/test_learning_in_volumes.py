@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guiding, light calibration and learned roulette with scattering volumes: equal images for all
-schedules, and no bias."""
+"""Guiding, light calibration and learned roulette with scattering volumes."""
 
 from __future__ import annotations
 

@@ -281,8 +281,9 @@ def test_gels_multiply_all_light(tmp_path, kind):
     both = "\nrel light:filters = [</Gel>, </Mult>]"
     free = picture(tmp_path, FLOOR + lamp(kind, body))
     got = picture(tmp_path, FLOOR + lamp(kind, body + both) + gel + mult)
-    # The product of both filters, with half of the diffuse light.
-    grey = 0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)
+    grey = (
+        0.5 * 0.5 * (0.2126 + 0.5 * 0.7152)
+    )  # product of both filters, with half of the diffuse light
     lit = free[:, :, 0] > 0
     assert got[lit] / free[lit] == pytest.approx(np.full((lit.sum(), 3), grey), rel=1e-3)
 

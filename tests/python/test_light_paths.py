@@ -123,7 +123,7 @@ def test_what_it_does_not_go_with_is_one_line(
 
 
 def test_brightness_of_lights_does_not_matter(stages: Any) -> None:
-    """Splat units follow the lights: 2^20 times the power gives exactly 2^20 times the image."""
+    """Splat units scale with the lights: 2^20 times the power is exactly 2^20 times as bright."""
     from pxr import Usd, UsdLux
 
     path = stages("caustics")

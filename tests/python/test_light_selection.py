@@ -26,7 +26,7 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Any:
 def builder_scene(
     glass: bool = False, edit: dict[int, dict[str, Any]] | None = None
 ) -> wavecomb.SceneBuilder:
-    """Returns a room of many small lights under a dome, with rough glass and edited lights."""
+    """Returns a room of many small lights under a dome, optionally with a rough glass pane."""
     rng = np.random.default_rng(4)
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -172,7 +172,7 @@ def test_the_street_has_the_lights_that_were_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_tree_that_nobody_chooses_by_is_not_built() -> None:
-    """With one bright light and many faint ones, lights are selected by power by default."""
+    """By default, one bright light and many faint ones are selected by power."""
 
     def scene() -> wavecomb.Scene:
         rng = np.random.default_rng(6)

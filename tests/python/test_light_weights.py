@@ -30,8 +30,7 @@ def studio(studio_path: Path) -> Any:
 
 
 def room() -> Any:
-    """Returns glossy and diffuse walls, a mostly hidden light, small lights, a dome, an emissive
-    mesh."""
+    """Returns a room with a mostly hidden light, small lights, a dome and an emissive mesh."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
 

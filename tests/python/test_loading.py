@@ -31,7 +31,7 @@ LINUX = only_where(sys.platform == "linux", "reads /proc")
 
 
 def textured_stage(folder: Path) -> Path:
-    """Eight quads with one image each: one is missing, one is broken, one is used twice."""
+    """Writes nine quads with eight images: one missing, one broken, one in two colour spaces."""
     rng = np.random.default_rng(7)
     for k in range(6):
         write_png(folder / f"{k}.png", rng.random((16 + k, 20, 3)).astype(np.float32))
@@ -68,8 +68,7 @@ def test_reading_ahead_changes_nothing(tmp_path: Path) -> None:
         )
     (one, a), (many, b) = loads
     assert a.report.lines() == b.report.lines()
-    # With the placeholder, and 0.png in two colour spaces.
-    assert len(one.textures) == len(many.textures) == 9
+    assert len(one.textures) == len(many.textures) == 9  # with the placeholder, 0.png twice
     for x, y in zip(one.textures, many.textures, strict=True):
         assert x["srgb"] == y["srgb"] and np.array_equal(x["pixels"], y["pixels"])
     warnings = [line for line in b.report.lines() if "cannot be read" in line]

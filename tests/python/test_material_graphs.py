@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX networks of a stage: what becomes a constant, a texture, or a value graph."""
+"""MaterialX networks of a stage: constants, textures, and value graphs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def standard(inputs, nodes="", model="ND_standard_surface_surfaceshader"):
 
 
 def driven(scene, mesh="M"):
-    """Parameter -> values at points, of a mesh's graph."""
+    """Returns a function that evaluates the graph of a mesh: points to values by parameter."""
     graph = scene.graphs[scene.material_of(mesh)["graph"]]
 
     def at(points):
@@ -80,7 +80,7 @@ def test_constant_networks_are_constants(tmp_path):
 
 
 def test_scaled_images_are_plain_textures(tmp_path):
-    """image * tint + bias through place2d: one texture use, and no graph."""
+    """image * tint + bias through place2d becomes one texture use without a graph."""
     write_image(tmp_path / "a.png", np.full((4, 4, 3), 99, np.uint8), "uint8")
     nodes = UV + node(
         "Place",
@@ -120,7 +120,7 @@ def test_scaled_images_are_plain_textures(tmp_path):
     assert use["channel"] == "rgb" and use["scale"] == (0.25, 0.5, 0.125, 1.0)
     assert use["bias"] == (0.0625, 0.0625, 0.0625, 0.0)
     assert scene.textures[use["texture"]]["wrap"][0] == "mirror"
-    # (uv - pivot) / scale, a quarter clockwise, - offset + pivot.
+    # (uv - pivot) / scale, a quarter turn clockwise, - offset + pivot.
     a, b, c, d, e, f = use["uv"]
     for u, v in ((0.0, 0.0), (0.3, 0.8)):
         x, y = (u - 0.5) / 0.5, (v - 0.5) / 0.25
@@ -191,7 +191,7 @@ def test_noise_drives_many_parameters_by_one_program(tmp_path):
     assert np.allclose(got["opacity"][:, 0], mix[:, 0], atol=1e-5)
     for parameter in ("fuzz_color", "coat_color", "transmission_tint"):
         assert np.allclose(got[parameter], mix, atol=1e-5)
-    # The whole, and what drives opacity and emission alone.
+    # All parameters, opacity alone, and what emission needs alone.
     assert len(scene.graphs) == 3
     assert [len(g.outputs) for g in scene.graphs[1:]] == [1, 3]
 
@@ -312,7 +312,7 @@ def test_networks_in_circles_end(tmp_path):
 
 @pytest.mark.parametrize("category", ["power", "screen", "contrast", "safepower", "overlay"])
 def test_networks_too_deep_are_cut(tmp_path, category):
-    """At a node, and said; the material keeps all else, however its nodes are made."""
+    """Networks that are too deep are cut at a node with a warning. Other inputs are kept."""
     first = {"power": "in1", "safepower": "in1", "contrast": "in"}.get(category, "fg")
     nodes = "".join(
         node(
@@ -342,7 +342,7 @@ def test_networks_too_large_are_said_and_leave_parameters_out(tmp_path):
         names.append(f"N{i}")
     for i in range(1, 70):
         first = names[0] if i == 1 else f"S{i - 1}"
-        # The sums come late: all noises are wanted at once by the last.
+        # The maxima come last, so that all noises are live at the same time.
         nodes += node(
             f"S{i}",
             "ND_max_color3",
@@ -358,7 +358,7 @@ def test_networks_too_large_are_said_and_leave_parameters_out(tmp_path):
 
 
 def test_graph_of_a_real_scene_renders_as_its_formula(tmp_path):
-    """Emission by a ramp over the texture: the picture is the ramp."""
+    """Emission by a ramp over texture coordinates renders as the ramp."""
     nodes = UV + node(
         "Ramp",
         "ND_ramp4_color3",
@@ -396,7 +396,7 @@ MOVED = """matrix4d xformOp:transform = ((0, 2, 0, 0), (-2, 0, 0, 0), (0, 0, 2, 
 
 
 def test_object_space_is_that_of_each_mesh(tmp_path):
-    """A mesh outside of instances is brought to the world; its graph goes back."""
+    """Points of a mesh outside of instances are in world space. Its graph transforms them back."""
     nodes = node("P", "ND_position_vector3", "", "float3 outputs:out")
     nodes += node("N", "ND_normal_vector3", "", "float3 outputs:out")
     text = standard(
@@ -415,7 +415,7 @@ def test_object_space_is_that_of_each_mesh(tmp_path):
     expected = normals @ matrix[:3, :3].T
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     assert np.allclose(driven(scene)(at)["specular_color"], expected, atol=1e-5)
-    # What stands still in its group shares the surface's own program.
+    # Without a transform, meshes share the program of the material.
     still, _ = load(tmp_path, text)
     assert len(still.graphs) == 1
 

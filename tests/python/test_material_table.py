@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from the core's table of materials; a row that is added is found everywhere."""
+"""The core's table of material parameters: every consumer picks up new rows."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ ADDED = (
 
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table with a few rows more, as if the core had them."""
+    """Adds rows to the table, as if the core had them."""
     add_rows(monkeypatch, material_parameters, ADDED)
 
 
 def build(program: str = "principled", **values: Any) -> Any:
-    """A scene with one triangle, whose material is told this."""
+    """Returns a scene with one triangle whose material has these parameters."""
     builder = core.SceneBuilder(1)
     builder.add_material(program, name="/M", **values)
     triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
@@ -51,7 +51,7 @@ def build(program: str = "principled", **values: Any) -> Any:
 
 
 def another(row: MaterialParameter) -> Any:
-    """A value that a row takes and that is not its default."""
+    """Returns a valid value other than the default."""
     if row.least is not None and row.most is not None:
         return row.most if row.default != row.most else row.least
     return {"number": 0.25, "colour": (0.25, 0.5, 0.75), "flag": not row.default}[row.kind]
@@ -163,7 +163,7 @@ def test_an_added_row_of_a_program_is_read_from_its_attribute(
         stage = Usd.Stage.CreateInMemory()
         stage.GetRootLayer().ImportFromString(STAGE % (program, attribute))
         prim, time = stage.GetPrimAtPath("/M"), Usd.TimeCode.Default()
-        textures: Any = None  # there are none to read
+        textures: Any = None  # no textures to read
         reader = PreviewReader(prim, time, textures, LoadReport())
         read = reader.read(UsdShade.Shader(stage.GetPrimAtPath("/M/S"))).parameters
         traced = traced_parameters(prim, time)

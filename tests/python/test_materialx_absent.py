@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages where MaterialX is not installed, or its package is cut off."""
+"""Stages where MaterialX is not installed, or its package is incomplete."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def cut_off(package, monkeypatch):
 
 @pytest.fixture(params=PACKAGES)
 def absent(request, monkeypatch):
-    """Without the wheel, or without the package that reads it."""
+    """Hides the wheel of MaterialX, or the package that reads its documents."""
     cut_off(request.param, monkeypatch)
 
 
@@ -77,7 +77,7 @@ def test_its_surfaces_are_grey_and_said_in_one_line(tmp_path, absent):
 def test_its_nodes_are_left_out_of_preview_surfaces(tmp_path, absent):
     loaded = loaded_of(write(tmp_path, MIXED))
     assert len(lines(loaded)) == 1 and "nodes left out: /Mat/P" in lines(loaded)[0]
-    assert loaded.scene.material_of("M")["roughness"] == 0.5  # UsdPreviewSurface's default
+    assert loaded.scene.material_of("M")["roughness"] == 0.5  # the default of UsdPreviewSurface
 
 
 def test_its_files_are_left_out_and_said_in_one_line(tmp_path, absent):

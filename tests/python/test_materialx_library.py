@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's own library: which of its nodes are read, and that what is written here is the same.
+"""MaterialX's library: supported nodes, and agreement of built-in nodes with its graphs.
 
-The list of docs/material-graphs.md is held to what is so.
+The list in docs/material-graphs.md must be correct.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ REASONS = {
     "standard_surface_to_gltf_pbr": "inputs of BSDF nodes",
     "chiang_hair_roughness": HAIR,
 }  # fmt: skip
-"""Why nodes are only named, by category."""
+"""Reasons for nodes that are recognised but not supported, by category."""
 
 
 def library_of(identifier):
@@ -50,7 +50,7 @@ def reason(identifier):
 
 @functools.cache
 def by_category(*support):
-    """Definitions that are read in one of these ways, by category."""
+    """Returns definitions with these kinds of support, by category."""
     found = collections.defaultdict(list)
     for identifier in patterns():
         if support_of(identifier) in support:
@@ -73,7 +73,7 @@ def test_all_nodes_are_read_or_named_with_a_reason():
         line = f"- {', '.join(f'`{name}`' for name in sorted(categories))}: {why}"
         assert re.sub(r"\s+", " ", line) in re.sub(r"\s+", " ", text), line
     table = text[text.index("| | primitives |") : text.index("All others are graphs")]
-    # Nodes of Arnold are none of the library's: docs/materialx.md has them.
+    # Nodes of Arnold are not part of the library; docs/materialx.md lists them.
     library_s = {name for name in CATEGORIES if not name.startswith("arnold_")}
     assert set(re.findall(r"`(\w+)`", table)) == library_s
     assert not REASONS.keys() - {name for names in named.values() for name in names}
@@ -81,7 +81,7 @@ def test_all_nodes_are_read_or_named_with_a_reason():
 
 @pytest.mark.parametrize("category", sorted(by_category("primitive", "graph")))
 def test_no_node_that_is_read_says_anything(category):
-    """And its output has as many components as it says: of the first and last types of each."""
+    """The first and last type of each node compiles without warnings to the right width."""
     variants = by_category("primitive", "graph")[category]
     for identifier in {variants[0], variants[-1]}:
         node = Node(identifier).feed_at_random()
@@ -93,7 +93,7 @@ def test_no_node_that_is_read_says_anything(category):
 
 
 def both_ways():
-    """Nodes that are written here though the library has a graph for them."""
+    """Yields nodes that are implemented here although the library has a graph for them."""
     for identifier in patterns():
         category = definition_of(identifier).category
         is_here = primitive(category, identifier) is not None or category in PER_COMPONENT
@@ -103,7 +103,7 @@ def both_ways():
 
 @pytest.mark.parametrize("identifier", sorted(both_ways()))
 def test_what_is_written_here_is_the_library_s_graph(identifier):
-    """Bit for bit, on inputs at random; and no operation more."""
+    """The implementation equals the library's graph bit for bit on random inputs."""
     at = points()
     node = Node(identifier).feed_at_random()
     if identifier.startswith("ND_UsdUVTexture"):
@@ -114,14 +114,14 @@ def test_what_is_written_here_is_the_library_s_graph(identifier):
         ours = node.value(output)
         graph = flat_graph(identifier, CATEGORIES)
         theirs = Body(node.call(output), graph).output(output)
-        if ours == theirs:  # the very same nodes
+        if ours == theirs:  # identical value graphs
             continue
         assert np.array_equal(run(ours, at), run(theirs, at), equal_nan=True), output
 
 
 @pytest.mark.parametrize("category", sorted(by_category("primitive")))
 def test_defaults_of_primitives_are_the_library_s(category):
-    """A node without inputs is one with all inputs at what its definition says."""
+    """A node without inputs equals one with all inputs set to the defaults of its definition."""
     for identifier in by_category("primitive")[category]:
         bare, full = Node(identifier), Node(identifier)
         full.networks.make = bare.networks.make
@@ -130,10 +130,10 @@ def test_defaults_of_primitives_are_the_library_s(category):
             if kind in WIDTHS and text and not item.getDefaultGeomPropString():
                 full.give(**{item.getName(): text})
         if identifier in ("ND_image_color4", "ND_image_vector4", "ND_hextiledimage_color4"):
-            full.give(default="0, 0, 0, 1")  # a file that is missing is drawn opaque
+            full.give(default="0, 0, 0, 1")  # a missing file is drawn opaque
         for output in patterns()[identifier]:
             ours, theirs = bare.value(output), full.value(output)
-            if all(isinstance(x, float) for x in (*ours, *theirs)):  # worked out of the defaults
+            if all(isinstance(x, float) for x in (*ours, *theirs)):  # folded constants
                 theirs = pytest.approx(theirs, rel=1e-5)
             assert ours == theirs, (identifier, output)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes against their formulas: primitives, and graphs of the library made of them."""
+"""MaterialX nodes against their formulas: primitives and graphs of the library."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ LUMA = np.array((0.2722287, 0.6740818, 0.0536895))
 
 
 def noise(node, name):
-    """What a fed input comes to."""
+    """Evaluates the noise that feeds an input."""
     shader = node.shader
     return run(node.networks.input(shader, name, "number"), AT).astype(float)
 
 
 def fed(identifier, width=3, **names):
-    """A node whose named inputs are noise of a type."""
+    """Returns a node whose named inputs are noise of the given types."""
     node = Node(identifier)
     for name, kind in names.items():
         size = ",".join(["0.9"] * {"float": 1, "color3": 3, "color4": 4, "vector3": 3}[kind])
@@ -40,7 +40,7 @@ def rows(function, *arrays):
 
 
 def hsv(colours):
-    """To hue, saturation and value; of colours outside of 0..1 too."""
+    """Converts to hue, saturation and value, also for colours outside of 0..1."""
     return rows(lambda c: colorsys.rgb_to_hsv(*c), colours)
 
 
@@ -51,7 +51,7 @@ def rgb(values):
 def test_checkerboard():
     got = Node("ND_checkerboard_color3").give(uvtiling="3, 5", uvoffset="0.25, 0.5").run(AT)
     cell = np.floor(UV * (3, 5) - (0.25, 0.5)).sum(axis=1)
-    # As MaterialX's graph has it: the first colour where the sum is odd.
+    # As in MaterialX's graph, the first colour is where the sum is odd.
     assert np.array_equal(got[:, 0], np.mod(cell, 2))
 
 
@@ -115,7 +115,7 @@ def test_range_clamps_only_when_told():
 
 
 def test_fractal2d_is_a_sum_of_flat_noise():
-    """Not a plane of the noise of three dimensions."""
+    """The noise has two dimensions; it is no slice of noise in three dimensions."""
     node = Node("ND_fractal2d_vector3")
     node.give(octaves=4, lacunarity="2.5", diminish="0.4", amplitude="1, 2, 3")
     total = sum(
@@ -125,7 +125,7 @@ def test_fractal2d_is_a_sum_of_flat_noise():
 
 
 def test_blackbody():
-    """White at 6500 K, red below; the chromaticity of the CIE's illuminant A at 2856 K."""
+    """White at 6500 K, red below; at 2856 K the chromaticity of CIE illuminant A."""
 
     def chromaticity(kelvin):
         value = Node("ND_blackbody").give(temperature=kelvin).run(AT[:1])[0].astype(float)
@@ -153,7 +153,7 @@ def test_blackbody_is_a_colour_of_the_working_space():
 
 
 def test_conversion_of_colour_spaces_keeps_white():
-    """The library's graph multiplies rows by its matrix."""
+    """The library's graph multiplies row vectors by its matrix."""
     node = Node("ND_acescg_to_lin_rec709_color3").give(**{"in": "1, 1, 1"})
     assert np.allclose(node.run(AT[:1]), 1.0, atol=1e-3)
     red = Node("ND_acescg_to_lin_rec709_color3").give(**{"in": "1, 0, 0"}).run(AT[:1])[0]
@@ -204,7 +204,7 @@ def test_matte_and_disjointover():
 
 
 def test_ramp_between_colours():
-    """Of several kinds and ways between; the intervals as authored."""
+    """Ramps of several kinds and interpolations, with authored intervals."""
     given = {
         "type": 0, "num_intervals": 3, "interval1": "0", "interval2": "0.25", "interval3": "1",
         "color1": "1, 0, 0, 1", "color2": "0, 1, 0, 0.5", "color3": "0, 0, 1, 1",
@@ -250,14 +250,14 @@ def test_logic():
 
 
 def test_images_of_gltf_are_placed_as_its_graph_says():
-    """Its scale counts texels per turn of the mesh's coordinates: inverse to place2d's."""
+    """The scale of the glTF node is the inverse of the scale of place2d."""
     node = Node("ND_gltf_image_color3_color3_1_0").give(file="a.png", scale="2, 4", factor="1,1,1")
     node.give(offset="0.25, 0.5", rotate="90")
     use = plain_use(node.value(kind="base"), wide=True)
     assert use["channel"] == "rgb" and use["scale"] == (1, 1, 1, 1)
     a, b, c, d, e, f = use["uv"]
     for u, v in ((0.0, 0.0), (0.3, 0.8)):
-        # About (0, 1): times scale, turned counter-clockwise, moved by (offset x, - offset y).
+        # About (0, 1): scaled, turned counter-clockwise, moved by (offset x, - offset y).
         x, y = 2 * u, 4 * (v - 1)
         expected = (-y + 0.25, x - 0.5 + 1)
         assert (a * u + b * v + c, d * u + e * v + f) == pytest.approx(expected, abs=1e-5)
@@ -281,7 +281,7 @@ def test_normal_maps_of_gltf_read_their_file():
 
 
 def test_triplanar_projection_mixes_three_images(monkeypatch):
-    """By the normal of the object; each image read along its axis."""
+    """Images are blended by the object-space normal, and each is read along its axis."""
     read = []
 
     def numbered(n, uv, *_):
@@ -296,7 +296,7 @@ def test_triplanar_projection_mixes_three_images(monkeypatch):
     normal = np.abs(AT[:, 12:15].astype(float))
     order = ["xyz".index(str(file.path)[0]) for file, _ in read]
     assert np.allclose(got.sum(axis=1), 1, atol=1e-5)
-    # Where the normal leans to an axis, the image along it counts most.
+    # Where the normal is near an axis, the image along that axis has the largest weight.
     strongest = np.array(order)[got.argmax(axis=1)]
     clear = np.sort(normal, axis=1)[:, 2] > 0.8
     assert clear.sum() > 20 and np.array_equal(strongest[clear], normal.argmax(axis=1)[clear])
@@ -306,9 +306,9 @@ def test_triplanar_projection_mixes_three_images(monkeypatch):
 
 
 def test_coordinates_by_an_image_are_no_colours():
-    """What only says where to look is read once, as data."""
+    """An image used as texture coordinates is read once, without colour conversion."""
     node = Node("ND_tiledimage_color3").give(file="a.png")
-    node.feed("texcoord", "ND_image_color3", file="b.png")  # whatever the type
+    node.feed("texcoord", "ND_image_color3", file="b.png")  # whatever its type
     node.value(kind="base")
     assert sorted(node.textures.uses) == [
         ("a.png", "auto", "repeat", "repeat", True),
@@ -317,7 +317,7 @@ def test_coordinates_by_an_image_are_no_colours():
 
 
 def test_long_networks_of_graphs_are_no_deep_calls():
-    """90 contrasts in a row, each a graph; all count."""
+    """A chain of 90 contrast nodes, each of which is a graph, compiles completely."""
     node = Node("ND_contrast_float").give(amount="1.01", pivot="0")
     shader = node.shader
     for i in range(90):
@@ -346,7 +346,7 @@ def test_long_networks_of_graphs_are_no_deep_calls():
     ],
 )  # fmt: skip
 def test_a_matrix_in_the_place_of_numbers_is_cut(identifier, name, is_driven):
-    """Files may connect anything with anything."""
+    """Files may connect inputs of any types."""
     node = Node(identifier)
     port = node.shader.CreateInput(name, Sdf.ValueTypeNames.Matrix4d)
     if is_driven:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``--memory-limit``: bombs end the child, in one line, and not the machine."""
+"""``--memory-limit``: decompression bombs end the child process with one line."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ code = subprocess.run(sys.argv[1:]).returncode
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 sys.exit(code)
 """
-"""Runs a command and says the peak of it and of its children, KB: this process has had others."""
+"""Runs a command in a new process and prints the peak memory of its children in KB."""
 
 
 def run(*words: object, limit: float = LIMIT_MB) -> subprocess.CompletedProcess[str]:
-    """Runs the command; the last line of its output is its peak in KB."""
+    """Runs the command. The last line of its output is its peak memory in KB."""
     command = [sys.executable, "-m", "wavecomb", *map(str, words), "--memory-limit", str(limit)]
     return subprocess.run(
         [sys.executable, "-c", PEAK_OF, *command],
@@ -45,7 +45,7 @@ def run(*words: object, limit: float = LIMIT_MB) -> subprocess.CompletedProcess[
 
 
 def packed_indices(folder: Path) -> list[object]:
-    """400 MB of indices in 130 KB."""
+    """Writes 400 MB of indices compressed to 130 KB. Returns a command that reads them."""
     stage = Usd.Stage.CreateNew(str(folder / "bomb.usdc"))
     mesh = UsdGeom.Mesh.Define(stage, "/M")
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.zeros((3, 3), np.float32)))
@@ -58,7 +58,7 @@ def packed_indices(folder: Path) -> list[object]:
 
 
 def packed_texture(folder: Path) -> list[object]:
-    """320 MB of pixels in a few MB."""
+    """Writes 320 MB of pixels compressed to a few MB. Returns a command that reads them."""
     spec = oiio.ImageSpec(9000, 9000, 4, "uint8")
     output = oiio.ImageOutput.create(str(folder / "t.tif"))
     spec.attribute("compression", "zip")
@@ -75,13 +75,13 @@ def packed_texture(folder: Path) -> list[object]:
 
 
 def large_picture(folder: Path) -> list[object]:
-    """A small stage whose film is too large."""
+    """Writes a small stage. Returns a command that renders it with too large a film."""
     (folder / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
     return ["render", folder / "s.usda", "-o", folder / "o.exr", "--size", 6000, 6000]
 
 
 def large_merge(folder: Path) -> list[object]:
-    """Pictures of 190 MB each, in a few KB."""
+    """Writes images of 190 MB compressed to a few KB. Returns a command that merges them."""
     for name in "ab":
         spec = oiio.ImageSpec(4000, 4000, 3, "float")
         spec.attribute("compression", "zip")

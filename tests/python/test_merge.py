@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb merge``: weighted by samples, and what does not fit is refused."""
+"""``wavecomb merge``: weights by samples, and images that do not match."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_a_merged_picture_merges_on(files: list[Path], stage: Path, tmp_path: Pa
 
 
 def test_variance_is_of_the_sum(tmp_path: Path) -> None:
-    """Of pictures of white noise, known variance: what merge says is what is there."""
+    """The variance of merged images of white noise is correct."""
     rng = np.random.default_rng(4)
     names = []
     for seed, samples in enumerate((4, 12, 16)):
@@ -113,7 +113,7 @@ def test_variance_is_of_the_sum(tmp_path: Path) -> None:
 
 
 def test_pixels_without_samples_or_errors_say_nothing(tmp_path: Path) -> None:
-    """A pixel without samples counts for nothing; an error that is not known stays so."""
+    """Pixels without samples have no weight, and an unknown error stays unknown."""
     inf, nan = np.inf, np.nan
     names = []
     for seed, (samples, beauty, variance) in enumerate(
@@ -137,7 +137,7 @@ def test_pixels_without_samples_or_errors_say_nothing(tmp_path: Path) -> None:
 
 
 def test_parts_are_as_good_as_the_whole(stage: Path, tmp_path: Path) -> None:
-    """Of independent samples: mean, variance and error of four renders are those of a long one."""
+    """Four merged renders have the mean, variance and error of one with four times the samples."""
     names = []
     settings: dict[str, Any] = {"size": (32, 24), "error": True, "sampler": "independent"}
     for seed, spp in enumerate((16, 48, 64, 128)):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths from lights that end at what is seen in mirrors and through glass: one picture for all
-schedules, parts of it, renders that are stopped, what they do not go with."""
+"""Light paths merged with points seen through mirrors and glass."""
 
 from __future__ import annotations
 

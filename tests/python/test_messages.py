@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong is found before anything is loaded, and said with what to do."""
+"""Errors are found before loading where possible, and messages say what to do."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
 def test_checks_that_need_no_stage_come_first(
     tmp_path: Path, options: tuple[str, ...], said: str
 ) -> None:
-    """The stage is not there: a check after loading would say that."""
+    """The stage does not exist, so a check after loading would report that."""
     output = () if "-o" in options else ("-o", "a.exr")
     for command in (("render",), ("farm", "submit")):
         done = forks.wavecomb(*command, "gone.usda", *output, *options, cwd=tmp_path)
@@ -92,7 +92,7 @@ def test_arguments_that_are_not_utf_8(tmp_path: Path, words: tuple[bytes, ...]) 
 
 
 def test_a_folder_whose_name_is_not_utf_8(tmp_path: Path) -> None:
-    """Relative names in it work, or are refused in a line."""
+    """Relative names in such a folder work, or are refused in one line."""
     folder = tmp_path / os.fsdecode(NOT_TEXT)
     folder.mkdir()
     (folder / "a.usda").write_text(STAGE)
@@ -230,7 +230,7 @@ def test_a_file_that_the_system_cuts_short_says_why(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """``/dev/full`` answers writes as a full disk does."""
+    """Writes to ``/dev/full`` fail as on a full disk."""
     part: Any = "/dev/full"
     assert files.why_not_written(part, "Write error").startswith("the disk is full")
     good = tmp_path / "a"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/methods.md has every paper that a source or a page names, and says truly where."""
+"""docs/methods.md lists every paper that a source or page cites, with the right files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_AUTHORS = frozenset((
 
 
 def prose(path: Path) -> str:
-    """What a file says to people: comments of C++, all of other files; on one line."""
+    """Returns the prose of a file as one line: comments of C++ files, all text of others."""
     text = path.read_text(encoding="utf-8", errors="replace")
     if path.suffix in (".h", ".cpp", ".in"):
         lines = [line.partition("//")[2] or "\n;\n" for line in text.splitlines()]
@@ -42,7 +42,7 @@ def prose(path: Path) -> str:
 
 @cache
 def citations() -> dict[tuple[str, str], list[str]]:
-    """(last name of the first author, year) -> files that name the paper."""
+    """Returns cited papers as (last name of the first author, year), with the citing files."""
     found: dict[tuple[str, str], list[str]] = {}
     for folder in SEARCHED:
         for path in sorted((ROOT / folder).rglob("*")):
@@ -58,7 +58,7 @@ def citations() -> dict[tuple[str, str], list[str]]:
 
 
 def rows() -> list[tuple[str, list[str]]]:
-    """The papers of the page, and the files that each row names."""
+    """Returns the papers of the page, with the files that each row names."""
     lines = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if line[:2] == "| "]
     cells = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
     return [
@@ -79,7 +79,7 @@ def test_every_paper_that_is_named_is_on_the_page() -> None:
 
 
 def test_citations_are_found() -> None:
-    """What the test above looks for: names, pairs, lists, titles between name and year."""
+    """Checks the pattern: names, pairs of authors, lists, titles between name and year."""
     there = citations()
     assert len(there) > 40
     for key in (("Walter", "2007"), ("Veach", "1997"), ("Dammertz", "2010"), ("Vose", "1991"),
@@ -100,7 +100,7 @@ def test_a_row_says_truly_where(paper: str, files: list[str]) -> None:
 
 
 def test_versions_agree() -> None:
-    """Of the project, the citation file and the newest part of the changelog."""
+    """The project, the citation file and the changelog have the same version."""
     version = re.search(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(), re.M)
     cff = (ROOT / "CITATION.cff").read_text()
     cited = re.search(r"^version: (.+)\ndate-released: (.+)$", cff, re.M)

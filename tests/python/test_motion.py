@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion blur: what stages say of it, and pictures of it."""
+"""Motion blur: what is read from stages, and images."""
 
 import numpy as np
 import pytest
@@ -52,9 +52,9 @@ def test_moving_transforms_become_moving_instances(tmp_path):
     scene, loaded = load(tmp_path, stage(camera(0, 0.5) + MOVING % QUAD), frame=1)
     ((name, motion),) = scene.motions
     assert name == "/Mover/Quad" and motion.shape == (1, 2, 4, 4)
-    assert motion[0, :, 3, 0].tolist() == [0.0, 1.0]  # two units a frame, half a frame
+    assert motion[0, :, 3, 0].tolist() == [0.0, 1.0]  # two units per frame, over half a frame
     assert loaded.shutter == (0.0, 0.5)
-    # Its points are the stage's own: nothing is baked, nothing is held twice.
+    # The points are those of the stage: not transformed, and not copied.
     assert scene.mesh("Quad")["positions"].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 
 
@@ -158,7 +158,7 @@ def test_velocities_move_points_that_have_one_sample(tmp_path):
     ).replace("(24,0,0)]", "(24,0,0)] }").replace("(0,576,0)]", "(0,576,0)] }")  # fmt: skip
     scene, _ = load(tmp_path, stage(camera(0, 1) + timed), frame=1)
     moved = scene.mesh("Quad")["positions"][:, 0]
-    # One unit a frame, and half of one a frame squared.
+    # One unit per frame, and half a unit per frame squared.
     when = np.linspace(0, 1, len(moved))
     assert len(moved) == 3
     assert np.allclose(moved, np.stack([when, 0.5 * when**2, 0 * when], axis=1), atol=1e-5)
@@ -226,7 +226,7 @@ def SphereLight "Lamp" {
     assert scene.camera["motion"].shape == (2, 4, 4)
     assert scene.camera["motion"][:, 3, 0].tolist() == [0.0, 1.0]
     assert scene.camera["transform"][3, 0] == 0.0  # at the frame
-    assert scene.lights[0]["transform"][3, 0] == 1.0  # in mid-shutter
+    assert scene.lights[0]["transform"][3, 0] == 1.0  # in the middle of the shutter interval
     assert scene.lights[0]["motion"][:, 3, 0].tolist() == [0.0, 2.0]
     assert "mid-shutter" not in said(loaded)
 
@@ -305,12 +305,12 @@ def test_blur_is_the_mean_of_still_frames(tmp_path, more):
         assert not still.scene.moves
         stills.append(wavecomb.render(still, spp=8, seed=k, **settings).beauty)
     mean = np.mean(stills, axis=0, dtype=np.float64)
-    # 8 x 64 samples each: the error of the difference is at most twice that of one.
+    # 512 samples each: the error of the difference is at most twice that of one.
     sigma = np.sqrt(2 * np.maximum(np.asarray(blurred.error) ** 2, 1e-6)).reshape(24, 24, -1)
     z = np.abs(mean - blurred.beauty).max(axis=2) / np.maximum(sigma.max(axis=2), 2e-3)
     assert np.quantile(z, 0.95) < 3 and z.max() < 8
     assert abs(mean.mean() - blurred.beauty.mean()) < 2e-3
-    # And it is blurred: far from any one of them.
+    # The image is blurred: it differs from the first still.
     assert np.abs(stills[0] - blurred.beauty).max() > 0.2
 
 
@@ -356,7 +356,7 @@ def Mesh "Cage" {
     assert moving["positions"].shape[0] == 2 and moving["normals"].shape[0] == 2
     for step, frame in ((0, 1), (1, 2)):
         still = read(frame=frame, motion_blur=False)
-        # Quads are halved along the better diagonal, that of the first step.
+        # Quads are split along the better diagonal of the first step.
         assert step != 0 or np.array_equal(moving["indices"], still["indices"])
         assert np.array_equal(moving["positions"][step], still["positions"])
         assert np.array_equal(moving["normals"][step], still["normals"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights with multipliers and links are found by bounces as well as by light samples."""
+"""Bounces and light samples find lights with multipliers and links alike."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def lamp(folder: Path, body: str = "", light: str = RECT) -> Any:
 
 
 def passes(loaded: Any, seed: int, count: int = 8, spp: int = 16) -> np.ndarray:
-    """(count, 20, 20, 3) of independent passes."""
+    """Returns (count, 20, 20, 3) pixels of independent renders."""
     return np.array(
         [wavecomb.render(loaded, spp=spp, seed=seed + k, **SETTINGS).beauty for k in range(count)],
         np.float64,
@@ -77,7 +77,7 @@ def passes(loaded: Any, seed: int, count: int = 8, spp: int = 16) -> np.ndarray:
 
 
 def agree(a: np.ndarray, b: np.ndarray) -> None:
-    """By blocks of 4 x 4 pixels, on the noise of the passes."""
+    """Asserts that two means agree over blocks of 4 x 4 pixels, within the measured noise."""
     blocks = [p.reshape(len(p), 5, 4, 5, 4, 3).mean(axis=(2, 4)) for p in (a, b)]
     variance = sum(x.var(axis=0, ddof=1) / len(x) for x in blocks)
     z = np.abs(blocks[0].mean(axis=0) - blocks[1].mean(axis=0)) / np.sqrt(variance + 1e-10)
@@ -88,12 +88,12 @@ def agree(a: np.ndarray, b: np.ndarray) -> None:
 
 
 def test_parts_add_up_to_the_whole(tmp_path: Path) -> None:
-    """0.5 of the diffuse and 2 of the specular part are as much of those two parts alone."""
+    """Multipliers of 0.5 and 2 scale the diffuse and the specular part."""
     diffuse = passes(lamp(tmp_path, MULTIPLIED % (1, 0)), 100)
     specular = passes(lamp(tmp_path, MULTIPLIED % (0, 1)), 200)
     mixed = passes(lamp(tmp_path, MULTIPLIED % (0.5, 2)), 300)
     whole = passes(lamp(tmp_path), 400)
-    floor = np.s_[:, 12:]  # where no lamp is seen
+    floor = np.s_[:, 12:]  # the lights are not visible there
     seen = whole[:, :12].mean()
     assert diffuse[:, :12].mean() > 0 and seen > 0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-""".nvdb files: values, quantised ones, names, packing, and what is broken."""
+""".nvdb files: values, quantised values, names, compression, and broken files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = [
 ]
 
 GRID_BYTES = 672
-"""Of nanovdb::GridData; the tree is next."""
+"""Size of nanovdb::GridData, which the tree follows."""
 
 
 def read_all(path: Path, **options: Any) -> list[vdb.Bricks]:
@@ -65,7 +65,7 @@ def test_several_grids_and_names(tmp_path: Path) -> None:
     ]
     assert [len(bricks.origins) for bricks in read_all(path)] == [3, 4, 5]
     assert heads[0].value_name == "float"
-    # Segments one after another, as a writer that appends leaves them.
+    # Several segments, as a writer that appends produces.
     both = tmp_path / "both.nvdb"
     both.write_bytes(path.read_bytes() * 2)
     assert [head.index for head in vdb.grid_heads(both)] == [0, 0, 1, 2, 1, 3]
@@ -76,7 +76,7 @@ def test_several_grids_and_names(tmp_path: Path) -> None:
     ("bits", "most"), [("4", 1 / 30), ("8", 1 / 510), ("16", 1.6e-5), ("n", 0.0101)]
 )
 def test_quantised_leaves(tmp_path: Path, bits: str, most: float) -> None:
-    """Within half a step of the range of a leaf; of "n" within its tolerance for fog."""
+    """The error is at most half a quantisation step of the leaf, or for "n" the fog tolerance."""
     made = noise(20)
     nvdb.write(tmp_path / "a.nvdb", [{"name": "d", "bits": bits, **made}], "blosc")
     (head,) = vdb.grid_heads(tmp_path / "a.nvdb")
@@ -105,14 +105,14 @@ def test_the_same_grids_give_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_that_of_the_vdb_file(tmp_path: Path) -> None:
-    """Bit for bit, and so is what is said."""
+    """Image and messages equal those for the .vdb file."""
     pictures = []
     for name in ("a.vdb", "a.nvdb"):
         (tmp_path / name).write_bytes(vdb_bytes(name))
         stage = tmp_path / f"{name}.usda"
         stage.write_text(VOLUME.replace("a.vdb", name))
         pictures.append(wavecomb.render(stage, size=(24, 24), spp=4).beauty)
-    # The second grid of the .vdb file is of halves, which those of the other are without loss.
+    # The second .vdb grid has half precision; its values are exact in the .nvdb file.
     assert pictures[0].max() > 0 and pictures[0].tobytes() == pictures[1].tobytes()
 
 
@@ -122,11 +122,11 @@ def test_such_files_are_read_and_not_written(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-# What is broken
+# Broken files
 
 
 def broken(tmp_path: Path, change: Any) -> str:
-    """What reading says of a file after a change of its bytes."""
+    """Returns the error message for a file whose bytes were changed."""
     path = tmp_path / "a.nvdb"
     nvdb.write(path, [{"name": "d", **noise(4)}])
     data = bytearray(path.read_bytes())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX documents whose definitions nest: small files that stand for billions of nodes."""
+"""MaterialX documents with nested definitions: small files that expand to billions of nodes."""
 
 import time
 
@@ -62,18 +62,18 @@ def document(folder, depth, feed, value):
 
 
 def test_a_chain_that_doubles(tmp_path):
-    """Each level is twice the one below: 2^32 nodes on paths of their own, 33 that differ."""
+    """Each level uses the one below twice: 2^32 nodes by path, but only 33 different ones."""
     depth = 32
     document(tmp_path, depth, BOTH, ", ".join([str(0.5**depth)] * 3))
     started = time.process_time()
     scene, loaded = load(tmp_path, STAGE)
     assert scene.material_of("Ball")["base_color"] == pytest.approx((0.5, 0.25, 0.75), rel=1e-5)
     assert not loaded.report.warnings and not loaded.report.unsupported
-    assert time.process_time() - started < 60  # it is about 2
+    assert time.process_time() - started < 60  # it takes about 2 s
 
 
 def test_a_chain_of_different_values_is_listed(tmp_path):
-    """q is fed by p: nothing is the same twice, and the network has 2^30 steps."""
+    """p feeds q, so no value repeats. The network has 2^30 steps and is reported as too large."""
     document(tmp_path, 30, CHAINED, "1, 1, 1")
     scene, loaded = load(tmp_path, STAGE)
     what = (
@@ -98,7 +98,7 @@ def test_instances_give_what_prims_of_their_own_give(tmp_path, monkeypatch, feed
         assert not loaded.report.unsupported
         found.append(scene.material_of("Ball")["base_color"])
 
-    # n(k) = n(k-1) twice: s, then s (1 + s) and so on.
+    # Expected value of level k, which applies level k - 1 twice.
     def level(k, x, s):
         if k == 0:
             return s * x

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures and progress in a notebook, with a stand-in for IPython, and the window from Python."""
+"""Images and progress in a notebook (with a fake IPython), and the window from Python."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Handle:
 
 @pytest.fixture
 def notebook(monkeypatch: pytest.MonkeyPatch) -> Handle:
-    """A kernel of Jupyter's without ipywidgets, as far as Wavecomb looks."""
+    """A fake Jupyter kernel without ipywidgets."""
     handle = Handle()
     outputs = ModuleType("IPython.display")
     outputs.HTML = lambda data: SimpleNamespace(data=data)  # type: ignore[attr-defined]
@@ -139,7 +139,7 @@ def test_a_notebook_shows_a_bar_and_the_picture_so_far(notebook: Handle) -> None
     bars = [one for one in notebook.shown if "<progress" in one]
     assert "samples/s" in bars[0]
     assert any("<img src='data:image/png;base64," in one for one in bars)
-    assert notebook.shown[-1] == ""  # what was rendered takes its place
+    assert notebook.shown[-1] == ""  # replaced by the rendered image
     before = len(notebook.shown)
     plain = wavecomb.render(scene(), size=(192, 192), spp=200, seed=3, progress=False)
     assert len(notebook.shown) == before
@@ -241,7 +241,7 @@ def test_a_window_opens_and_closes(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     opened = wavecomb.view()
     until = time.monotonic() + 60
-    # Its handlers of signals are there once it has a thread beside the main one.
+    # Its signal handlers are installed once its second thread runs.
     while len(os.listdir(f"/proc/{opened.pid}/task")) < 2 and time.monotonic() < until:
         time.sleep(0.1)
     assert opened.is_open

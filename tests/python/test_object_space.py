@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes that lead between the object's space and the world's."""
+"""MaterialX nodes that convert between object space and world space."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,12 @@ from graph_reference import evaluate
 from materialx_nodes import Node, points
 
 MATRIX = np.array([[1.5, 0.4, 0.0], [-0.3, 0.8, 0.2], [0.1, 0.0, 2.0]])
-"""From the object to the world, of columns."""
+"""Object-to-world matrix for column vectors."""
 SHIFT = np.array([3.0, -1.0, 0.5])
 
 
 def hits(n=50):
-    """Points on an object that is placed so, with frames of their own."""
+    """Returns points on an object with this transform, with orthonormal shading frames."""
     table = points(n).astype(np.float64)
     table[:, 3:6] = table[:, 6:9] @ MATRIX.T + SHIFT
     table[:, 21:30] = np.linalg.inv(MATRIX).ravel()
@@ -51,7 +51,7 @@ def test_vectors_normals_and_points_go_both_ways(space):
 
 
 def test_a_normal_in_object_space_is_in_that_of_tangents():
-    """And on the side that the surface's own is seen from."""
+    """In tangent space, the normal is on the side of the surface normal."""
     at = hits()
     world = unit(V @ np.linalg.inv(MATRIX))
     normal, tangent = at[:, 9:12], at[:, 15:18]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A test that lacks a part is skipped, and fails in CI; long tests wait for `make test-long`."""
+"""Missing dependencies skip a test, or fail it in CI; long tests run in `make test-long`."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ MODULE = "import pytest\npytest.importorskip('engine_that_nobody_has')\ndef test
 
 @pytest.fixture
 def inner(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
-    """A folder of tests with this repository's conftest, outside CI."""
+    """A folder of tests with this repository's conftest, outside of CI."""
     for name in ("CI", "WAVECOMB_STRICT", "WAVECOMB_LONG"):
         monkeypatch.delenv(name, raising=False)
     pytester.makeconftest((HERE / "conftest.py").read_text())
@@ -75,7 +75,7 @@ def run(inner: pytest.Pytester, *options: str) -> pytest.RunResult:
 def test_a_user_sees_skips(inner: pytest.Pytester) -> None:
     inner.makepyfile(test_some=TESTS, test_module=MODULE)
     result = run(inner)
-    # Seven lack a part, two are of other machines, one is long, and a file cannot be imported.
+    # Seven lack a dependency, two are for other machines, one is long, and a file cannot import.
     result.assert_outcomes(passed=1, skipped=len(LACKING) + 4, xfailed=1)
     result.stdout.fnmatch_lines(["*engine_that_nobody_has cannot be imported*"])
 
@@ -88,7 +88,7 @@ def test_ci_sees_failures(
     inner.makepyfile(test_some=TESTS)
     monkeypatch.setenv(variable, "true")
     result = run(inner, *workers)
-    # What a fixture skips fails in the set-up, where pytest speaks of errors.
+    # A skip in a fixture becomes a failure in the set-up, which pytest reports as an error.
     found = result.parseoutcomes()
     assert (found["passed"], found["skipped"], found["xfailed"]) == (1, 3, 1)
     assert found.get("failed", 0) + found.get("errors", 0) == len(LACKING)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SSIM, FLIP, trimmed relMSE and the z-test on pictures with known answers."""
+"""SSIM, FLIP, trimmed relMSE and the z-test on images with known results."""
 
 from __future__ import annotations
 
@@ -60,14 +60,14 @@ def test_equal_pictures(metric: str) -> None:
 def test_psnr_of_a_known_error_as_shown() -> None:
     grey = linear_from_srgb(np.full((8, 8, 3), 0.5, np.float32))
     other = linear_from_srgb(np.full((8, 8, 3), 0.51, np.float32))
-    assert psnr(other, grey) == pytest.approx(40.0, abs=1e-3)  # 0.01 of 1
-    # What is above the display's white is not seen, unless the exposure brings it down.
+    assert psnr(other, grey) == pytest.approx(40.0, abs=1e-3)  # a difference of 0.01
+    # Values above the display's white are not visible, unless the exposure lowers them.
     assert psnr(grey + 2, grey + 3) == np.inf
     assert psnr(grey + 2, grey + 3, exposure=-3) < 30.0
 
 
 def test_ssim_of_flat_pictures_is_the_luminance_term() -> None:
-    x, y = 0.25, 0.5  # shown values
+    x, y = 0.25, 0.5  # encoded values
     a, b = (
         np.full((20, 20, 3), linear_from_srgb(np.array([v], np.float32))[0], np.float32)
         for v in (x, y)
@@ -86,7 +86,7 @@ def test_ssim_of_opposite_checks_is_negative_and_of_noise_falls() -> None:
 
 
 def test_ssim_against_sums_over_one_window() -> None:
-    """One 11 x 11 picture has one whole window: the formula by plain weighted sums."""
+    """An 11 x 11 image has one complete window, so SSIM is a formula of weighted sums."""
     a, b = picture(1, (11, 11, 1)), picture(2, (11, 11, 1))
     d = np.exp(-0.5 * (np.arange(-5, 6) / 1.5) ** 2)
     w = np.outer(d, d) / d.sum() ** 2
@@ -110,12 +110,12 @@ def test_flip_of_known_pairs() -> None:
     green[:, :, 1] = 1
     blue = np.zeros_like(black)
     blue[:, :, 2] = 1
-    # Green against blue is FLIP's own largest colour difference, from which it scales its range.
+    # FLIP scales its range by the colour difference of green and blue, its largest.
     assert flip(green, blue).mean() == pytest.approx(1.0, abs=0.01)
     assert 0.5 < flip(black, white).mean() <= 1.0
     near = flip(white * np.float32(0.98), white).mean()
     assert 0.0 < near < 0.1
-    # What lies above the display's white is invisible to LDR-FLIP, and seen by HDR-FLIP.
+    # LDR-FLIP does not see values above the display's white, HDR-FLIP does.
     lamp = white.copy()
     lamp[4:8, 4:8] = 50.0
     other = lamp * np.float32(1.0)
@@ -147,7 +147,7 @@ def test_what_metrics_refuse() -> None:
 
 
 def noisy_pair(seed: int, shift: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A picture with noise of known variance and the mean that it has but for ``shift``."""
+    """Returns an image with noise of known variance, and its mean, off by ``shift``."""
     rng = RNG(seed)
     mean = rng.random((40, 48, 3)) + 0.5
     variance = (0.05 * mean) ** 2
@@ -168,7 +168,7 @@ def test_a_shift_is_found_and_placed() -> None:
     whole = z_test(a + 0.01, b, variance_a=variance)
     assert not whole.agrees
     assert whole.worst_tile is None
-    a[16:24, 8:16, 1] *= 1.05  # a standard deviation in one tile of 64 pixels
+    a[16:24, 8:16, 1] *= 1.05  # a shift by one standard deviation in one tile of 64 pixels
     local = z_test(a, b, variance_b=variance)
     assert not local.agrees
     assert local.worst_tile == (8, 16)

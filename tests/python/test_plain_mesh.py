@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes of triangles or quads alone take a short way: it must end where the long one does."""
+"""The fast path for meshes of triangles or quads gives the result of the general path."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SEED = 20
 
 
 def matrices(rng: np.random.Generator) -> list[Gf.Matrix4d]:
-    """Identity, a translation, a mirror of small whole numbers, and any."""
+    """Returns the identity, a translation, a mirror with small integers, and a random matrix."""
     shift, mirror, turn = np.eye(4), np.diag([-2.0, 0.0, 3.0, 1.0]), rng.standard_normal((4, 4))
     shift[3, :3] = 1e6, -3.5, 0.0
     mirror[1, 0] = mirror[0, 1] = 1.0
@@ -85,7 +85,7 @@ def test_anything_else_is_left_to_the_long_way(counts: list[int], indices: list[
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_points_that_are_nowhere_are_left_to_it(value: float, axis: int) -> None:
     points = SQUARE.copy()
-    points[3, axis] = value  # which no triangle has
+    points[3, axis] = value  # no triangle uses this point
     faces = np.array([3], np.int32), np.array([0, 1, 2], np.int32)
     assert plain(points, *faces, IDENTITY) is None
     assert plain(SQUARE, *faces, IDENTITY) is not None

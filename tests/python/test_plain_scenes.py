@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generated stages in their plain form: UsdPreviewSurface as other people's exporters write it."""
+"""Generated stages with plain UsdPreviewSurface materials, as other exporters write them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def plain_stage(
 
 
 def without_looks(stage: Usd.Stage) -> str:
-    """All of a stage but its materials, as text."""
+    """Returns a stage as text, without its materials."""
     layer = Sdf.Layer.CreateAnonymous(".usda")
     layer.TransferContent(stage.GetRootLayer())
     del layer.GetPrimAtPath("/World").nameChildren["Looks"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples of docs/writing-a-policy.md, as they stand there."""
+"""The examples of docs/writing-a-policy.md run as printed."""
 
 from __future__ import annotations
 

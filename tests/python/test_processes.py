@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Python processes that Wavecomb starts: what they import, and when they end."""
+"""Python processes that Wavecomb starts: imports, inheritance and lifetime."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def DistantLight "L" {}
 
 
 class Place:
-    """A working folder and the folder of a stage, both with hostile files."""
+    """A working folder and the folder of a stage, both with malicious modules."""
 
     def __init__(self, folder: Path) -> None:
         self.work, self.shot = folder / "work", folder / "shot"
@@ -52,7 +52,7 @@ class Place:
         self.stage.write_text(STAGE)
 
     def run(self, words: list[str], **variables: str) -> str:
-        """Runs a command in the working folder; gives what it printed."""
+        """Runs a command in the working folder and returns its output."""
         names = ("PYTHONPATH", "WAVECOMB_ISOLATE")
         kept = {key: value for key, value in os.environ.items() if key not in names}
         done = subprocess.run(
@@ -63,13 +63,13 @@ class Place:
         return done.stdout
 
     def program(self, code: str, *arguments: object) -> str:
-        """Runs a script that lies in a folder without hostile files."""
+        """Runs a script from a folder without malicious modules."""
         script = self.safe / "program.py"
         script.write_text(code)
         return self.run([sys.executable, str(script), *map(str, arguments)])
 
     def check(self) -> None:
-        """Fails if one of the planted files was executed."""
+        """Fails if one of the malicious modules was executed."""
         assert not self.marker.exists(), self.marker.read_text()
 
 
@@ -79,7 +79,7 @@ def place(tmp_path: Path) -> Place:
 
 
 def wavecomb_script() -> list[str]:
-    """The command as it is installed: a script beside the interpreter."""
+    """Returns the installed command: a script beside the interpreter."""
     script = Path(sys.executable).with_name("wavecomb")
     assert script.is_file()
     return [sys.executable, str(script)]
@@ -237,7 +237,7 @@ def test_multiprocessing_imports_nothing_from_the_working_folder(place: Place) -
 
 
 def test_a_process_finds_the_package_that_lies_in_the_working_folder() -> None:
-    """As in a checkout: the folder is not on the path, and the package is found all the same."""
+    """As in a checkout: the package is found although the folder is not on the module path."""
     words = processes.command("-c", "import wavecomb, sys; print(wavecomb.__file__, sys.path)")
     done = subprocess.run(
         words, cwd=PACKAGE.parent, capture_output=True, text=True, check=True, timeout=60
@@ -291,7 +291,7 @@ time.sleep(60)
 
 
 def is_running(pid: int) -> bool:
-    """Whether a process is there, and no zombie."""
+    """Returns whether a process exists and is not a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -301,7 +301,7 @@ def is_running(pid: int) -> bool:
 @linux
 @pytest.mark.parametrize("where", ["main", "thread"])
 def test_a_process_ends_with_its_parent_and_not_before(where: str) -> None:
-    """The kernel watches the thread that starts a process: one that ends must not count."""
+    """The kernel's parent-death signal depends on the starting thread, whose end must not count."""
     words = [sys.executable, "-c", PARENT, where]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
@@ -333,7 +333,7 @@ def test_a_process_inherits_nothing_and_leads_its_group() -> None:
         for one in (read, other):
             os.set_inheritable(one, True)
         words = processes.command("-c", LOOK, parent=os.getpid(), keep=[read])
-        # As Qt starts it: in this group, with all that is inheritable.
+        # Qt starts processes like this: in the same group, with all inheritable descriptors.
         done = subprocess.run(words, close_fds=False, capture_output=True, text=True, timeout=60)
         leads, *numbers = done.stdout.split()
         assert leads == "True"
@@ -369,7 +369,7 @@ PROGRAMS = {
     "farm/clusters.py": "Slurm's commands",
     "run/isolate/sandbox.py": "bwrap",
 }
-"""Files that start other programs than Python."""
+"""Files that start programs other than Python."""
 
 PYTHON = {"processes.py", "boot.py"}
 STARTERS = {
@@ -383,7 +383,7 @@ STARTERS = {
     "sys": {"executable"},
 }  # fmt: skip
 CLUSTERS = {"multiprocessing", "ProcessPoolExecutor", "LocalCluster", "Nanny", "SubprocessCluster"}
-"""Start processes by multiprocessing; a file that names one calls isolate_multiprocessing."""
+"""Users of multiprocessing. A file with one must call isolate_multiprocessing()."""
 
 WORTH_PARSING = re.compile(
     rf"\b({'|'.join(CLUSTERS)}|subprocess|pty|asyncio|QProcess)\b|sys\.executable"
@@ -392,7 +392,7 @@ WORTH_PARSING = re.compile(
 
 
 def starts(tree: ast.AST) -> list[str]:
-    """What a module uses that starts processes."""
+    """Returns the uses of functions that start processes."""
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
@@ -405,12 +405,12 @@ def starts(tree: ast.AST) -> list[str]:
 
 
 def type_only(text: str) -> str:
-    """Source without what only names a type."""
+    """Removes uses of subprocess.Popen as a type."""
     return text.replace("subprocess.Popen[", "Popen[")
 
 
 def names_of(tree: ast.AST) -> set[str]:
-    """Names that a module uses, and what it imports."""
+    """Returns the names that a module uses or imports."""
     found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     for node in ast.walk(tree):
         if isinstance(node, (ast.Import, ast.ImportFrom)):

@@ -203,7 +203,7 @@ main(sys.argv[1:])
 
 
 def test_a_lost_interrupt_is_heeded_by_the_next_who_asks() -> None:
-    """A library that prints exceptions and goes on does not lose a Ctrl-C."""
+    """A Ctrl-C is not lost in a library that prints exceptions and continues."""
     before = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Public bug reports of other USD programs, replayed by small stages (docs/testing.md)."""
+"""Bug reports of other USD programs, reproduced with small stages (docs/testing.md)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def move(x: float, y: float = 0.0, z: float = 0.0) -> str:
 def material(
     name: str, colour: tuple[float, float, float], inputs: str = "", nodes: str = ""
 ) -> str:
-    """Emits a colour and reflects nothing."""
+    """Returns a material that emits a colour and reflects nothing."""
     emission = "" if "emissiveColor" in inputs else f"color3f inputs:emissiveColor = {colour}"
     return f"""
     def Material "{name}" {{
@@ -70,7 +70,7 @@ def shot(
     camera: str = "",
     **settings: Any,
 ) -> wavecomb.Picture:
-    """Looks along -z at a square of this width; each pixel is of one colour."""
+    """Renders along -z a square of the given width. Each pixel has one colour."""
     high = across * size[1] / size[0]
     path = folder / "stage.usda"
     path.write_text(f"""#usda 1.0
@@ -96,7 +96,7 @@ def Xform "World" {{
 
 
 def at(layer: Any, x: float, y: float, across: float = 4.0) -> Any:
-    """The pixel that shows a point of the plane z = 0."""
+    """Returns the pixel at a point of the plane z = 0."""
     height, width = layer.shape[:2]
     column = int((x / across + 0.5) * width)
     row = int((0.5 - y / (across * height / width)) * height)
@@ -108,7 +108,7 @@ def same(found: Any, colour: Any, tolerance: float = 0.02) -> None:
 
 
 def test_collections_bind_inside_instances(tmp_path: Path) -> None:
-    """OpenUSD 3484."""
+    """OpenUSD 3484: collection bindings inside instances."""
     body = f"""{LOOKS}
     class Xform "Shape" {{
         def Cube "Box" ( {BOUND} ) {{
@@ -136,7 +136,7 @@ def test_collections_bind_inside_instances(tmp_path: Path) -> None:
 
 
 def test_primvars_of_instances_inside_a_point_instancer(tmp_path: Path) -> None:
-    """OpenUSD 3388."""
+    """OpenUSD 3388: primvars of instances inside a point instancer."""
     body = f"""
     class Xform "Shape" {{
         def Cube "Box" {{
@@ -166,7 +166,7 @@ def test_primvars_of_instances_inside_a_point_instancer(tmp_path: Path) -> None:
 
 
 def test_materials_below_prototypes(tmp_path: Path) -> None:
-    """OpenUSD 3483: materials in the scope of the prototypes, one of which is not used."""
+    """OpenUSD 3483: materials below the prototypes' scope, one of which is not used."""
     look = material("Blue", BLUE).replace("/World/Blue", "/World/Many/Prototypes/Blue")
     ball = f"""( {BOUND} ) {{
                 rel material:binding = </World/Many/Prototypes/Blue>
@@ -187,7 +187,7 @@ def test_materials_below_prototypes(tmp_path: Path) -> None:
 
 
 def test_primvars_of_several_prototypes(tmp_path: Path) -> None:
-    """arnold-usd 759: values go with instances, not with positions within a prototype."""
+    """arnold-usd 759: primvar values belong to instances, not to positions within a prototype."""
     body = """def PointInstancer "Many" {
         point3f[] positions = [(-1, 1, 0), (1, 1, 0), (-1, -1, 0), (1, -1, 0)]
         int[] protoIndices = [1, 0, 0, 1]
@@ -208,14 +208,14 @@ def test_primvars_of_several_prototypes(tmp_path: Path) -> None:
 
 
 def bound(look: str, primvars: str = ST) -> str:
-    """A square with a material."""
+    """Returns a square with a material."""
     binding = f"rel material:binding = </World/{look}>"
     return f'def Mesh "Quad" ( {BOUND} ) {{ {QUAD}\n{primvars}\n{binding}\n}}'
 
 
 @pytest.mark.parametrize("channels", [3, 4])
 def test_opacity_of_an_image(channels: int, tmp_path: Path) -> None:
-    """OpenUSD 1338: an image without alpha is opaque, one with alpha is as its pixels say."""
+    """OpenUSD 1338: an image without alpha is opaque; one with alpha has that of its pixels."""
     alpha = np.ones((8, 8), np.float32)
     alpha[:, :4] = 0
     white = np.ones((8, 8, 3), np.float32)
@@ -242,7 +242,7 @@ def test_opacity_of_an_image(channels: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["normal3d", "normal3f", "float3"])
 def test_indexed_normals(kind: str, tmp_path: Path) -> None:
-    """OpenUSD 2070, arnold-usd 1483: of any type, with fewer values than points."""
+    """OpenUSD 2070, arnold-usd 1483: indexed normals of any type, with fewer values than points."""
     tilt = (0.6, 0.0, 0.8)
     for interpolation in ("vertex", "faceVarying"):
         body = f"""def Mesh "Quad" {{ {QUAD}
@@ -253,7 +253,7 @@ def test_indexed_normals(kind: str, tmp_path: Path) -> None:
 
 
 def test_the_primvar_goes_before_the_attribute(tmp_path: Path) -> None:
-    """maya-usd 826: primvars:normals are stronger than normals."""
+    """maya-usd 826: primvars:normals takes precedence over normals."""
     body = f"""def Mesh "Quad" {{ {QUAD}
         normal3f[] normals = [(0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1)]
         normal3f[] primvars:normals = [(0.6, 0, 0.8)] ( interpolation = "faceVarying" )
@@ -264,7 +264,7 @@ def test_the_primvar_goes_before_the_attribute(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rule", ["all", "none"])
 def test_face_varying_coordinates_of_subdivided_meshes(rule: str, tmp_path: Path) -> None:
-    """arnold-usd 632: the rule decides over the boundary of seams."""
+    """arnold-usd 632: the rule determines the interpolation at the boundary of seams."""
     body = f"""def Mesh "Quads" {{
         int[] faceVertexCounts = [4, 4]
         int[] faceVertexIndices = [0, 1, 4, 3, 1, 2, 5, 4]
@@ -276,14 +276,14 @@ def test_face_varying_coordinates_of_subdivided_meshes(rule: str, tmp_path: Path
         int[] primvars:displayColor:indices = [0, 0, 0, 0, 1, 1, 1, 1]
     }}"""
     albedo = shot(tmp_path, body, size=(16, 16)).albedo
-    # Values of each side are constant, so no rule may mix them across the seam.
+    # The values of each side are constant, so no rule may blend them across the seam.
     same(at(albedo, -0.3, 0), RED)
     same(at(albedo, 0.3, 0), BLUE)
 
 
 @pytest.mark.parametrize("kind", ["quath[] orientations", "quatf[] orientationsf"])
 def test_orientations_of_instances(kind: str, tmp_path: Path) -> None:
-    """arnold-usd 1776: a bar turned by a right angle about z."""
+    """arnold-usd 1776: a bar rotated by a right angle about z."""
     half = float(np.sqrt(0.5))
     body = f"""def PointInstancer "Many" {{
         point3f[] positions = [(0, 0, 0)]
@@ -302,7 +302,7 @@ def test_orientations_of_instances(kind: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("specifier", ["over", "class", "def"])
 def test_prototypes_are_not_drawn_beside_their_instances(specifier: str, tmp_path: Path) -> None:
-    """arnold-usd 904: below the instancer nothing is drawn by itself, whatever it is."""
+    """arnold-usd 904: prims below the instancer are not drawn themselves."""
     body = f"""def PointInstancer "Many" {{
         point3f[] positions = [(1, 0, 0)]
         int[] protoIndices = [0]
@@ -316,7 +316,7 @@ def test_prototypes_are_not_drawn_beside_their_instances(specifier: str, tmp_pat
 
 
 def test_display_colours_are_inherited(tmp_path: Path) -> None:
-    """maya-usd 327."""
+    """maya-usd 327: display colours are inherited."""
     body = """def Xform "Group" {
         color3f[] primvars:displayColor = [(0, 0, 1)] ( interpolation = "constant" )
         def Xform "Inner" {
@@ -328,7 +328,7 @@ def test_display_colours_are_inherited(tmp_path: Path) -> None:
 
 
 def test_varying_primvars_of_meshes(tmp_path: Path) -> None:
-    """RadeonProRenderUSD pull 343, maya-usd pull 2107: beside a constant opacity."""
+    """RadeonProRenderUSD pull 343, maya-usd pull 2107: varying colours and a constant opacity."""
     body = f"""def Mesh "Quad" {{ {QUAD}
         color3f[] primvars:displayColor = [(1, 0, 0), (0, 0, 1), (0, 0, 1), (1, 0, 0)] (
             interpolation = "varying"
@@ -341,7 +341,7 @@ def test_varying_primvars_of_meshes(tmp_path: Path) -> None:
 
 
 def test_opacity_of_faces(tmp_path: Path) -> None:
-    """maya-usd 1687, 1537: one value for each face."""
+    """maya-usd 1687, 1537: one opacity for each face."""
     body = """def Mesh "Quads" {
         int[] faceVertexCounts = [4, 4]
         int[] faceVertexIndices = [0, 1, 4, 3, 1, 2, 5, 4]
@@ -358,7 +358,7 @@ def test_opacity_of_faces(tmp_path: Path) -> None:
 
 
 def test_opacity_of_points(tmp_path: Path) -> None:
-    """maya-usd 2753: values of points are interpolated."""
+    """maya-usd 2753: vertex opacities are interpolated."""
     body = f"""def Mesh "Quad" {{ {QUAD}
         float[] primvars:displayOpacity = [0.25, 0.5, 1, 0.75] ( interpolation = "vertex" )
     }}"""
@@ -386,7 +386,7 @@ def textured(inputs: str, primvars: str = ST) -> str:
 
 
 def test_a_scale_of_zero(tmp_path: Path) -> None:
-    """OpenUSD 988."""
+    """OpenUSD 988: a texture with a scale of 0."""
     write_png_codes(tmp_path / "a.png", np.full((4, 4, 3), 255, np.uint8))
     for scale, colour in ((0, BLACK), (1, WHITE)):
         body = textured(
@@ -396,7 +396,7 @@ def test_a_scale_of_zero(tmp_path: Path) -> None:
 
 
 def test_fallback_without_a_file(tmp_path: Path) -> None:
-    """maya-usd pull 1689."""
+    """maya-usd pull 1689: the fallback of a texture without a file."""
     body = textured("float4 inputs:fallback = (0, 0, 1, 1)")
     same(at(shot(tmp_path, body).beauty, 0.3, 0.3), BLUE)
 
@@ -404,7 +404,7 @@ def test_fallback_without_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("ops", "order", "place"),
     [
-        # OpenUSD 194: an inverse without its partner.
+        # OpenUSD 194: an inverse op without its partner.
         ("double3 xformOp:translate = (-1, 0, 0)", '"!invert!xformOp:translate"', (1, 0)),
         # LightUSD 27: a pivot and its inverse.
         (
@@ -412,13 +412,13 @@ def test_fallback_without_a_file(tmp_path: Path) -> None:
             '"xformOp:translate", "xformOp:translate:pivot", "!invert!xformOp:translate:pivot"',
             (1, 0),
         ),
-        # maya-usd pull 1426: a turn about a pivot.
+        # maya-usd pull 1426: a rotation about a pivot.
         (
             "double3 xformOp:translate:pivot = (1, 0, 0)\nfloat xformOp:rotateZ = 180",
             '"xformOp:translate:pivot", "xformOp:rotateZ", "!invert!xformOp:translate:pivot"',
             (2, 0),
         ),
-        # OpenUSD 311: what is above does not count.
+        # OpenUSD 311: a reset of the transform stack.
         ("double3 xformOp:translate = (1, 0, 0)", RESET + ', "xformOp:translate"', (1, 0)),
     ],
 )  # fmt: skip
@@ -440,7 +440,7 @@ def test_transforms(ops: str, order: str, place: tuple[int, int], tmp_path: Path
 
 @pytest.mark.parametrize("kind", ["Capsule_1", "Cylinder_1"])
 def test_two_radii(kind: str, tmp_path: Path) -> None:
-    """OpenUSD 3113: 1 below, 0.3 above."""
+    """OpenUSD 3113: radius 1 at the bottom, 0.3 at the top."""
     body = f"""def {kind} "Shape" {{
         double height = 2
         double radiusBottom = 1
@@ -454,7 +454,7 @@ def test_two_radii(kind: str, tmp_path: Path) -> None:
 
 
 def test_implicit_shapes_from_inside(tmp_path: Path) -> None:
-    """OpenUSD 3686: a camera in a cube that is not double-sided sees its wall."""
+    """OpenUSD 3686: a camera in a single-sided cube sees its wall."""
     for sided in (0, 1):
         body = f"""def Cube "Room" {{
             double size = 10
@@ -466,7 +466,7 @@ def test_implicit_shapes_from_inside(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["DiskLight", "DistantLight"])
 def test_common_inputs_of_lights(kind: str, tmp_path: Path) -> None:
-    """LightUSD 250, arnold-usd 1051: exposure, colour and temperature of each kind."""
+    """LightUSD 250, arnold-usd 1051: exposure, colour and temperature of each kind of light."""
 
     def lit(inputs: str) -> Any:
         light = f'def {kind} "Light" {{\n{inputs}\n{move(0, 0, 3)}\n}}'
@@ -491,7 +491,7 @@ def test_common_inputs_of_lights(kind: str, tmp_path: Path) -> None:
 
 
 def test_subsets_bind_materials(tmp_path: Path) -> None:
-    """OpenUSD 542."""
+    """OpenUSD 542: subsets bind materials."""
     body = f"""{LOOKS}
     def Mesh "Quads" ( {BOUND} ) {{
         int[] faceVertexCounts = [4, 4]
@@ -512,7 +512,7 @@ def test_subsets_bind_materials(tmp_path: Path) -> None:
 
 
 def test_an_input_that_follows_another_shaders(tmp_path: Path) -> None:
-    """OpenUSD 3957: its value, or a line that says that it is not read."""
+    """OpenUSD 3957: an input connected to another shader's input is read, or reported."""
     nodes = """
         def Shader "Other" {
             uniform token info:id = "UsdPreviewSurface"
@@ -529,7 +529,7 @@ def test_an_input_that_follows_another_shaders(tmp_path: Path) -> None:
 
 
 def test_a_path_of_an_image_in_a_primvar(tmp_path: Path) -> None:
-    """OpenUSD 2518: the image, or a line that says that the input is not read."""
+    """OpenUSD 2518: an image path in a primvar is read, or the input is reported."""
     write_png_codes(tmp_path / "a.png", np.full((4, 4, 3), (0, 0, 255), np.uint8))
     body = textured("asset inputs:file.connect = </World/Map/F.outputs:result>")
     reader = """def Shader "F" {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policies written in Python, in real renders."""
+"""Scheduling policies in Python, in real renders."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytest.importorskip("wavecomb._core")
 
 @pytest.fixture(scope="module")
 def scene() -> Any:
-    """Stripes of five materials of two programs, two with textures, under an even sky."""
+    """Stripes of five materials with two programs, two of them textured, under an even sky."""
     builder = wavecomb.SceneBuilder()
     rng = np.random.default_rng(1)
     textures = [
@@ -47,7 +47,7 @@ def scene() -> Any:
 
 
 class Policy(wavecomb.SchedulingPolicy):
-    """The given function as a policy."""
+    """A policy that calls the given function."""
 
     def __init__(self, function: Order, name: str = "mine", columns: tuple[str, ...] = ()) -> None:
         self.function = function
@@ -77,10 +77,10 @@ def test_sees_what_is_documented(scene: Any) -> None:
     assert picture.stats["settings"]["policy"] == "watching"
     assert wavecomb.compare(picture, render(scene, "none")).equal
     gc.collect()
-    # Queues of one record are not ordered.
+    # Queues of a single record are not ordered.
     records = sum(len(queue["material"]) for queue, _, _ in seen)
     assert 0.99 < records / picture.stats["counts"]["records"] <= 1
-    for queue, costs, keys in seen:  # kept beyond the render, and still whole
+    for queue, costs, keys in seen:  # arrays stay valid after the render
         n = len(queue["material"])
         assert keys.dtype == np.uint64
         assert keys.shape == (n,)
@@ -117,7 +117,7 @@ def test_columns_come_only_when_asked_for(scene: Any) -> None:
 
 
 def bits(x: Any) -> Any:
-    """Of floats that are not negative, ascending as they do."""
+    """Returns the bits of nonnegative floats, which have the same order."""
     return np.asarray(x, np.float32).view(np.uint32).astype(np.uint64)
 
 
@@ -161,7 +161,7 @@ def not_at_all(queue: Any, costs: Any, keys: Any) -> bool:
 def test_equals_the_same_policy_in_cpp(
     scene: Any, name: str, function: Order, columns: tuple[str, ...], materialize: str
 ) -> None:
-    # One thread: coherence is measured on every 17th queue of a worker, so on the same queues.
+    # Coherence is measured on every 17th queue of a worker, so one thread makes it reproducible.
     settings = {"threads": 1, "materialize": materialize}
     theirs = render(scene, name, **settings)
     ours = render(scene, Policy(function, columns=columns), **settings)
@@ -187,7 +187,7 @@ def test_exceptions_come_out(scene: Any, threads: int, calls: int) -> None:
 
     with pytest.raises(Mishap, match=f"after {calls}"):
         render(scene, Policy(order), threads=threads)
-    # And the renderer is none the worse.
+    # The renderer can be used again.
     assert wavecomb.compare(render(scene, "program"), render(scene, "none")).equal
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The translators of benchmarks/references.py, on small scenes of our own."""
+"""Translators of benchmarks/references.py, on small scenes written for these tests."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_a_translated_scene_looks_as_mitsuba_renders_it(mi: Any, tmp_path: Path,
     ).beauty
     scene = referee(parsed(mi, tmp_path, text), as_ours=True)
     theirs = np.asarray(mi.render(scene, spp=256))[:, :, :3]
-    # A light, a texture or an object that is elsewhere, or turned, moves much more than noise.
+    # A misplaced or rotated light, texture or object changes the image by much more than noise.
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.01)
     blocks = [image.reshape(6, 4, 8, 4, 3).mean((1, 3)) for image in (ours, theirs)]
     assert abs(blocks[0] - blocks[1]).max() < 0.12 * theirs.mean()
@@ -139,7 +139,7 @@ def test_a_shape_whose_image_is_missing_is_left_out_with_its_pixels(
 
 
 def test_reflectance_of_a_conductor_is_the_textbooks() -> None:
-    # At normal incidence ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2); along the surface 1.
+    # ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2) at normal incidence; 1 at grazing incidence.
     normal = mitsuba.conductor_reflectance([0.2, 1.5], [3.9, 0.0], 0.0)
     assert normal == pytest.approx([(0.64 + 15.21) / (1.44 + 15.21), 0.04])
     assert mitsuba.conductor_reflectance([0.2], [3.9], 90.0) == pytest.approx([1.0])
@@ -220,7 +220,7 @@ usd
     test = arnold.to_stage(tmp_path / "test", tmp_path / "out" / "scene.usda")
     assert "arnold:lambert is diffuse" in test.notes and test.space == "rec709"
     picture = wavecomb.render(test.stage, size=(16, 12), spp=4, max_depth=1)
-    # 2^2 on albedo / pi, straight on, and the square fills the picture.
+    # Radiance 2^2 times albedo / pi at normal incidence; the square fills the image.
     expected = 4 * 0.8 * np.array([0.5, 0.25, 0.125]) / np.pi
     assert picture.beauty[6, 8] == pytest.approx(expected, rel=1e-4)
     assert np.isfinite(picture.depth).all()

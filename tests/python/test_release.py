@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/release: which files and changelogs it refuses."""
+"""Files and changelogs that tools/release refuses."""
 
 from __future__ import annotations
 

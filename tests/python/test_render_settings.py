@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdRender: settings, products and vars, and options that go before them."""
+"""UsdRender: settings, products and vars, and options that override them."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def test_what_is_no_good_is_named_and_left_out(tmp_path):
     ("window", "region"),
     [
         ((0, 0, 1, 1), None),
-        ((0, 0.5, 0.5, 1), (0, 0, 10, 5)),  # the upper left quarter: y is up
-        ((0.24, 0, 1, 0.26), (5, 7, 20, 10)),  # pixels whose centres are in it
+        ((0, 0.5, 0.5, 1), (0, 0, 10, 5)),  # the upper left quarter, since y is up
+        ((0.24, 0, 1, 0.26), (5, 7, 20, 10)),  # pixels with their centres inside
         ((-1, -1, 2, 0.5), (0, 5, 20, 10)),
     ],
 )
@@ -202,13 +202,13 @@ def test_which_settings(tmp_path):
 
 
 def test_all_products_are_rendered_of_one_scene(tmp_path):
-    """Each is what it is alone, bit for bit."""
+    """Each product equals a single render bit for bit."""
     settings = "uniform int2 resolution = (30, 20)\nrel camera = </A>" + PRODUCTS
     stage = write(tmp_path, stage_text(settings, folder=tmp_path))
     assert run("render", stage, "--spp", 2, "--output-dir", tmp_path) == (0, "")
     one, two = (read_layers(tmp_path / f"{name}.exr") for name in ("one", "two"))
     assert list(one) == ["beauty", "depth"] and one["beauty"].shape == (20, 30, 3)
-    spec = oiio.ImageInput.open(str(tmp_path / "two.exr")).spec()  # its data window alone
+    spec = oiio.ImageInput.open(str(tmp_path / "two.exr")).spec()  # only its data window
     assert (spec.x, spec.y, spec.width, spec.height) == (0, 0, 10, 5)
     assert (spec.full_x, spec.full_y, spec.full_width, spec.full_height) == (0, 0, 20, 10)
     assert two["beauty"].shape == (5, 10, 3) and (two["beauty"] > 0).all()

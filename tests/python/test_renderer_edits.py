@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A renderer that stays ready: edits, twins, stops, picks, snapshots, regions."""
+"""A persistent renderer: edits, twins, stops, picks, snapshots, regions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def build(
     materials: dict[int, dict[str, Any]] | None = None,
     lights: dict[int, dict[str, Any]] | None = None,
 ) -> Any:
-    """The scene, with other values here and there."""
+    """Returns the scene with some values replaced."""
     builder = _core.SceneBuilder()
     checks = np.tile(np.asarray([[0, 255], [255, 0]], np.uint8), (4, 4))
     builder.add_texture(checks, srgb=False, name="/checks.png")
@@ -91,7 +91,7 @@ def test_an_edited_scene_is_the_scene_built_anew(edit: dict[str, Any]) -> None:
     assert renderer.version == 1
     assert renderer.scene is not scene
     assert beauty(renderer) == beauty(_core.Renderer(build(**edit))) != before
-    # And back again, with what the scene said of itself.
+    # Edit back to the values that the first scene reported.
     renderer.edit(camera=scene.camera)
     for kind, values in (("material", scene.material), ("light", scene.light)):
         fixed = {"name", "program", "textures", "kind", "texture", "group", "ies"}
@@ -146,7 +146,7 @@ def test_bad_edits_change_nothing(edit: dict[str, Any], message: str) -> None:
 
 
 class Snapshots:
-    """A watcher that asks for snapshots all the time, and may stop."""
+    """A watcher that requests snapshots all the time, and can stop the render."""
 
     def __init__(self, take: Any, wanted: int = 1000) -> None:
         self.take, self.wanted, self.seen = take, wanted, 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures that README and docs quote are of this repository: commit, rounds, command."""
+"""Figures quoted by README and docs come from result files with commit, rounds and command."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from parts import not_here
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
 OLD = {"claims", "noise_target", "peers", "peers-dragon"}
-"""Of fewer than five rounds, or from before their commands were kept."""
+"""Results with fewer than five rounds, or older than the record of their commands."""
 RECENT = 40
-"""Commits of src/ after which a result has to be measured again."""
+"""Number of commits to src/ after which a result must be measured again."""
 
 
 def git(*words: str) -> subprocess.CompletedProcess[str]:
@@ -68,7 +68,7 @@ def test_pages_quote_the_command(path: Path) -> None:
 
 @cache
 def sections() -> list[str]:
-    """Sections of the pages, down to the second level of headings."""
+    """Returns the sections of all pages, split at second-level headings."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     texts = (page.read_text(encoding="utf-8") for page in pages)
     return [part for text in texts for part in re.split(r"^## ", text, flags=re.MULTILINE)]
@@ -76,7 +76,7 @@ def sections() -> list[str]:
 
 @pytest.mark.parametrize("path", RESULTS, ids=of)
 def test_pages_mark_old_results(path: Path) -> None:
-    """A page that names a result of long ago says that it has to be measured again."""
+    """A page that quotes an old result says that it must be measured again."""
     shallow = git("rev-parse", "--is-shallow-repository")
     if shallow.returncode != 0 or shallow.stdout.strip() != "false":
         not_here("the history of this repository")

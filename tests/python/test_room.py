@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The generated room: closed, furnished, of many plain materials, and in life size."""
+"""The generated room: closed, furnished, with many plain materials, and in real size."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_images_are_sound(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["plaster", "planks", "planks_roughness", "walnut", "wool"])
 def test_images_tile(name: str) -> None:
-    """First and last row, and column, are neighbours: they differ as any two neighbours do."""
+    """Opposite edges of a texture differ no more than neighbouring rows and columns."""
     image = ROOM_TEXTURES[name].make(128, np.random.default_rng(0))[..., 0]
     for lines in (image, image.T):
         inside = np.abs(np.diff(lines, axis=0)).mean(axis=1)
@@ -114,10 +114,10 @@ def test_images_tile(name: str) -> None:
     "look", ["Plaster", "Planks", "Walnut", "Wool", "Linen", "Twill", "Leather", "Marble"]
 )
 def test_texture_coordinates_are_metres(stage: Usd.Stage, look: str) -> None:
-    """Of most of the surface; what is folded or rounded is stretched a little."""
+    """Most of a surface has this scale; folded or rounded parts are stretched a little."""
     areas, scales = [], []
     for mesh in meshes(stage):
-        # The floor of the partition's reveal, and pillows' rims, have no say: they are small.
+        # Skip small meshes: the floor of the partition's reveal, and rims of pillows.
         if look_of(mesh) != look or len(set(mesh.GetFaceVertexCountsAttr().Get())) > 1:
             continue
         corners = np.array(mesh.GetFaceVertexIndicesAttr().Get())
@@ -160,7 +160,7 @@ CAMERAS = (
 
 
 def dark_room(room: Path, file: Path, is_open: bool) -> Path:
-    """The room without its lamp under a bright sky, with or without a ceiling."""
+    """Writes the room without its lamp under a bright sky, with or without a ceiling."""
     layer = Usd.Stage.CreateNew(str(file))
     layer.GetRootLayer().subLayerPaths.append(str(room))
     layer.GetPrimAtPath("/World/Lights/Panel").SetActive(False)

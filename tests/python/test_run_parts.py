@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/run_parts: order, lanes, times against budgets, closing lines, exit codes."""
+"""tools/run_parts: order, lanes, times and budgets, closing lines, exit codes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run(folder: Path, rows: str, tier: str = "test") -> subprocess.CompletedProc
 
 
 def test_times_budgets_and_closing_lines(tmp_path: Path) -> None:
-    """Lanes run side by side; the back one has low priority, and says all at its end."""
+    """Lanes run in parallel. The background lane has low priority and prints at its end."""
     done = run(
         tmp_path,
         "test setup setup -     front wall 9\n"

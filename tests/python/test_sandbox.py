@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the child process of a command can do once a file has taken it over: very little."""
+"""A compromised child process of a command can do very little."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ supervisor.choices.words = (place,)
 supervisor.choices.reads = tuple(reads.split(":")) if reads else ()
 supervisor.run_in_sandbox(Outputs((place + "/out/a.exr",)), program=code)
 """
-"""Runs code in the sandbox that a command has."""
+"""Runs code in the sandbox of a command."""
 
 CHILD = """
 import json, os, signal, socket, subprocess, sys, threading
@@ -55,7 +55,7 @@ def trying(name, deed):
 
 @pytest.fixture
 def place() -> Iterator[Path]:
-    """Folders for outputs and for the stage, and one that is neither's. Not below /tmp."""
+    """Folders for outputs and for the stage, and one that is neither. Not below /tmp."""
     with tempfile.TemporaryDirectory(dir=Path.home(), prefix="wavecomb-test-") as name:
         folder = Path(name)
         for one in ("out", "shot", "secret"):
@@ -67,7 +67,7 @@ def place() -> Iterator[Path]:
 
 
 def child(place: Path, code: str, *, reads: str = "", status: int = 0) -> dict[str, str]:
-    """Runs code in the sandbox and returns what it tried, and how each attempt ended."""
+    """Runs code in the sandbox. Returns what it tried, and how each attempt ended."""
     given = CHILD + code + "\nprint(json.dumps(tried))"
     done = subprocess.run(
         [sys.executable, "-c", PARENT, str(place), reads, given],
@@ -144,7 +144,7 @@ trying("terminal", lambda: __import__("fcntl").ioctl(0, 0x5412, b"x"))
 
 
 def test_it_inherits_nothing(place: Path) -> None:
-    """No open file and no environment variable that selects Python modules."""
+    """No open file descriptor, and no environment variable that affects Python's imports."""
     (place / "json.py").write_text("raise SystemExit(77)")
     with (place / "secret/key").open("r+") as key:
         os.set_inheritable(key.fileno(), True)
@@ -211,7 +211,7 @@ load_stage(place / "shot/s.usda")
 """
     wide = child(place, code)
     assert wide == {"secret": "done", "stage": "done"}
-    # The command line names the folder itself in ``child``: not here, where it would be readable.
+    # Unlike in ``child``, the command line must not name the folder, or it would be readable.
     parent = PARENT.replace("choices.words = (place,)", "choices.words = ()")
     given = CHILD.replace("sys.argv[1]", repr(str(place))) + code + "\nprint(json.dumps(tried))"
     done = subprocess.run(
@@ -227,7 +227,7 @@ def test_nothing_is_left_of_a_child_that_is_killed(place: Path) -> None:
 
 
 def test_nothing_outlives_the_command(place: Path) -> None:
-    """Not even a process that the child starts in a session of its own."""
+    """Even a process that the child starts in another session ends with the command."""
     code = CHILD + (
         "subprocess.Popen(['sleep', '4321.5'], start_new_session=True)\n"
         "print('ready', flush=True)\nthreading.Event().wait(60)"
@@ -291,7 +291,7 @@ def test_a_crash_is_one_line(place: Path, deed: str, words: str) -> None:
 
 
 def test_shared_mappings_count_as_memory(place: Path) -> None:
-    """RLIMIT_DATA does not see them; a control group does, where one may be made."""
+    """RLIMIT_DATA does not count shared mappings. A control group does, if one can be created."""
     group = memory.Group.make(300_000_000)
     if group is None:
         not_here("no control group may be made here")
@@ -313,7 +313,7 @@ for at in range(0, len(held), 4096):
 
 @pytest.mark.slow
 def test_a_render_as_people_make_it(place: Path) -> None:
-    """All kinds of outputs, with the sandbox required; the same image as without."""
+    """A render with all kinds of outputs in the sandbox gives the same image as without it."""
     stage = place / "shot/s.usda"
 
     def run(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -381,7 +381,7 @@ def test_required_and_not_there(place: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_without_user_namespaces_auto_works_without(place: Path, tmp_path: Path) -> None:
-    """A bubblewrap that fails, as where user namespaces are refused."""
+    """bubblewrap fails, as it does where user namespaces are not permitted."""
     fake = tmp_path / "bwrap"
     fake.write_text("#!/bin/sh\necho 'bwrap: No permissions to create new namespace' >&2\nexit 1\n")
     fake.chmod(0o755)

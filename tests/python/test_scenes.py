@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The procedural stages hold what they promise, and their meshes are sound."""
+"""Procedural stages have the documented contents, and their meshes are valid."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def assert_sound(mesh: Mesh, closed: bool = True) -> None:
 
 
 def assert_closed(mesh: Mesh) -> None:
-    """Every edge, seams welded, is used as often one way as the other."""
+    """Asserts that each edge, with seams welded, is used equally often in both directions."""
     _, weld = np.unique(mesh.points + np.float32(0.0), axis=0, return_inverse=True)
     faces = weld.ravel()[mesh.faces].astype(np.int64)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -308,7 +308,7 @@ def test_spread_has_what_was_asked_for(tmp_path: Path) -> None:
         "plastic",
     }
     assert scene.triangles == pytest.approx(40_000, rel=0.1)
-    assert scene.instanced_triangles == scene.triangles  # no instance: triangles are memory
+    assert scene.instanced_triangles == scene.triangles  # no instances: all use memory
     own = [size for name, size in scene.textures if "stone_" in name]
     assert len(own) == 200 and sum(own) == pytest.approx(6e6, rel=0.2)
     dear = {
@@ -337,9 +337,9 @@ def test_stones_are_closed_and_their_charts_lie_apart(tmp_path: Path) -> None:
     assert st.GetInterpolation() == UsdGeom.Tokens.faceVarying
     uv = np.array(st.Get()).reshape(-1, 3, 2)
     size = uv.max(axis=1) - uv.min(axis=1)
-    assert len(uv) == len(faces) and size.max() < 4.0 / 800.0  # 4 texels of some 860
+    assert len(uv) == len(faces) and size.max() < 4.0 / 800.0  # 4 texels of about 860
     steps = np.abs(np.diff(uv.mean(axis=1), axis=0)).mean()
-    assert 0.25 < steps < 0.42  # of independent places on a unit square: 1 / 3
+    assert 0.25 < steps < 0.42  # 1 / 3 for independent positions in a unit square
 
 
 @pytest.mark.slow
@@ -357,7 +357,7 @@ def test_shader_cost_takes_time(tmp_path: Path) -> None:
         stats = wavecomb.render(loaded, size=(48, 48), spp=8, threads=1).stats
         return next(m["ns_per_record"] for m in stats["materials"] if "Stone_" in m["name"])
 
-    # The least of some: whatever else runs on the machine only adds to what a clock says.
+    # The minimum of several runs, since other processes only add time.
     rounds = [[stone_ns(loaded) for loaded in stages] for _ in range(5)]
     plain, dear = (min(times) for times in zip(*rounds, strict=True))
     assert dear > 5.0 * plain > 0.0
@@ -390,7 +390,7 @@ def test_heavy_has_materials_of_all_weights(tmp_path: Path) -> None:
     stones = [kind for name, kind in scene.materials if "Stone_" in name]
     assert (len(stones), stones.count("openpbr"), stones.count("diffuse")) == (24, 21, 3)
     own = [size for name, size in scene.textures if "stone_" in name]
-    # Diffuse ones read one of their three maps.
+    # Diffuse materials read one of their three maps.
     assert sum(own) == pytest.approx(4e6 * (21 + 3 * 4 / 9) / 24, rel=0.2)
     ids = [
         [UsdShade.Shader(node).GetIdAttr().Get() for node in look.GetChildren()]
@@ -473,7 +473,7 @@ def test_teapot_surface_is_the_published_one() -> None:
     spatial = pytest.importorskip("scipy.spatial")
     mesh = teapot(10)
     assert len(mesh.faces) == 6320
-    # The published mesh has the same ten cells an edge, so its vertices are on ours.
+    # The published mesh has ten cells per edge as well, so the vertices coincide.
     near, _ = spatial.cKDTree(mesh.points).query(published)
     assert near.max() < 2e-3
     back, _ = spatial.cKDTree(published).query(mesh.points)
@@ -598,7 +598,7 @@ def test_texture_coordinates_of_an_obj_are_kept(tmp_path: Path) -> None:
         "vt 0 0\nvt .5 0\nvt .5 .5\nvt 1 1\nf 1/1 2/2 3/3\nf -4/-4 -2/-1 -1/-2\n"
     )
     mesh = load_dragon(tmp_path / "t.obj")
-    # Vertex 3 carries two texture coordinates.
+    # Vertex 3 has two texture coordinates.
     assert len(mesh.points) == 5
     assert {tuple(row) for row in mesh.uv.tolist()} == {(0, 0), (0.5, 0), (0.5, 0.5), (1, 1)}
 

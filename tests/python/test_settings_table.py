@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from the core's table of settings; a row that is added is found everywhere."""
+"""The core's table of settings: every consumer picks up new rows."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ FOLLOW = (
     "wavecomb.gui.scheduling.choices", "wavecomb.gui.scheduling.run_log", "wavecomb.gui.setup",
     "wavecomb.run.checkpoint",
 )  # fmt: skip
-"""Modules that make something of the table when they are imported."""
+"""Modules that derive data from the table at import."""
 
 
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table with a few rows more, as if the core had them."""
+    """Adds rows to the table, as if the core had them."""
     add_rows(monkeypatch, settings, ADDED, FOLLOW)
 
 

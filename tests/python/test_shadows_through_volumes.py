@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shadows of a colour, of light that has come through volumes."""
+"""Shadow colours of lights seen through volumes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ pytestmark = needs("wavecomb._core")
 
 
 def lit(has_smoke: bool, is_blocked: bool, **more: Any) -> Any:
-    """A floor under a lamp straight above whose shadow is blue; smoke and a blind between them."""
+    """Renders a floor under a light with a blue shadow colour, with smoke or an occluder."""
     builder = wavecomb.SceneBuilder()
     grey = builder.add_material("diffuse", base_color=(0.5, 0.5, 0.5))
     slab(builder, -1.0, 0.0, grey)
@@ -34,7 +34,7 @@ def lit(has_smoke: bool, is_blocked: bool, **more: Any) -> Any:
 
 @pytest.mark.parametrize("integrator", ["wavefront", "reference"])
 def test_a_coloured_shadow_has_come_through_smoke(integrator: str) -> None:
-    """What the shadow leaves is of the light that the smoke has left."""
+    """The shadow colour is attenuated by the smoke."""
     pixels = {
         (has_smoke, is_blocked): lit(has_smoke, is_blocked, integrator=integrator)
         for has_smoke in (False, True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contact sheets, pages of sequences, wipes, and folders that are compared."""
+"""Contact sheets, pages of sequences, wipes, and comparisons of folders."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def failed(*arguments: Any) -> str:
 
 @pytest.fixture
 def frames(tmp_path: Path) -> Path:
-    """Frames 8 to 11, of other colours."""
+    """Frames 8 to 11 in different colours."""
     folder = tmp_path / "out"
     folder.mkdir()
     for frame, colour in zip(range(8, 12), (RED, GREEN, BLUE, RED), strict=True):
@@ -93,8 +93,8 @@ def test_contact_sheet_has_each_picture_in_its_place(frames: Path, tmp_path: Pat
     for k, colour in enumerate((RED, GREEN, BLUE, RED)):
         x, y = 12 + k % 3 * 60, 12 + k // 3 * 59
         assert (sheet[y : y + 27, x : x + 48] == np.array(colour) * 255).all()
-        assert sheet[y + 28 : y + 44, x : x + 48].max() > 150  # its name
-    assert (sheet[59 + 12 : 59 + 39, 60 + 12 :] == 24).all()  # nothing in the last two places
+        assert sheet[y + 28 : y + 44, x : x + 48].max() > 150  # the file name
+    assert (sheet[59 + 12 : 59 + 39, 60 + 12 :] == 24).all()  # the last two cells are empty
 
 
 def test_sheet_is_as_the_layer_is_shown(frames: Path) -> None:
@@ -103,7 +103,7 @@ def test_sheet_is_as_the_layer_is_shown(frames: Path) -> None:
     dark = contact_sheet(files, Look(exposure=-1.0), width=48)
     assert plain[20, 20].tolist() == [255, 0, 0] and dark[20, 20].tolist() == [188, 0, 0]
     depth = contact_sheet(files, Look("depth"), width=48)
-    assert len(set(depth[20, 20].tolist())) > 1  # a false colour
+    assert len(set(depth[20, 20].tolist())) > 1  # false colours
     with pytest.raises(Exception, match="has no layer normal; there are beauty, depth"):
         contact_sheet(files, Look("normal"), width=48)
 
@@ -113,7 +113,7 @@ def test_pictures_are_made_smaller_in_linear_light() -> None:
     stripes[:, ::2] = 255
     small = fitted(stripes, 20, 100)
     assert small.shape == (10, 20, 3)
-    assert abs(int(small[5, 10, 0]) - 188) <= 2  # half the light, not half the code
+    assert abs(int(small[5, 10, 0]) - 188) <= 2  # half of the linear light
     assert fitted(stripes, 100, 100) is stripes
 
 
@@ -157,7 +157,7 @@ def test_wipe_has_a_line() -> None:
 
 @pytest.fixture
 def others(frames: Path, tmp_path: Path) -> Path:
-    """As the frames, but 9 differs, 10 has another size, 11 is missing, and there is a 12."""
+    """Copies of the frames, but 9 differs, 10 has another size, 11 is missing, and 12 is new."""
     folder = tmp_path / "reference"
     folder.mkdir()
     layers = {"depth": np.full((27, 48), 8, np.float32)}
@@ -184,7 +184,7 @@ def test_folders_and_sequences(frames: Path, others: Path, tmp_path: Path, patte
     assert lines[3:] == [f"{name(11)}: only in A", f"{name(12)}: only in B",
                          "1 of 3 pairs pass; 2 have no other"]  # fmt: skip
     text = page.read_text()
-    assert text.count("<figure>") == 3  # of the one pair that differs: A, B, difference
+    assert text.count("<figure>") == 3  # A, B and their difference for the one pair that differs
     assert "1 of 3 pairs pass, 2 pictures have no other" in text
     document = json.loads(run("compare", a, b, "--json").stdout)
     assert [one["passed"] for one in document["pairs"]] == [True, False, False]
@@ -235,7 +235,7 @@ def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
 
 
 def test_both_work_in_their_sandbox(frames: Path, others: Path, tmp_path: Path) -> None:
-    """As a command of its own: a child that writes its outputs only."""
+    """Both commands run in a sandbox in which only their outputs can be written."""
     page, sheet = tmp_path / "a.html", tmp_path / "b.html"
     done = forks.wavecomb("sheet", frames / "shot.####.exr", "-o", sheet)
     assert (done.returncode, done.stderr) == (0, "")

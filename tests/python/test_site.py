@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of the documentation: their links lead somewhere, and the site is whole."""
+"""Documentation pages: links have targets, and the site is complete."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
 
 def text_of(page: Path) -> str:
-    """The page without code."""
+    """Returns the page without code."""
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
     return re.sub(r"`[^`\n]*`", "code", text)
 
 
 @cache
 def anchors(page: Path) -> frozenset[str]:
-    """Addresses of headings, as GitHub and the site make them."""
+    """Returns the anchors of headings, as GitHub and the site generate them."""
     found: set[str] = set()
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
     for heading in re.findall(r"^#+ (.+)$", text, flags=re.M):
@@ -54,7 +54,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_nothing_installs_wavecomb_from_an_index() -> None:
-    """No package index has it, so the name there could be anybody's."""
+    """Wavecomb is on no package index, so anybody could register its name there."""
     files = [*PAGES, *(ROOT / "python").rglob("*.py"), ROOT / "Makefile"]
     said = re.compile(r"pip install (?:-\S+ )*['\"]?wavecomb\b")
     assert [file for file in files if said.search(file.read_text(encoding="utf-8"))] == []
@@ -62,7 +62,7 @@ def test_nothing_installs_wavecomb_from_an_index() -> None:
 
 @needs("wavecomb._core")
 def test_commands_of_pages_have_their_options(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every option that a page gives to a command of wavecomb is one of that command."""
+    """Every option that a page shows for a command exists."""
     import click
 
     from wavecomb.cli import main
@@ -90,7 +90,7 @@ def test_commands_of_pages_have_their_options(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_sources_name_pages_that_are_there() -> None:
-    """Of docs/NAME.md in comments, messages and tests."""
+    """Pages named as docs/NAME.md in comments, messages and tests exist."""
     missing = []
     for folder in ("src", "bindings", "python", "tests", "tools", "benchmarks", "cmake"):
         for path in (ROOT / folder).rglob("*"):
@@ -159,7 +159,7 @@ def test_reference_pages_have_every_row(monkeypatch: pytest.MonkeyPatch) -> None
     rows = [line.split(" | ") for line in pages["options.md"].splitlines() if line[:3] == "| `"]
     assert len(rows) > 200
     for row in rows:
-        assert len(row) == 4 and len(row[0]) < 36, row  # a first column that leaves room
+        assert len(row) == 4 and len(row[0]) < 36, row  # a narrow first column
     assert any(row[0] == "| `--seed`" and "`N`" in row[1] and "0" in row[3] for row in rows)
     for name, text in pages.items():
         widths = {line.replace("\\|", "").count("|") for line in text.splitlines()
@@ -182,7 +182,7 @@ def test_the_site_is_built_without_warnings(tmp_path: Path) -> None:
         assert (tmp_path / "cpp/classwavecomb_1_1SceneBuilder.html").is_file()
         assert "cpp/annotated.html" in (tmp_path / "reference/cpp.html").read_text("utf-8")
     browser = shutil.which("chromium")
-    if browser:  # the search works where pages are opened as files
+    if browser:  # search works when pages are opened as files
         page = f"{(tmp_path / 'index.html').as_uri()}?q=guiding"
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000"]
         shown = subprocess.run([browser, *options, "--dump-dom", page], capture_output=True,

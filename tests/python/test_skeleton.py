@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdSkel against skinning and blending written out in NumPy."""
+"""UsdSkel against skinning and blend shapes in NumPy."""
 
 import numpy as np
 import pytest
@@ -24,12 +24,12 @@ def rotation(degrees, axis=(1, 0, 0)):
 
 
 def pose(time):
-    """(rotation, translation) of B then A, the order of the animation."""
+    """Returns (rotation, translation) of B, then of A, as in the animation."""
     return [(rotation(20 * time, (0, 1, 0)), (0, 0.1 * time, 1)), (rotation(30 * time), (0, 0, 0))]
 
 
 def make_stage(*, mesh_order=None, indices, weights, each, constant=False, method=None):
-    """A stage with one skinned mesh, moved by transforms of its own, and a skeleton beside it."""
+    """Returns a stage with a skinned mesh that has its own transform, and a skeleton."""
     stage = Usd.Stage.CreateInMemory()
     stage.SetStartTimeCode(1)
     stage.SetEndTimeCode(4)
@@ -41,7 +41,7 @@ def make_stage(*, mesh_order=None, indices, weights, each, constant=False, metho
     rest = [BIND[0], BIND[1] * BIND[0].GetInverse(), BIND[2] * BIND[1].GetInverse()]
     skeleton.GetRestTransformsAttr().Set(rest)
     animation = UsdSkel.Animation.Define(stage, "/Root/Anim")
-    animation.GetJointsAttr().Set(["A/B", "A"])  # an order of its own, and C is left out
+    animation.GetJointsAttr().Set(["A/B", "A"])  # another order than the skeleton, and without C
     animation.GetScalesAttr().Set(Vt.Vec3hArray([(1, 1, 1), (1, 1, 1)]))
     for time in (1, 2, 4):
         turns = [Gf.Quatf(turn.GetQuat()) for turn, _ in pose(time)]
@@ -73,12 +73,12 @@ def make_stage(*, mesh_order=None, indices, weights, each, constant=False, metho
 
 
 def skinned(time, indices, weights, rest=POINTS):
-    """World positions (n, 3) and normals by linear blending; ``indices`` into JOINTS."""
+    """Linear blend skinning: world positions (n, 3) and normals. ``indices`` refer to JOINTS."""
     (turn_b, at_b), (turn_a, at_a) = pose(time)
     local = [
         Gf.Matrix4d(turn_a, Gf.Vec3d(at_a)),
         Gf.Matrix4d(turn_b, Gf.Vec3d(at_b)),
-        Gf.Matrix4d().SetTranslate((0, 0, 2)),  # C rests
+        Gf.Matrix4d().SetTranslate((0, 0, 2)),  # C is in its rest pose
     ]
     world = [np.array(local[0])]
     for matrix in local[1:]:
@@ -92,7 +92,7 @@ def skinned(time, indices, weights, rest=POINTS):
             joint = joints[indices[i, k]]
             points[i] += weights[i, k] * homogeneous[i] @ joint
             normals[i] += weights[i, k] * NORMALS[i] @ np.linalg.inv(joint[:3, :3]).T
-    # In the skeleton's space, which is moved by 0.5; the mesh's own transform does not count.
+    # Skeleton space is translated by 0.5. The transform of the mesh is ignored.
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     return points[:, :3] + np.array([0.5, 0, 0]), normals
 
@@ -139,7 +139,7 @@ def test_normals_of_corners():
     stage = make_stage(indices=INDICES.ravel().tolist(), weights=WEIGHTS.ravel().tolist(), each=2)
     mesh = UsdGeom.Mesh.Get(stage, "/Root/Mesh")
     flat = [i for face in FACES for i in face]
-    # Different at one corner of a point, so that they stay of corners.
+    # One point has different normals at its corners, so they stay face-varying.
     corners = NORMALS[flat]
     corners[2] = (0, 0, 1)
     mesh.GetNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(corners.astype(np.float32)))
@@ -152,7 +152,7 @@ def test_normals_of_corners():
 
 
 def test_dual_quaternions_keep_lengths():
-    """Half way between a joint and a turned one, a linear blend shrinks; this does not."""
+    """Half way to a rotated joint, linear blending shortens an edge, dual quaternions do not."""
     options = {"indices": [0, 1], "weights": [0.5, 0.5], "each": 2, "constant": True}
     linear, _ = read(make_stage(**options), frame=4)
     dual, _ = read(make_stage(method="dualQuaternion", **options), frame=4)
@@ -183,18 +183,18 @@ def test_blend_shapes_with_inbetweens():
     between.SetOffsets(Vt.Vec3fArray.FromNumpy(half.astype(np.float32)))
     frown = UsdSkel.BlendShape.Define(stage, "/Root/Mesh/Frown")
     frown.GetOffsetsAttr().Set(Vt.Vec3fArray.FromNumpy(other[:2].astype(np.float32)))
-    frown.GetPointIndicesAttr().Set([4, 6])  # of two points only
+    frown.GetPointIndicesAttr().Set([4, 6])  # affects two points only
     binding = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Root/Mesh"))
     binding.CreateBlendShapesAttr().Set(["smile", "frown"])
     binding.CreateBlendShapeTargetsRel().SetTargets([smile.GetPath(), frown.GetPath()])
     animation = UsdSkel.Animation.Get(stage, "/Root/Anim")
-    animation.GetBlendShapesAttr().Set(["frown", "smile"])  # an order of its own
+    animation.GetBlendShapesAttr().Set(["frown", "smile"])  # another order than the mesh
     weights = {1.0: (0.25, 0.2), 2.0: (1.0, 0.5), 4.0: (-0.5, 0.8)}
     for time, values in weights.items():
         animation.GetBlendShapeWeightsAttr().Set(Vt.FloatArray(values), time)
     rest = read(stage, frame=1)[0]["positions"]
     for time, (frowns, smiles) in weights.items():
-        # Piecewise linear through 0, the inbetween at 0.5 and the shape at 1.
+        # Piecewise linear through 0, the inbetween at 0.5, and the shape at 1.
         if smiles <= 0.5:
             offset = half * smiles / 0.5
         else:
@@ -207,7 +207,7 @@ def test_blend_shapes_with_inbetweens():
 
 
 def test_skins_that_do_not_fit_rest():
-    stage = make_stage(indices=[0, 1], weights=[1.0, 1.0], each=1)  # two of seven points
+    stage = make_stage(indices=[0, 1], weights=[1.0, 1.0], each=1)  # for two of seven points
     mesh, loaded = read(stage, frame=2)
     assert np.allclose(mesh["positions"], POINTS + np.array([0, 3, 0]), atol=1e-5)
     assert "rest pose" in said(loaded)

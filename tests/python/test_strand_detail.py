@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strands that are thinned out where they are thin in the picture."""
+"""Strands that are thin in the image are replaced by fewer, wider ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COUNT = 4000
 
 
 def lawn(path: Path, away: float, projection: str = "perspective", widths: str = "vertex") -> Path:
-    """Upright strands of many colours in a square of 2 by 2, seen from ``away``."""
+    """Writes upright strands of many colours on a 2 by 2 square, seen from distance ``away``."""
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     rng = np.random.default_rng(4)
@@ -54,7 +54,7 @@ def lawn(path: Path, away: float, projection: str = "perspective", widths: str =
 
 @pytest.mark.parametrize("widths", ["constant", "uniform", "varying", "vertex"])
 def test_opacity_and_colours_are_kept(tmp_path: Path, widths: str) -> None:
-    """A part of the strands covers what all covered, and has their mean colour."""
+    """The remaining strands have the same coverage and mean colour."""
     stage = lawn(tmp_path / "lawn.usda", 8.0, widths=widths)
     options: dict[str, Any] = {"size": (64, 64), "max_depth": 2, "aovs": ["alpha"], "seed": 2}
     every = wavecomb.render(stage, spp=64, **options)
@@ -70,21 +70,21 @@ def test_opacity_and_colours_are_kept(tmp_path: Path, widths: str) -> None:
 
 
 def segments(stage: Path, pixels: float) -> int:
-    """Of the curves of a stage that are kept."""
+    """Counts the curve segments that remain."""
     return int(load_stage(stage, size=(400, 400), strand_pixels=pixels).scene.curve_segments)
 
 
 def test_more_distance_keeps_fewer_of_the_same(tmp_path: Path) -> None:
     kept = [segments(lawn(tmp_path / f"{x}.usda", x), 0.2) for x in (1.0, 8.0, 32.0)]
     assert kept[0] == COUNT > kept[1] > kept[2] > 0
-    # The camera's lens of 50 mm on 20.955 mm of 400 pixels.
+    # Strand width in pixels for a focal length of 50 mm, a 20.955 mm aperture and 400 pixels.
     wide = 0.0005 * 400 * 50 / 20.955 / np.array([8.0, 32.0])
     assert kept[1:] == pytest.approx(COUNT * wide / 0.2, rel=0.15)
 
 
 def test_orthographic_widths_do_not_depend_on_distance(tmp_path: Path) -> None:
     kept = [segments(lawn(tmp_path / f"{x}.usda", x, "orthographic"), 0.2) for x in (3.0, 30.0)]
-    # 0.0005 of 4 units over 400 pixels is a twentieth of a pixel: a quarter stays.
+    # A width of 0.0005 of 4 units over 400 pixels is a twentieth of a pixel; a quarter remains.
     assert kept[0] == kept[1] == pytest.approx(COUNT / 4, rel=0.1)
 
 
@@ -112,5 +112,5 @@ def test_what_is_kept_of_a_layout() -> None:
 def test_numbers_look_random() -> None:
     x = even(np.arange(100_000))
     counts = np.histogram(x, bins=50, range=(0, 1))[0]
-    assert ((counts - 2000) ** 2 / 2000).sum() < 85  # chi-square of 49 degrees: 0.1 %
+    assert ((counts - 2000) ** 2 / 2000).sum() < 85  # chi-square with 49 degrees of freedom: 0.1 %
     assert abs(np.corrcoef(x[1:], x[:-1])[0, 1]) < 0.01

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard streams that are closed, full or nobody's, names that are not text, and Ctrl-C."""
+"""Standard streams that are closed, full or missing, names that are not text, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def stage(tmp_path: Path) -> Path:
 
 
 def shell(command: str, folder: Path, **options: object) -> subprocess.CompletedProcess[str]:
-    """Runs a line of bash in a folder; its exit code is that of the first command of a pipe."""
+    """Runs a line of bash. The exit code is that of the first command of a pipe."""
     line = f"{command}; exit ${{PIPESTATUS[0]}}"
     return subprocess.run(
         ["bash", "-c", line], cwd=folder, capture_output=True, text=True, errors="replace",
@@ -70,7 +70,7 @@ def test_a_result_that_is_lost_is_an_error_and_a_reader_that_ends_is_none(
 
 
 def test_a_closed_stream_is_not_given_to_a_file(stage: Path, tmp_path: Path) -> None:
-    """Else messages of libraries would be written into the first file that is opened."""
+    """Otherwise messages of libraries would be written to the first file that is opened."""
     words = "render a.usda -o a.exr --stats a.json --isolate off"
     done = shell(f"{WAVECOMB} {words} {SMALL} <&- >&- 2>&-", tmp_path)
     assert done.returncode == 0
@@ -94,7 +94,7 @@ def test_clean() -> None:
 
 @pytest.mark.parametrize("forced", [False, True])
 def test_names_in_a_stage_reach_no_terminal_as_they_are(tmp_path: Path, forced: bool) -> None:
-    """Names of files in warnings, in tables and in errors; also where Rich writes colours."""
+    """Control characters of file names are escaped in all output, with or without Rich."""
     name = HOSTILE.replace("/", "")
     inner = name.replace("\x1b", "\\x1b").replace("\x07", "\\x07")
     texture = f"""
@@ -188,7 +188,7 @@ def test_ctrl_c_while_modules_are_imported(
         capture_output=True, text=True, timeout=100,
     )  # fmt: skip
     assert "Traceback" not in done.stderr and "internal" not in done.stderr
-    if (tmp_path / "a.exr").exists():  # a library lost the signal, or all was done
+    if (tmp_path / "a.exr").exists():  # a library lost the signal, or the render had ended
         assert done.returncode in (0, 130)
     else:
         assert done.returncode == 130 and "stopped" in done.stderr, done.stderr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subdivision surfaces: against closed forms and masks that are worked out here."""
+"""Subdivision surfaces against closed forms and masks computed here."""
 
 import json
 import weakref
@@ -18,7 +18,7 @@ FACE_VARYING = ("none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundari
 
 
 def surface(points, faces, level=2, **rules):
-    """The refined mesh of one description, as ``SceneBuilder.make_surfaces`` gives it."""
+    """Returns a refined mesh of ``SceneBuilder.make_surfaces``."""
     description = {
         "level": level,
         "points": np.ascontiguousarray(points, np.float32),
@@ -36,7 +36,7 @@ def surface(points, faces, level=2, **rules):
 
 
 def grid(width, height, z=None):
-    """Points ((width + 1) (height + 1), 3) on whole numbers, and quads."""
+    """Returns points ((width + 1) (height + 1), 3) with integer coordinates, and quads."""
     x, y = np.meshgrid(np.arange(width + 1.0), np.arange(height + 1.0))
     points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size) if z is None else z], axis=1)
     row = width + 1
@@ -49,12 +49,12 @@ CUBE_FACES = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 
 
 
 def nearest(made, point):
-    """Distance of a point to the nearest of a refined mesh."""
+    """Returns the distance of a point to the nearest point of a refined mesh."""
     return float(np.linalg.norm(made["positions"] - np.asarray(point), axis=1).min())
 
 
 def neighbours(faces, v):
-    """Points that share an edge with v, and the corners across its faces (quads)."""
+    """Returns the points that share an edge with v, and those across its quads."""
     edges, across = set(), []
     for face in faces:
         if v in face:
@@ -66,7 +66,7 @@ def neighbours(faces, v):
 
 
 def bspline(control, u):
-    """Uniform cubic B-spline of 4 values at u in [0, 1], and its derivative."""
+    """Evaluates a uniform cubic B-spline of 4 values at u in [0, 1], and its derivative."""
     b = (
         np.array([(1 - u) ** 3, 3 * u**3 - 6 * u**2 + 4, -3 * u**3 + 3 * u**2 + 3 * u + 1, u**3])
         / 6
@@ -92,7 +92,7 @@ def test_a_regular_patch_is_a_bicubic_b_spline():
 
 
 def fan(count):
-    """A closed mesh of quads with two points of valence ``count``: a double pyramid of quads."""
+    """Returns a double pyramid of quads: closed, with two points of valence ``count``."""
     angle = np.arange(2 * count) * np.pi / count
     ring = np.stack([np.cos(angle), np.sin(angle), 0.1 * np.cos(3 * angle)], axis=1)
     points = np.concatenate([[[0, 0.1, 1.0]], ring, [[0.1, 0, -0.8]]])
@@ -182,12 +182,13 @@ def test_a_crease_that_fades_lies_between_sharp_and_smooth():
             CUBE, CUBE_FACES, 4, crease_edges=edges,
             crease_sharpness=np.full(4, sharpness, np.float32),
         )  # fmt: skip
-        # Across the creased edge x = z = 1.
+        # The creased edge is at x = z = 1.
         return made["positions"][:, [0, 2]].sum(axis=1).max()
 
     heights = [height(s) for s in (0.0, 1.0, 2.0, 10.0)]
     assert heights == sorted(heights) and len(set(heights)) == 4
-    # A closed B-spline of the square's corners: (1 + 23 + 23 + 1) / 48 in the middle of an edge.
+    # The crease is a closed B-spline: (1 + 23 + 23 + 1) / 48 of its points at the middle of an
+    # edge.
     assert heights[-1] == pytest.approx(1 + 46 / 48 - 2 / 48, abs=1e-6)
 
 
@@ -217,7 +218,7 @@ QUAD = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 def test_boundaries_of_one_quad(rule, corner):
     made = surface(QUAD, [[0, 1, 2, 3]], 3, boundary=rule)
     assert nearest(made, corner) < 1e-6
-    # The middle of an edge is on the boundary curve: (1 + 23 + 23 + 1) / 48 of its points.
+    # The boundary is a B-spline: (1 + 23 + 23 + 1) / 48 of its points at the middle of an edge.
     lowest = 1 / 48 + 1 / 48 if rule == "edgeOnly" else 0.0
     assert nearest(made, [0.5, lowest, 0]) < 1e-6
 
@@ -229,22 +230,22 @@ def test_without_boundary_interpolation_the_outer_faces_go():
 
 
 def smoothed(*values):
-    """A point on a crease in the limit: of its neighbour, itself, its other neighbour."""
+    """Returns the limit position on a crease, from a neighbour, the point, the other neighbour."""
     a, b, c = (np.asarray(value, float) for value in values)
     return (a + 4 * b + c) / 6
 
 
-# Texture coordinates on 2 x 2 quads around point 4: point i at (i % 3, i // 3), two of them bent.
+# Texture coordinates on 2 x 2 quads around point 4: point i at (i % 3, i // 3), two displaced.
 BENT = np.array([(i % 3, i // 3) for i in range(9)], float)
 BENT[4] = (1.3, 1.2)
 BENT[1] = (0.9, -0.2)
 _, GRID_FACES = grid(2, 2)
 REGIONS = {"joined": [0, 0, 0, 0], "three": [0, 1, 2, 1], "concave": [1, 0, 0, 0]}
-"""Which chart each quad is in."""
+"""Index of the texture chart of each quad."""
 
 
 def charted(regions):
-    """Face-varying texture coordinates, charts 10 apart along u."""
+    """Returns face-varying texture coordinates with charts 10 apart along u."""
     keys = [(regions[f], v) for f, face in enumerate(GRID_FACES) for v in face]
     unique = sorted(set(keys))
     values = np.array([BENT[v] + (10 * r, 0) for r, v in unique], np.float32)
@@ -294,7 +295,7 @@ def test_values_that_agree_are_joined_and_others_are_not():
 
 
 def mesh(points, faces, rest="", name="M"):
-    """A mesh prim as text."""
+    """Returns a mesh prim as text."""
     at = ", ".join(f"({x!r}, {y!r}, {z!r})" for x, y, z in np.asarray(points, float).tolist())
     corners = [str(i) for face in faces for i in face]
     return f"""def Mesh "{name}" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
@@ -403,11 +404,11 @@ def test_colours_follow_the_refined_faces(tmp_path):
 
 @pytest.mark.parametrize("kind", ["vertex", "varying", "faceVarying"])
 def test_primvars_are_refined_as_texture_coordinates_are(tmp_path, kind):
-    """A primvar with the values of texture coordinates: the same numbers at every corner."""
+    """A primvar with the values of the texture coordinates is refined to the same values."""
     points, faces = grid(2, 2)
     values = BENT[np.concatenate(faces)] if kind == "faceVarying" else BENT
     if kind == "faceVarying":
-        values[:4] += 0.25  # a seam
+        values[:4] += 0.25  # adds a seam
     rest = f"{BIND}; texCoord2f[] primvars:st = {pairs(values)} (interpolation = "
     rest += f'"{kind}"); color3f[] primvars:tint = ['
     rest += ", ".join(f"({u}, {v}, 0.5)" for u, v in values) + f'] (interpolation = "{kind}")'
@@ -446,7 +447,7 @@ def test_a_plane_displaced_by_a_constant_and_by_a_texture(tmp_path):
     recorder, _ = load(tmp_path, mesh(points, faces, st) + preview(CONSTANT), subdivision=2)
     made = recorder.mesh("/M")
     assert made["positions"][:, 2] == pytest.approx(0.25)
-    # Green rises with u and v: bilinear filtering of linear texels is linear between their centres.
+    # Green is linear in u and v, and so is bilinear filtering between texel centres.
     rows, columns = np.indices((8, 8))
     pixels = np.zeros((8, 8, 3))
     pixels[..., 1] = columns + 2 * (7 - rows)
@@ -467,7 +468,7 @@ def test_a_constant_displacement_is_an_offset_along_the_normals(tmp_path):
     moved, _ = load(tmp_path, mesh(CUBE, CUBE_FACES, BIND) + preview(CONSTANT), subdivision=4)
     a, b = plain.mesh("/M"), moved.mesh("/M")
     assert b["positions"] == pytest.approx(a["positions"] + 0.25 * a["normals"], abs=1e-6)
-    # The normals of an offset surface are those of the surface.
+    # An offset surface has the normals of the original surface.
     assert np.einsum("ij,ij->i", a["normals"], b["normals"]).min() > 0.995
 
 
@@ -521,7 +522,7 @@ def test_authored_normals_count_for_polygons_only(tmp_path):
 
 
 def level_of(loaded):
-    """The one level that the report tells."""
+    """Returns the only refinement level in the report."""
     (line,) = [line for line in loaded.report.lines() if "refined" in line]
     return int(line.rsplit(" ", 1)[1])
 
@@ -537,8 +538,8 @@ CAMERA = """def Camera "C" {
 
 
 def test_automatic_levels_follow_the_size_in_the_picture(tmp_path):
-    # A quad of edge 1, 4 away: a quarter of the picture's width, so edges of 50, 100 ... pixels
-    # (a little less, as they are seen from the eye: 4.03 away).
+    # A quad of edge length 1 at distance 4 covers a quarter of the image width: 50, 100 ... pixels,
+    # or slightly less, since the distance to its corners is larger.
     text = CAMERA + mesh(QUAD, [[0, 1, 2, 3]])
     levels = []
     for width in (200, 400, 800):
@@ -567,7 +568,7 @@ def test_the_largest_instance_counts(tmp_path):
     assert level_of(loaded) == 5
     behind = text.replace("(0, 0, 0), ", "(0, 0, 8), ")
     _, loaded = load(tmp_path, behind, subdivision="auto", size=(200, 200))
-    assert level_of(loaded) == 2  # 50 pixels an eighth, at the same distance behind the camera
+    assert level_of(loaded) == 2  # an edge of 25 pixels, at the same distance behind the camera
 
 
 def test_memory_bounds_automatic_levels(tmp_path, monkeypatch):
@@ -628,7 +629,7 @@ def test_degenerate_faces_and_shapes_that_are_no_manifolds(tmp_path):
     line = mesh(points, [[0, 1], [0, 1, 2, 3]])
     recorder, loaded = load(tmp_path, line, subdivision=2)
     assert "fewer than three corners: drawn as polygons" in said(loaded)
-    # Three quads on one edge.
+    # Three quads share an edge.
     book = mesh(points, [[0, 1, 2, 3], [1, 0, 4, 5], [0, 1, 7, 6]])
     recorder, loaded = load(tmp_path, book, subdivision=3)
     assert "not manifold: sharp there" in said(loaded)

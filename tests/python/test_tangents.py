@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tangents that vary smoothly over triangles, and normal maps in mirrors, in pictures."""
+"""Tangents interpolated over triangles, and normal maps on mirrored geometry, in images."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def add_mesh(
 
 
 def brushed_cone(path: Path, sides: int, rows: int) -> None:
-    """A cone of brushed metal, whose grain goes round it; the texture's seam is behind."""
+    """Writes a cone of brushed metal with circular grain; the texture seam is at the back."""
     pytest.importorskip("MaterialX")
     stage = new_stage(path, (0, 0, 5))
     material = UsdShade.Material.Define(stage, "/Metal")
@@ -82,7 +82,7 @@ def brushed_cone(path: Path, sides: int, rows: int) -> None:
 
 
 def test_a_coarse_cone_shines_as_a_fine_one(tmp_path: Path) -> None:
-    """With one tangent for each triangle the highlight breaks at every edge."""
+    """With a constant tangent per triangle, the highlight would break at every edge."""
     brushed_cone(tmp_path / "coarse.usda", 16, 2)
     brushed_cone(tmp_path / "fine.usda", 120, 20)
     coarse, fine = (
@@ -94,18 +94,17 @@ def test_a_coarse_cone_shines_as_a_fine_one(tmp_path: Path) -> None:
         ).beauty[..., 1]
         for name in ("coarse", "fine")
     )
-    # Where both show the cone's front, away from its outline.
+    # Pixels on the front of both cones, away from the silhouette.
     rows, columns = np.mgrid[0:48, 0:48]
     inside = (rows > 15) & (rows < 33) & (np.abs(columns - 23.5) < 3)
     assert fine[inside].max() > 1  # there is a highlight
-    # As a screen shows it: 0.04, and 0.09 with one tangent for each triangle.
+    # Clipped as on a display: 0.04 now, and 0.09 with a constant tangent per triangle.
     a, b = np.minimum(coarse, 0.3)[inside], np.minimum(fine, 0.3)[inside]
     assert np.abs(a - b).mean() / b.mean() < 0.06
 
 
 def mapped(path: Path, mirrored: bool, transform: bool = False) -> None:
-    """A square whose normal map leans to u and v, and the same in a mirror: all that is at x is at
-    -x then, by a transform or in its points."""
+    """Writes a normal-mapped square, optionally mirrored in x by a transform or its points."""
     write_png(path.parent / "normal.png", np.full((4, 4, 3), (0.7, 0.8, 0.85), np.float32))
     stage = new_stage(path, (0, 0, 4))
     material = UsdShade.Material.Define(stage, "/M")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``--texture-limit`` without a store: which mip levels textures leave out, and what is left."""
+"""``--texture-limit`` without a texture store: which mip levels textures omit."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -13,7 +13,7 @@ from wavecomb.usd.looks.texture_limit import pyramid_bytes
 
 
 class NoStore:
-    """In place of ``_core.TextureStore`` where the system has none."""
+    """Replaces ``_core.TextureStore`` as on a system without userfaultfd."""
 
     @staticmethod
     def obstacle():
@@ -36,11 +36,11 @@ MOVING_CAMERA = """def DistantLight "Sun" {}
         uniform token[] xformOpOrder = ["xformOp:translate"]
     }
     """
-"""A sun, and a camera that looks along -Z and moves over four frames."""
+"""A sun, and a camera along -Z that moves over four frames."""
 
 
 def textured(name, file, distance):
-    """A unit square with a texture, some way off along -Z."""
+    """Returns a textured unit square at a distance along -Z."""
     return f"""def Material "{name}Mat" {{
         token outputs:surface.connect = </{name}Mat/S.outputs:surface>
         def Shader "S" {{
@@ -73,7 +73,7 @@ def textured(name, file, distance):
 
 @pytest.fixture
 def stage(tmp_path):
-    """Textures of 256 x 256: one near, one 64 times as far."""
+    """Two textures of 256 x 256: one near, one at 64 times the distance."""
     rng = np.random.default_rng(1)
     for name in ("near", "far"):
         pixels = rng.integers(0, 256, (256, 256, 3), np.uint8)
@@ -106,7 +106,7 @@ def test_what_is_small_in_the_picture_goes_first(tmp_path, stage):
     assert at(2 * WHOLE / 1e6)[0] == {"Near": 256, "Far": 256}
     got, words = at(1.3 * WHOLE / 1e6)
     assert got == {"Near": 256, "Far": 128} and "1 of 2 textures without their finest" in words
-    # Far shows 64 times fewer texels, so that it loses six levels before Near loses one.
+    # Far shows 64 times fewer texels, so it loses six levels before Near loses one.
     assert at(1.02 * WHOLE / 1e6)[0] == {"Near": 256, "Far": 32}
     got, words = at(0.2 * WHOLE / 1e6)
     assert got["Near"] == 64 and got["Far"] <= 4
@@ -118,7 +118,7 @@ def test_the_scene_takes_what_was_planned(tmp_path, stage, monkeypatch):
     limit = 0.9 * WHOLE
     loaded = load_stage(write(tmp_path, stage), texture_limit=limit / 1e6, size=(64, 64))
     total = sum(size for _, size in loaded.scene.textures) - pyramid_bytes(128, 64, 3, np.float32)
-    assert total <= limit  # beside the soft dome of a stage without lights
+    assert total <= limit  # in addition to the default dome
     halved = pyramid_bytes(128, 128, 3, np.uint8)
     assert total in {halved + pyramid_bytes(2**k, 2**k, 3, np.uint8) for k in range(9)}
 
@@ -154,10 +154,10 @@ def test_bytes_are_those_of_the_core(size, channels, dtype):
 def test_halves_are_boxes_in_linear_light():
     chess = np.array([[0, 255], [255, 0]], np.uint8)[..., None].repeat(4, axis=2)
     assert halve(chess, srgb=False)[0, 0].tolist() == [128, 128, 128, 128]
-    # sRGB code of half the light is 188; alpha is no colour.
+    # 188 is the sRGB code of half the light; alpha is linear.
     assert halve(chess, srgb=True)[0, 0].tolist() == [188, 188, 188, 128]
     odd = np.arange(5, dtype=np.float32).reshape(1, 5, 1)
-    # Boxes of 2 1/2 texels: (0 + 1 + 2/2) / 2.5, (2/2 + 3 + 4) / 2.5.
+    # Box filters of 2 1/2 texels: (0 + 1 + 2/2) / 2.5, (2/2 + 3 + 4) / 2.5.
     assert halve(odd, srgb=False)[0, :, 0].tolist() == pytest.approx([0.8, 3.2])
     tall = np.random.default_rng(2).random((1024, 3, 3)).astype(np.float16)
     exact = tall.astype(np.float64).reshape(512, 2, 3, 3).mean(axis=(1, 2))

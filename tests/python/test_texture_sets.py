@@ -51,7 +51,7 @@ def stage(tmp_path, colour="UVMap2", rough="st"):
 def test_each_texture_is_at_its_own_set(tmp_path):
     scene, loaded = load(tmp_path, stage(tmp_path))
     mesh, got = scene.mesh("M"), scene.material_of("M")
-    # The colour is read first, so UVMap2 is the mesh's, and st an attribute.
+    # The colour is read first, so UVMap2 becomes the mesh's uv, and st an attribute.
     assert mesh["uvs"][:2].tolist() == [[1, 0], [0, 0]]
     assert set(mesh["attributes"]) == {"st"} and "sets" not in said(loaded)
     assert set(got["textures"]) == {"base_color"} and got["textures"]["base_color"]["uv"][2] == 0.25
@@ -68,7 +68,7 @@ def test_a_set_that_is_not_there_leaves_the_other(tmp_path):
 
 
 def test_parts_of_a_mesh_have_their_own(tmp_path):
-    """Materials of subsets that name other sets than the first."""
+    """Materials of subsets that use other sets than the first."""
     text = stage(tmp_path, "st", "st")
     other = stage(tmp_path, "UVMap2", "UVMap2").split("def Mesh")[0]
     other = other.replace('"Mat"', '"Two"').replace("</Mat", "</Two")
@@ -88,7 +88,7 @@ def test_parts_of_a_mesh_have_their_own(tmp_path):
 
 
 def test_the_picture_is_that_of_the_set_as_the_mesh_s(tmp_path):
-    """A roughness at a second set, and the same where it is the only one."""
+    """A roughness texture on a second set looks as on an only set."""
     two = stage(tmp_path)
     write_image(tmp_path / "flat.png", np.full((2, 2, 3), 102, np.uint8), "uint8")
     two = two.replace("@t.png@", "@rough.png@", 1).replace("@t.png@", "@flat.png@")
@@ -101,6 +101,6 @@ def test_the_picture_is_that_of_the_set_as_the_mesh_s(tmp_path):
         picture = wavecomb.render(tmp_path / "s.usda", size=(24, 24), spp=64, seed=3)
         pictures.append(np.asarray(picture.beauty, np.float64))
     assert pictures[1].max() > 0.1
-    # Directions are drawn about other tangents, so strips are compared.
+    # Sampling uses other tangents, so means over strips are compared.
     two, one = (picture.reshape(24, 4, 6, 3).mean(axis=(0, 2)) for picture in pictures)
     assert np.abs(two - one).max() < 0.02 * one.max()

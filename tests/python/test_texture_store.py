@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``--texture-limit``: the same picture, within the limit, and what stands in the way."""
+"""``--texture-limit`` with a texture store: equal images, memory within the limit, errors."""
 
 import ctypes
 import errno
@@ -28,16 +28,16 @@ from wavecomb.usd.looks.pixels import ReadAhead
 LIMIT_MB = 2.0
 TEXTURES, SIZE = 9, 512
 CHUNK_KB = 65536
-"""Address space that a store takes at a time."""
+"""Address space that a store reserves at a time."""
 
 needs_store = needs("userfaultfd")
 
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory):
-    """Nine squares that fill the picture, with 12.6 MB of noise on them, which also cuts them out.
+    """Nine squares that fill the image, with 12.6 MB of noise textures that also cut them out.
 
-    Whether there is something is asked of the finest level, so that rays read all of it.
+    Cut-outs read the finest level, so that rays access all of it.
     """
     folder = tmp_path_factory.mktemp("textures")
     rng = np.random.default_rng(3)
@@ -75,7 +75,7 @@ def picture(stage, texture_limit=None, **options):
 
 @pytest.fixture(scope="module")
 def whole(stage):
-    """The picture without a limit."""
+    """The image without a limit."""
     result = picture(stage)
     assert result.stats["texture_store"] is None
     assert len(np.unique(result.beauty)) > 1000
@@ -114,7 +114,7 @@ def test_wave_sizes_and_threads_do_not_matter(stage, whole, size):
 
 
 def resident_of_stores():
-    """Bytes in memory of the address space of all stores, as the kernel counts them."""
+    """Returns the resident bytes of the address space of all stores, as the kernel counts them."""
     sum_kb, is_store = 0, False
     for line in Path("/proc/self/smaps").read_text().splitlines():
         head = re.match(r"[0-9a-f]+-[0-9a-f]+ (\S+) \S+ 00:00 0 *$", line)
@@ -148,7 +148,7 @@ def test_the_kernel_sees_no_more_than_the_limit(stage):
         watcher.join()
     assert result.stats["texture_store"]["loads"] > 100
     seen.append(resident_of_stores())
-    # The kernel is asked page by page, so that what comes and goes meanwhile may count twice.
+    # The kernel counts page by page, so pages that change meanwhile may count twice.
     assert 0.8 * LIMIT_MB * 1e6 < max(seen) <= 1.05 * LIMIT_MB * 1e6, (len(seen), max(seen))
 
 
@@ -187,14 +187,14 @@ def test_a_file_that_cannot_be_read_back_ends_the_render(stage):
         try:
             if "(deleted)" in os.readlink(path) and os.stat(path).st_size > 12e6:
                 os.truncate(path, 4096)
-        except OSError:  # that of listdir is closed by now
+        except OSError:  # the descriptor of listdir is closed by now
             continue
     with pytest.raises(ValueError, match=r"cannot be read back .*; set TMPDIR to another folder"):
         wavecomb.render(loaded, size=(32, 32), spp=1)
 
 
 def no_memory_for_tiles():
-    """Makes the kernel refuse to fill what a store asks for: UFFDIO_COPY fails with ENOMEM."""
+    """Makes the kernel refuse to fill tiles: UFFDIO_COPY fails with ENOMEM."""
     ioctl, copy, allow, fail = 16, 0xC028AA03, 0x7FFF0000, 0x00050000 | errno.ENOMEM
     steps = [(0x20, 0, 0, 0), (0x15, 0, 3, ioctl), (0x20, 0, 0, 24), (0x15, 0, 1, copy),
              (0x06, 0, 0, fail), (0x06, 0, 0, allow)]  # fmt: skip
@@ -211,7 +211,7 @@ def no_memory_for_tiles():
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="numbers of system calls of x86_64")
 @pytest.mark.parametrize("limit", ["1", "2"], ids=["on the store's thread", "on the loader's"])
 def test_no_memory_for_a_tile_ends_the_render_in_one_line(stage, limit):
-    """With 1 MB all textures go to the file at once; with 2 the first one is to stay."""
+    """With 1 MB all textures go to the file at once; with 2 MB the first one stays in memory."""
     done = subprocess.run(
         [sys.executable, "-m", "wavecomb", "render", stage, "-o", stage.parent / "o.exr", "--size",
          "64", "64", "--spp", "1", "--texture-limit", limit, "--isolate", "off"],
@@ -296,7 +296,7 @@ def test_grids_leave_less_for_textures(smoky, stage):
     whole = picture(smoky).beauty
     assert not np.array_equal(whole, picture(stage).beauty)
     grid_bytes = 900 * 9**3 * 4
-    for limit in (15.9, 5.0):  # textures alone fit into the first
+    for limit in (15.9, 5.0):  # without the grid, textures would fit into the first limit
         result = picture(smoky, texture_limit=limit)
         assert np.array_equal(result.beauty, whole)
         store = result.stats["texture_store"]
@@ -331,7 +331,7 @@ def test_reading_ahead_keeps_to_its_limit(tmp_path):
         most = max(most, len(ahead._ready))
         assert (ahead.read(file).take() == i).all()
     ahead.close()
-    assert most == 3  # two images, and the one that is not there
+    assert most == 3  # two images and the missing one
 
 
 def test_the_file_goes_where_it_is_told_to(monkeypatch, tmp_path):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `make test` leaves to `make test-long` has a representative in it, and nothing is lost."""
+"""Every test that `make test` leaves to `make test-long` has a representative in `make test`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_no_representative_is_long() -> None:
 
 @pytest.mark.slow
 def test_every_row_names_tests() -> None:
-    """Each side of each row is collected; a test that got another name has to be renamed there."""
+    """Both sides of each row are collected. A renamed test must be renamed there too."""
     sides = [side for row in ROWS for side in (row.long, row.representative)]
     files = sorted({side.partition("::")[0] for side in sides})
     files = [file for file in files if (ROOT / file).is_file()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Transport auto: what it chooses, and that no schedule has a say in it."""
+"""Transport "auto": its choices, and independence of schedules."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ pytest.importorskip("wavecomb._core")
 
 SIZE, SPP = 32, 4
 ENOUGH = {"size": (160, 160), "spp": 96}
-"""Just enough samples for a trial."""
+"""Just enough samples for a pilot render."""
 
 
 def chosen(stage: Any, **settings: Any) -> dict[str, Any]:
-    """What auto makes of a render that is stopped as soon as it has begun."""
+    """Returns the choice of a render that is stopped as soon as it starts."""
     picture = wavecomb.render(
         stage, transport="auto", progress=lambda *_: False, **(ENOUGH | settings)
     )

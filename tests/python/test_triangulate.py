@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Polygons of any shape as triangles: what comes out, and how long it takes."""
+"""Triangulation of arbitrary polygons: results and run time."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def turn(a, b, c):
 
 
 def every_ear(flat):
-    """Ear clipping that looks at every corner each time: the definition of what comes out."""
+    """Ear clipping that checks every corner in each step, as a reference."""
 
     def is_ear(a, b, c):
         if turn(flat[a], flat[b], flat[c]) <= 0:
@@ -98,7 +98,7 @@ def test_ears_are_those_of_looking_everywhere(name):
 
 
 def check_time(name, count):
-    """The search ends within a tenth of a second's steps for each 10,000 corners."""
+    """Asserts that the search for ears needs few steps per corner."""
     flat = np.ascontiguousarray(HARD[name](count, np.random.default_rng(count)))
     triangles, hurried = _core.clip_ears(flat, module._EAR_STEPS * count // 100_000)
     assert hurried == 0
@@ -118,7 +118,7 @@ def test_faces_of_100000_corners_take_a_second(name):
 
 
 def test_large_concave_faces_are_covered_once():
-    """A comb of 8,000 corners: more than ears were once clipped from."""
+    """A comb of 8,000 corners, once too large for ear clipping."""
     corners = comb(8000, np.random.default_rng(3))
     points = np.concatenate([corners, np.zeros((8000, 1))], axis=1).astype(np.float32)
     topology = module.triangulate(

@@ -46,7 +46,7 @@ def widths(values, interpolation):
 
 
 def segment_values(points, basis, wrap, u):
-    """Values on every segment of one curve at u, by the basis matrices."""
+    """Evaluates every segment of one curve at u with the basis matrices."""
     points = np.asarray(points, float)
     n = len(points)
     if basis == "linear":
@@ -66,7 +66,7 @@ def segment_values(points, basis, wrap, u):
 
 
 def bezier_values(mesh, values, u):
-    """The same from what the loader made."""
+    """Evaluates the converted Bezier segments at u."""
     first = (mesh["segments"] & FIRST).astype(int)
     if mesh["kind"].startswith("linear"):
         return (1 - u) * values[first] + u * values[first + 1]
@@ -96,7 +96,7 @@ def test_every_basis_and_wrap_goes_through_the_same_points(tmp_path, basis, wrap
         parts = [segment_values(points[a:b], basis, wrap, u) for a, b in itertools.pairwise(starts)]
         found = bezier_values(mesh, mesh["positions"], u)
         assert np.allclose(found, np.concatenate(parts), atol=1e-6)
-    # Neighbours share their point, and flags say who has one.
+    # Neighbouring segments share a point, and flags mark segments that have a neighbour.
     words = mesh["segments"]
     sizes = [len(part) for part in parts]
     inner = np.concatenate([np.arange(size) for size in sizes])
@@ -106,7 +106,7 @@ def test_every_basis_and_wrap_goes_through_the_same_points(tmp_path, basis, wrap
     assert (((words & AFTER) > 0) == ((last > 0) | closed)).all()
     first, step = (words & FIRST).astype(int), 1 if basis == "linear" else 3
     assert (np.diff(first)[inner[1:] > 0] == step).all()
-    # The point beyond an end is that of the segment there.
+    # In a closed curve, the point beyond one end is a point of the segment at the other end.
     positions = mesh["positions"]
     for k in np.flatnonzero((inner == 0) & closed):
         end = k + sizes[int(np.sum(inner[: k + 1] == 0)) - 1] - 1
@@ -229,7 +229,7 @@ def test_texture_coordinates(tmp_path):
     uvs = scene.meshes[0]["uvs"]
     assert np.allclose(uvs[:, 0], [[0.1, 0.2], [0.3, 0.4], [0.3, 0.4]])
     assert (uvs[:, 0] == uvs[:, 1]).all()
-    # Without any, u goes along the curve.
+    # Without texture coordinates, u runs along the curve.
     scene, loaded = load(tmp_path, text + body.replace("primvars:st", "primvars:other"))
     assert np.allclose(scene.meshes[0]["uvs"][:, :, 0], [[0, 1], [0, 0.5], [0.5, 1]])
     assert "made up" in said(loaded)
@@ -296,5 +296,5 @@ def test_many_curves_load_in_a_second(tmp_path):
     started = time.process_time()
     scene = load_stage(tmp_path / "hair.usdc", builder_factory=Recorder).scene
     assert len(scene.meshes[0]["segments"]) == count * (size - 1)
-    # No step of Python's a curve: some microseconds each would be seconds.
+    # Python code that ran for each curve would take several seconds.
     assert time.process_time() - started < 5.0

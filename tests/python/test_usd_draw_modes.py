@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw modes of models: what stands in for them, where, and for which."""
+"""Draw modes of models: which proxy geometry is drawn, where, and for which models."""
 
 import numpy as np
 import OpenImageIO
@@ -31,7 +31,7 @@ def cards(geometry, *textures):
 
 @pytest.fixture
 def card(tmp_path):
-    """A picture, clear on its left."""
+    """An image with a transparent left part."""
     image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(2, 2, 4, "uint8"))
     image.set_pixels(
         OpenImageIO.ROI(0, 2, 0, 2), np.array([[[0, 0, 0, 0], [1, 0.5, 0, 1]]] * 2, np.float32)
@@ -63,7 +63,7 @@ def test_a_cross_has_the_axes_that_have_pictures(tmp_path, card):
     flat = np.ptp(corners, axis=1).argmin(axis=1)
     assert sorted(flat.tolist()) == [0, 0, 1, 1] and np.abs(corners[flat == 0, :, 0]).max() < 1e-3
     for card_, right, way in ((0, 1, 1), (1, 0, -1), (2, 1, 1), (3, 0, 1)):
-        # The third shows the picture of the first from behind: mirrored, its right stays there.
+        # The third card shows the first image from behind, mirrored so that its right side stays.
         across, up = corners[card_, :, right], corners[card_, :, 2]
         low, high = across.min(), across.max()
         wanted = (across - low) / (high - low)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages that are open and read again: what is known of them, and what is shared."""
+"""Open stages that are loaded repeatedly: known attributes, and shared data."""
 
 import os
 import shutil
@@ -156,7 +156,7 @@ def test_parameters_are_traced_to_attributes(path):
     assert base.value == pytest.approx((0.8, 0.1, 0.1)) and base.authored(base.value) == Gf.Vec3f(
         *base.value
     )
-    # Not authored: the default, and where it would be.
+    # An unauthored input has its default, and the path where an edit would be written.
     assert red["clearcoat_roughness"].value == 0.01
     assert red["ior"].attribute == Sdf.Path("/W/Red/S.inputs:ior")
     wood = material_parameters(stage.GetPrimAtPath("/W/Wood"), time)
@@ -182,7 +182,7 @@ def test_materialx_inputs_are_its_own(tmp_path):
         float inputs:coat.connect = </X/Grey.outputs:out>"""
     stage = open_stage(write(tmp_path, MTLX % ("standard_surface", inputs)))
     found = material_parameters(stage.GetPrimAtPath("/X"), Usd.TimeCode.Default())
-    # A weight of 0 hides what it weighs, which keeps its value.
+    # With a weight of 0, the weighted colour keeps its authored value.
     assert found["base"].value == 0 and found["base_color"].value == pytest.approx((0.8, 0.4, 0.2))
     assert found["base_color"].attribute == Sdf.Path("/X/S.inputs:base_color")
     assert found["base_color"].definition.group == "Base"
@@ -202,7 +202,7 @@ def test_a_colour_in_a_space_of_its_own_has_a_value(tmp_path):
 
 
 class Defaults:
-    """Notes which defaults the loader takes, as ``openpbr.Inputs``."""
+    """Records the defaults that the loader uses, in the role of ``openpbr.Inputs``."""
 
     def __init__(self):
         self.found = {}
@@ -227,7 +227,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
     inputs = Defaults()
     layers_of(model, inputs)
     known = definitions(model)
-    inputs.found.pop("dielectric_priority", None)  # Arnold's, of no definition
+    inputs.found.pop("dielectric_priority", None)  # an input of Arnold without a definition
     assert inputs.found.keys() <= known.keys()
     for name, default in inputs.found.items():
         assert known[name].default == pytest.approx(default), name
@@ -242,7 +242,7 @@ def test_defaults_of_the_loader_are_materialx_s(model):
 
 @pytest.mark.parametrize("model", sorted(MODELS))
 def test_surface_values_are_what_the_loader_gives_the_core(tmp_path, model):
-    """Of each input in turn at a value that is not its default, and of all together."""
+    """Each input with a value other than its default, one at a time and all together."""
     known, time = definitions(model), Usd.TimeCode.Default()
 
     def stage_of(values, file):

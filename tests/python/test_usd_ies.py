@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""IES profiles: symmetry, types, and files that are no good."""
+"""IES profiles: symmetry, photometric types, invalid files."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def ies(vertical, horizontal, candela, kind=1, factors=(1, 1, 1), tilt="NONE"):
 
 
 def candela(profile, theta, phi):
-    """By numpy's own interpolation."""
+    """Interpolates a profile with NumPy."""
     planes = [np.interp(theta, profile.vertical, row) for row in profile.candela]
     return np.interp(phi % 360, profile.horizontal, planes)
 
@@ -41,7 +41,7 @@ def test_values_are_multiplied_by_the_files_factors():
         ([0, 90, 180], [1, 2, 5], [(0, 1), (90, 2), (180, 5), (270, 2), (225, 3.5)]),
         ([90, 180, 270], [1, 2, 5], [(90, 1), (180, 2), (0, 2), (270, 5), (45, 1.5), (315, 3.5)]),
         ([90, 135, 270], [1, 2, 5], [(90, 1), (45, 2), (270, 5), (0, 3), (180, 3)]),
-        ([0, 120, 240], [1, 2, 5], [(0, 1), (240, 5), (300, 3)]),  # 360 left out
+        ([0, 120, 240], [1, 2, 5], [(0, 1), (240, 5), (300, 3)]),  # without 360
         ([0, 180, 360], [1, 2, 1], [(90, 1.5), (270, 1.5)]),
     ],
 )
@@ -53,14 +53,14 @@ def test_symmetry(horizontal, values, alike):
 
 
 def test_type_b_and_a_know_their_poles():
-    # Candela fall with the horizontal angle alone, from 90 to 0; both sides alike.
+    # The intensity depends on the horizontal angle only, 90 to 0, equal on both sides.
     text = ies([-90, 90], [0, 90], [90, 90, 0, 0], kind=2)
     b = parse_ies(text)
     assert candela(b, 0, 0) == pytest.approx(90)
     assert candela(b, 60, 0) == pytest.approx(30)  # sin H = x
     assert candela(b, 60, 180) == pytest.approx(30)
     assert candela(b, 60, 90) == pytest.approx(90)  # x = 0
-    assert candela(b, 120, 0) == 0  # behind
+    assert candela(b, 120, 0) == 0  # the back
     h = np.degrees(np.arcsin(np.sin(np.radians(40)) * np.cos(np.radians(30))))
     assert candela(b, 40, 30) == pytest.approx(90 - h, rel=1e-6)
     a = parse_ies(ies([-90, 90], [0, 90], [90, 90, 0, 0], kind=3))
@@ -107,7 +107,7 @@ def test_lights_share_a_profile(tmp_path):
     first, second = scene.lights
     assert (first["ies"], first["ies_angle_scale"], first["ies_normalize"]) == (0, -0.5, True)
     assert (second["ies"], second["ies_angle_scale"], second["ies_normalize"]) == (0, 0, False)
-    assert first["cone_angle"] == 90  # what ShapingAPI says where nothing is authored
+    assert first["cone_angle"] == 90  # the default of ShapingAPI
     assert len(scene.profiles) == 1 and scene.profiles[0]["candela"].tolist() == [[10, 4]]
     assert not loaded.report.warnings
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Native instances and point instancers: where copies end up, with which material."""
+"""Native instances and point instancers: transforms and materials of the copies."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ LOOKS = look("A", 0.125) + look("B", 0.25)
 
 
 def origins(scene):
-    """World position of each mesh's first point, sorted."""
+    """Returns the world position of each mesh's first point, sorted."""
     out = [
         (np.append(mesh["positions"][0], 1) @ matrix)[:3].round(5).tolist()
         for mesh, matrix, _ in scene.world_meshes()
@@ -37,7 +37,7 @@ def origins(scene):
 
 
 def names(scene):
-    """Material name of each mesh as seen, by x of its first point."""
+    """Returns the material name of each visible mesh, by x of its first point."""
     out = {}
     for mesh, matrix, material in scene.world_meshes():
         x = float((np.append(mesh["positions"][0], 1) @ matrix)[0])
@@ -240,7 +240,7 @@ def test_lights_in_instances_are_placed(tmp_path):
 
 
 def nested(depth):
-    """A prototype in so many instancers and instances by turns, each of which places it twice."""
+    """Returns a prototype in alternating instancers and native instances, two copies per level."""
     text = f'class "L0" {{ def Mesh "M" {{ {QUAD} }} }}\n'
     for level in range(1, depth + 1):
         step, below = 2 ** (level - 1), f"L{level - 1}"
@@ -268,7 +268,7 @@ def test_instancers_and_instances_nest_to_any_depth(tmp_path, depth):
 
 
 def test_colours_of_instances_reach_through_nested_ones(tmp_path):
-    """The innermost instancer with a colour wins; indexed colours, and those of what is hidden."""
+    """The innermost instancer with a colour counts, also with indices and invisible ids."""
     text = f"""
     def PointInstancer "Outer" {{
         rel prototypes = [</Outer/Plain>, </Outer/Own>]
@@ -298,7 +298,7 @@ def test_colours_of_instances_reach_through_nested_ones(tmp_path):
 
 
 def test_many_instances_take_no_step_each(tmp_path):
-    """What Python does for a point instancer does not grow with its instances."""
+    """The number of Python calls for a point instancer does not grow with its instances."""
     import sys
 
     from pxr import Usd, UsdGeom, Vt
@@ -328,6 +328,6 @@ def test_many_instances_take_no_step_each(tmp_path):
         assert len(scene.world_meshes()) == count
         return len(made)
 
-    calls(10), calls(1000)  # what is imported when it is first needed
+    calls(10), calls(1000)  # imports and caches
     few, many = calls(10), calls(1000)
     assert many < few + 400

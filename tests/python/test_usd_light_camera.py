@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights and cameras, and the defaults where there are none."""
+"""Lights and cameras, and their defaults."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -37,7 +37,7 @@ def test_colour_intensity_exposure_temperature(tmp_path):
 
 @pytest.mark.parametrize("kelvin", [4000, 5000, 6500, 8750, 10000, 11000, 13000, 15000])
 def test_colour_temperatures_are_those_of_black_bodies(kelvin):
-    """The Planckian locus by Kim's cubic splines, from 4000 K on; beyond 10,000 K, too."""
+    """Planckian locus by Kim's cubic splines from 4000 K, also above 10,000 K."""
     x = np.polyval([-3.0258469e9, 2.1070379e6, 0.2226347e3, 0.240390], 1 / kelvin)
     y = np.polyval([3.0817580, -5.87338670, 3.75112997, -0.37001483], x)
     from_xyz = np.linalg.inv(
@@ -49,7 +49,7 @@ def test_colour_temperatures_are_those_of_black_bodies(kelvin):
 
 
 def test_colour_temperatures_agree_with_usdlux():
-    """With UsdLux's table where that has values, within 0.3 % of the largest channel."""
+    """Agrees with UsdLux's table within 0.3 % of the largest channel."""
     from pxr import UsdLux
 
     for kelvin in range(2000, 10001, 250):
@@ -201,7 +201,7 @@ def test_mesh_lights(tmp_path):
     assert [scene.mesh(name)["mesh_light"] for name in ("Glow", "Alone", "Plain")] == [0, 1, None]
     assert scene.material_of("Alone")["emission"] == (1, 1, 1)
     assert "unknown light:materialSyncMode loud" in said(loaded)
-    # They are light enough for a stage without others.
+    # Mesh lights count as lights, so no default dome is added.
     assert not scene.lights and loaded.report.counts["mesh lights"] == 3
 
 
@@ -238,7 +238,7 @@ def test_linking(tmp_path):
     }
     assert scene.sets[a["shadow_link"]] == {"/": "expand", "/World/Floor": "exclude"}
     assert b["shadow_link"] == a["shadow_link"] and "light_link" not in b
-    assert "light_link" not in c  # includeRoot is true: all is in it anyway
+    assert "light_link" not in c  # includeRoot is true, so all prims are included already
     assert not loaded.report.unsupported
 
 
@@ -281,7 +281,7 @@ def test_links_by_membership_expression(tmp_path):
         "/heroes": "expand",
     }
     assert scene.sets[a["light_link"]] == hero
-    assert "shadow_link" not in a  # it has all prims
+    assert "shadow_link" not in a  # it contains all prims
     assert scene.sets[b["light_link"]] == {**hero, "/Set/Ball": "expand"}
     assert not loaded.report.warnings
 
@@ -319,7 +319,7 @@ def test_predicates_of_expressions(tmp_path, predicate, rules, words):
 
 
 def test_expressions_are_evaluated_at_so_many_prims(tmp_path, monkeypatch):
-    """Instances in instances are billions of prims in a few lines."""
+    """The number of visited prims is limited, since nested instances can be billions."""
     monkeypatch.setattr("wavecomb.usd.stage.collections.MOST_PRIMS", 5)
     scene, loaded = load(tmp_path, _EXPRESSIONS)
     assert "membershipExpression beyond 5 prims (cut there)" in said(loaded)
@@ -409,9 +409,9 @@ def test_default_dome_and_camera_know_what_is_up(tmp_path, up, axis):
     scene, loaded = load(tmp_path, f'#usda 1.0\n(upAxis = "{up}")\ndef Mesh "M" {{ {box} }}')
     assert pole(scene.lights[0])[axis] == 1
     frame = scene.camera["transform"]
-    assert frame[1, axis] > 0.8  # the camera's up
+    assert frame[1, axis] > 0.8  # the camera's up vector
     assert np.linalg.det(frame[:3, :3]) == pytest.approx(1)
-    # All corners are in the picture.
+    # All corners are inside the image.
     points = np.append(scene.mesh("M")["positions"], np.ones((4, 1)), axis=1)
     seen = points @ np.linalg.inv(frame)
     assert (seen[:, 2] < 0).all()
@@ -441,7 +441,7 @@ def test_camera(tmp_path):
     camera = scene.camera
     assert loaded.camera_path == "/Cam"
     assert camera["window"] == pytest.approx((-0.1, 0.3, -0.1, 0.1))
-    # 50 tenths of a unit at f/2: an aperture of 2.5 units across.
+    # 50 tenths of a unit at f/2 give an aperture diameter of 2.5 units.
     assert camera["lens_radius"] == pytest.approx(1.25) and camera["focus_distance"] == 7
     assert (camera["near_clip"], camera["far_clip"]) == (0.5, 100)
     assert camera["transform"][:3, :3] == pytest.approx(np.eye(3))
@@ -508,7 +508,7 @@ def test_variants(tmp_path):
     ("authored", "x"), [("", 3.0), ("startTimeCode = 10\nendTimeCode = 20", 5.0)]
 )
 def test_without_a_frame_or_a_range_the_earliest_samples_count(tmp_path, authored, x):
-    """As usdrecord does; default values would put an animated camera at the origin."""
+    """As in usdrecord. Default values would put an animated camera at the origin."""
     path = tmp_path / "moving.usda"
     path.write_text(
         f"""#usda 1.0

@@ -225,7 +225,7 @@ def test_udim_tiles_are_one_texture(tmp_path):
 
 
 def test_udim_names_start_at_the_layer_that_has_the_value(tmp_path):
-    """A stronger layer may say something else of the attribute."""
+    """A stronger layer may author metadata of the same attribute."""
     folder = tmp_path / "asset"
     folder.mkdir()
     write_image(folder / "a.1001.png", np.full((2, 2, 3), 255, np.uint8), "uint8")
@@ -261,7 +261,7 @@ def test_udim_tiles_lie_side_by_side_in_the_picture(tmp_path):
         double3 xformOp:translate = (0.5, 0.5, 1)
         uniform token[] xformOpOrder = ["xformOp:translate"] }"""
     picture = wavecomb.render(write(tmp_path, text), size=(8, 8), spp=2).beauty
-    # The lower left corner of the texture is 1001; 1012 is missing.
+    # 1001 is at the lower left; 1012 is missing.
     assert picture[6, 1].tolist() == [1, 0, 0] and picture[6, 6].tolist() == [0, 1, 0]
     assert picture[1, 1].tolist() == [0, 0, 1] and picture[1, 6].tolist() == [0.5, 1, 0]
 
@@ -538,7 +538,7 @@ def test_materialx_constants(tmp_path, identifier, inputs, program, expected):
 
 
 def test_materialx_metal_without_specular(tmp_path):
-    """Standard Surface's specular dims the edge of a metal, not the metal."""
+    """The specular weight of Standard Surface affects the edge tint of metal, not the metal."""
     text = surface("float inputs:metalness = 1\nfloat inputs:specular = 0")
     text = text.replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader")
     scene, _ = load(tmp_path, text)
@@ -557,7 +557,7 @@ def test_brushed_metal_has_a_direction_without_a_texture(tmp_path, anisotropy, b
 
 
 def test_materialx_layers(tmp_path):
-    """Standard Surface as its published translation to OpenPBR has it, and what has no effect."""
+    """Standard Surface inputs as in its published translation to OpenPBR; others are reported."""
     text = surface(
         """float inputs:sheen = 0.5
         float inputs:thin_film_thickness = 300
@@ -635,7 +635,7 @@ def test_alpha_of_two_channels_is_the_second_and_tints_stay(tmp_path):
         ),
     )
     uses = scene.material_of("M")["textures"]
-    # The core gives (first, first, first, second): docs of TextureDesc.
+    # One channel is stored for rgb and a second for alpha (see TextureDesc).
     assert uses["opacity"]["channel"] == "a" and uses["base_color"]["channel"] == "rgb"
     assert uses["base_color"]["scale"] == (1, 0.5, 0, 1)
 
@@ -742,14 +742,14 @@ def test_files_with_the_same_bytes_are_one_texture(tmp_path):
     )
     uses = scene.material_of("M")["textures"]
     images = [one for one in scene.textures if one["pixels"].dtype == np.uint8]
-    assert len(images) == 1  # beside the soft dome
+    assert len(images) == 1  # without the default dome
     assert uses["base_color"]["texture"] == uses["emission"]["texture"] == 0
 
 
 @pytest.mark.parametrize(
     ("space", "stored", "linear"),
     [
-        # From the primaries of each space, by the published matrices to Rec.709 (D65).
+        # Computed from the primaries of each space with the published matrices to Rec.709 (D65).
         ("acescg", (255, 0, 0), (1.70505, -0.13026, -0.02400)),
         ("lin_p3d65_scene", (255, 0, 0), (1.22494, -0.04206, -0.01964)),
         ("g22_rec709_scene", (128, 255, 0), ((128 / 255) ** 2.2, 1, 0)),

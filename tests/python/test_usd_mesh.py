@@ -111,7 +111,7 @@ def test_orientation_and_mirrors_turn_triangles(tmp_path):
     )
     assert normal_of(scene.mesh("Right"))[2] == pytest.approx(1)
     assert normal_of(scene.mesh("Left"))[2] == pytest.approx(-1)
-    # What is outside stays outside: +z is not mirrored.
+    # The orientation is kept: +z is not mirrored.
     assert normal_of(scene.mesh("Mirror"))[2] == pytest.approx(1)
     assert normal_of(scene.mesh("Stretch"))[2] == pytest.approx(2)
 
@@ -319,7 +319,7 @@ def test_sharp_creases_split_normals(tmp_path):
     on_top = flat[:, 2] > 0
     assert mesh["normals"][on_top] == pytest.approx(np.tile([0, 0, 1], (2, 3, 1)))
     sides = mesh["normals"][np.abs(flat[:, 2]) < 1e-6]
-    assert np.abs(sides[..., 0]).min() > 0.3  # still round about the upright edges
+    assert np.abs(sides[..., 0]).min() > 0.3  # still rounded about the upright edges
 
 
 def test_bilinear_and_none_are_flat(tmp_path):

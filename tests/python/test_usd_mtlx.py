@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX files that stages name: what they compose to, and what is said of broken ones."""
+"""MaterialX files in stages: composition, and messages about broken files."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def write(folder: Path, name: str, text: str) -> Path:
 
 
 def value(stage: Usd.Stage, path: str, name: str) -> object:
-    """What an input of the surface shader of a material comes to."""
+    """Returns the value of an input of a material's surface shader."""
     shader = UsdShade.Material(stage.GetPrimAtPath(path)).ComputeSurfaceSource("mtlx")[0]
     assert shader, path
     found = UsdShade.Utils.GetValueProducingAttributes(shader.GetInput(name))
@@ -112,7 +112,7 @@ def test_variants_and_opinions_above(folder: Path) -> None:
 
 
 def test_variants_that_are_not_selected(folder: Path) -> None:
-    """The window changes variants on a stage whose layers nobody may change any more."""
+    """The window changes variants of a stage whose layers are locked."""
     stage = open_stage(folder / "stage.usda")
     mtlx.resolve(stage, everywhere=True)
     stage.SetEditTarget(stage.GetSessionLayer())
@@ -262,7 +262,7 @@ def test_graphs_and_includes(tmp_path: Path) -> None:
     assert source(f"{top}/NG/mul", "in2") == f"{top}/NG.inputs:amount"
     assert source(f"{top}/S", "emission_color") == f"{top}/NodeGraphs/custom/sum.outputs:out"
     assert source(f"{top}/NodeGraphs/custom/sum", "in1") == f"{top}/NodeGraphs/loose.outputs:out"
-    # A node of the document's own is the graph that defines it.
+    # A node definition of the document becomes the graph that implements it.
     assert stage.GetPrimAtPath("/MaterialX/NodeGraphs/ND_twice").GetTypeName() == "NodeGraph"
     image = UsdShade.Shader(stage.GetPrimAtPath(f"{top}/NG/img"))
     assert image.GetShaderId() == "ND_image_color3"
@@ -360,7 +360,7 @@ def test_damaged_files_never_crash(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["basic", "basicTextured"])
 def test_as_openusd_reads_it(name: str) -> None:
-    """Interfaces and graphs of materials, and what they come to, against OpenUSD's own reading."""
+    """Interfaces, graphs and values of materials equal those of OpenUSD's plug-in."""
     folder = "usd/wg_test_assets/MaterialXTest"
     ours = open_stage(asset(f"{folder}/{name}.usda"))
     theirs = Usd.Stage.Open(str(asset(f"{folder}/{name}_flatten.usda")))
@@ -369,7 +369,7 @@ def test_as_openusd_reads_it(name: str) -> None:
         top = theirs.GetPrimAtPath(f"/MaterialX/{scope}")
         for prim in Usd.PrimRange(top) if top else ():
             if prim.GetName().startswith("ND_"):
-                continue  # named by its definition then, and by its node since
+                continue  # OpenUSD names it by its definition, Wavecomb by its node
             for attribute in prim.GetAttributes():
                 other = ours.GetAttributeAtPath(attribute.GetPath())
                 assert other and other.GetTypeName() == attribute.GetTypeName(), attribute
@@ -383,7 +383,7 @@ def test_as_openusd_reads_it(name: str) -> None:
 
 
 def test_materialx_counts_before_the_preview(tmp_path: Path) -> None:
-    """A material in both forms, and no word of inputs that an interface connects to nothing."""
+    """A material with both networks uses MaterialX, without a message about unconnected inputs."""
     write(tmp_path, "gold.mtlx", GOLD)
     file = write(
         tmp_path,

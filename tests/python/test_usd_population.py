@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a stage is drawn: masks, session layers, purposes, payloads, what is inactive."""
+"""Population of a stage: masks, session layers, purposes, payloads, inactive prims."""
 
 import json
 from pathlib import Path
@@ -44,7 +44,7 @@ def Scope "Rig" {{
 
 
 def drawn(scene):
-    """Names of the meshes that are seen, each as often as it is."""
+    """Returns the names of the visible meshes, once per instance."""
     return sorted(mesh["name"].rsplit("/", 1)[1] for mesh, _, _ in scene.world_meshes())
 
 
@@ -173,7 +173,7 @@ def test_the_command_takes_masks_and_session_layers(tmp_path):
 
 
 def test_what_is_drawn_at_all(tmp_path):
-    """Payloads are; what is inactive, abstract or undefined is not, nor purposes not chosen."""
+    """Payloads are drawn. Inactive, abstract and undefined prims, and other purposes, are not."""
     (tmp_path / "load.usda").write_text(
         f'#usda 1.0\n(defaultPrim = "P")\ndef Xform "P" {{\n def Mesh "Paid" {{ {QUAD} }}\n}}\n'
     )
@@ -256,7 +256,7 @@ def test_bad_payloads_are_named(tmp_path, payloads, says):
 
 @pytest.mark.parametrize("units", [0.01, 1.0])
 def test_units_change_nothing(tmp_path: Path, units):
-    """Lengths are in the stage's units, whatever those are."""
+    """Lengths are in the units of the stage, whatever these are."""
     text = f"""#usda 1.0
 (metersPerUnit = {units})
 def Mesh "M" {{ {QUAD} }}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bad input ends in one clear line, never a crash and never a silent wrong picture."""
+"""Bad input ends in one clear line, never in a crash or in a silently wrong image."""
 
 import subprocess
 import sys
@@ -124,7 +124,7 @@ BIND = '(prepend apiSchemas = ["MaterialBindingAPI"])'
 @pytest.mark.parametrize(
     "network",
     [
-        # A shader that feeds itself, a ring of node graphs, and connections to nothing.
+        # A shader connected to itself, a cycle of node graphs, and connections to nothing.
         """def Shader "S" { uniform token info:id = "UsdPreviewSurface"
            float inputs:roughness.connect = </Mat/T.outputs:r>; token outputs:surface }
            def Shader "T" { uniform token info:id = "UsdUVTexture"
@@ -315,7 +315,7 @@ def test_more_instances_than_memory_holds(tmp_path):
 
 
 def test_material_networks_with_endless_ways(tmp_path):
-    """Every node takes the next one twice: 2^30 ways."""
+    """Every node uses the next one twice: 2^30 paths."""
     nodes = "".join(
         f'def Shader "N{i}" {{ uniform token info:id = "ND_multiply_color3"\n'
         f"color3f inputs:in1.connect = </Mat/N{i + 1}.outputs:out>\n"
@@ -382,7 +382,7 @@ def test_bad_cameras_and_lights(tmp_path):
 @needs_asset("usd/Teapot/Teapot.usd")
 @pytest.mark.parametrize("step", [7, pytest.param(1, marks=pytest.mark.long)])
 def test_every_asset_loads(capfd, step):
-    """Or each seventh of them."""
+    """Every test asset, or every seventh."""
     stages = [p for p in sorted((ASSETS / "usd").rglob("*.usd*")) if p.is_file()][::step]
     assert stages
     refused = []
@@ -394,7 +394,7 @@ def test_every_asset_loads(capfd, step):
             assert "cannot be read as USD" in str(error)
         else:
             assert loaded.scene.camera is not None and loaded.report.as_dict()
-    # USD itself refuses a few on purpose.
+    # A few assets are invalid on purpose, and USD refuses them.
     assert len(refused) <= 8, refused
     out, err = capfd.readouterr()
     assert out == "" and err == ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Implicit shapes against closed forms: area, volume, normals, coordinates, extent."""
+"""Implicit shapes against closed forms: area, volume, normals, texture coordinates, extent."""
 
 import math
 
@@ -11,7 +11,7 @@ PI = math.pi
 
 
 def frustum(r, s, h):
-    """Side area and volume of a truncated cone."""
+    """Returns side area and volume of a truncated cone."""
     return PI * (r + s) * math.hypot(h, r - s), PI * h * (r * r + r * s + s * s) / 3
 
 
@@ -25,7 +25,7 @@ def capsule(r, s, h):
     return area + 2 * PI * (r * r + s * s), volume + 2 * PI * (r**3 + s**3) / 3
 
 
-# prim, its attributes, area, volume, extent
+# prim, attributes, area, volume, extent
 SHAPES = [
     ("Sphere", "", 4 * PI, 4 * PI / 3, (1, 1, 1)),
     ("Sphere", "double radius = 3", 36 * PI, 36 * PI, (3, 3, 3)),
@@ -62,7 +62,7 @@ def corners(mesh, name):
 
 
 def measure(mesh):
-    """Area, enclosed volume, and unit normals (m, 3) of the triangles."""
+    """Returns area, enclosed volume, and unit normals (m, 3) of the triangles."""
     a, b, c = corners(mesh, "positions").transpose(1, 0, 2)
     cross = np.cross(b - a, c - a)
     length = np.linalg.norm(cross, axis=1)
@@ -78,7 +78,7 @@ def test_closed_forms(tmp_path, prim, body, area, volume, extent, hand):
     mesh = scene.mesh("S")
     outside = 1 if hand == "rightHanded" else -1
     got_area, got_volume, faces = measure(mesh)
-    # 64 segments round an axis: an area less by 0.16 %, a sphere's volume by 0.3 %.
+    # 64 segments about the axis lose 0.16 % of the area, and 0.3 % of a sphere's volume.
     assert area * 0.995 < got_area <= area * 1.000001
     assert volume * 0.995 - 1e-6 <= outside * got_volume <= volume * 1.000001
     if extent is not None:
@@ -86,14 +86,14 @@ def test_closed_forms(tmp_path, prim, body, area, volume, extent, hand):
         assert np.allclose(mesh["positions"].min(axis=0), -np.array(extent), rtol=2e-3, atol=1e-6)
     normals = corners(mesh, "normals")
     assert np.allclose(np.linalg.norm(mesh["normals"], axis=1), 1, atol=1e-5)
-    # Normals lean away from a triangle's own by no more than half a segment each way.
+    # A shading normal differs from its triangle's normal by at most half a segment.
     assert (np.einsum("ijk,ik->ij", normals, faces) > 0.99).all()
     assert mesh["uvs"].min() >= 0 and mesh["uvs"].max() <= 1
     assert np.allclose(np.ptp(mesh["uvs"], axis=0), 1)
 
 
 def test_normals_are_exact(tmp_path):
-    """Of the surface that is meant, not of the triangles."""
+    """The normals are those of the ideal surface, not of the triangles."""
     scene, _ = load(
         tmp_path,
         'def Sphere "S" { double radius = 3 }'
@@ -116,7 +116,7 @@ def test_planes_face_their_axis(tmp_path):
 
 
 def test_coordinates_go_round_and_up(tmp_path):
-    """u counter-clockwise about the axis as seen from its tip, v along it."""
+    """u is counter-clockwise about the axis as seen from its tip, v is along the axis."""
     scene, _ = load(tmp_path, 'def Sphere "S" {}')
     mesh = scene.mesh("S")
     x, y, z = mesh["positions"].T

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""NURBS, Hermite curves and tetrahedra: by formulas of their own, and what is said of others."""
+"""NURBS, Hermite curves and tetrahedra against separate formulas, and unsupported cases."""
 
 from itertools import pairwise
 
@@ -13,7 +13,7 @@ ROUND = [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
 
 
 def listed(values):
-    """Numbers or tuples of them as USD writes them."""
+    """Returns numbers or tuples in USD's text syntax."""
     return (
         "["
         + ", ".join(
@@ -25,7 +25,7 @@ def listed(values):
 
 
 def cox_de_boor(i, order, t, knots):
-    """Basis function by its definition; t is no knot."""
+    """Evaluates a B-spline basis function by its definition. t is not a knot."""
     if order == 1:
         return float(knots[i] <= t < knots[i + 1])
     total = 0.0
@@ -38,7 +38,7 @@ def cox_de_boor(i, order, t, knots):
 
 
 def on_segments(mesh, u):
-    """Points of all Bezier segments at u."""
+    """Evaluates all Bezier segments at u."""
     first = mesh["segments"] & 0x3FFFFFFF
     a, b, c, d = (mesh["positions"][first + k].astype(float) for k in range(4))
     v = 1 - u
@@ -61,7 +61,7 @@ def test_polynomial_nurbs_curves_are_exact(tmp_path, order):
     points = rng.random((count, 3))
     knots = np.sort(rng.random(count + order))
     if order > 2:
-        knots[order + 1] = knots[order + 2]  # one piece is empty
+        knots[order + 1] = knots[order + 2]  # one empty segment
     scene, loaded = load(tmp_path, nurbs(points, knots, order))
     mesh = scene.mesh("C")
     assert not loaded.report.warnings and mesh["kind"] == "cubic-tube"
@@ -121,7 +121,7 @@ def test_hermite_curves_follow_their_tangents(tmp_path):
 
 
 def sphere(more="", points=None):
-    """A half circle, v from pole to pole, turned about z by u."""
+    """Returns a half circle, v from pole to pole, rotated about z by u."""
     arc = [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1)]
     if points is None:
         points = [(r * x, r * y, z) for r, z in arc for x, y in CIRCLE]

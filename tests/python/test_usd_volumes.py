@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdVol volumes: fields, files, looks, places, and what cannot be read."""
+"""UsdVol volumes: fields, files, materials, transforms, invalid input."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_a_volume_without_a_material(tmp_path: Path) -> None:
     assert (found["density"]["values"] == 0.5).all()
     assert np.allclose(found["density"]["matrix"], np.diag([0.25, 0.25, 0.25, 1]))
     assert found["to_world"][3, :3].tolist() == [1, 2, 3]
-    # No camera and no light: the volume is framed, and lit by a soft dome.
+    # Without camera and light, the volume is framed and lit by a default dome.
     assert scene.camera is not None and scene.lights[0]["kind"] == "dome"
     assert "not supported" not in report and "nothing to draw" not in report
 
@@ -244,7 +244,7 @@ def test_modes_of_emission(
     found, scene, _ = the_volume(tmp_path, text)
     assert found["emission"] == pytest.approx(emission)
     assert (found["glow"] is not None) == has_grid
-    assert bool(scene.lights) == (mode == "none")  # else it lights itself
+    assert bool(scene.lights) == (mode == "none")  # an emissive volume counts as a light
 
 
 CLOSURE = """uniform token info:id = "ND_volume"
@@ -344,7 +344,7 @@ def test_black_bodies() -> None:
     assert light[1, 0] > 2 * light[1, 1] and light[1, 2] == 0
 
 
-# What cannot be read
+# Errors
 
 
 @with_vdb

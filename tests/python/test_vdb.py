@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plug-in that reads .vdb files: values, tiles, names, and what is broken."""
+"""The plug-in that reads .vdb files: values, tiles, names, broken files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EDGE = vdb.BRICK
 
 
 def noise(count: int, channels: int = 1, dtype: type = np.float32, seed: int = 1) -> dict[str, Any]:
-    """Bricks here and there, of values that are not 0."""
+    """Returns bricks at random positions with nonzero values."""
     rng = np.random.default_rng(seed)
     cells = rng.choice(40**3, count, replace=False)
     origins = (np.stack(np.unravel_index(cells, (40,) * 3), 1) - 20) * EDGE
@@ -106,7 +106,7 @@ def test_bricks_of_zeros_may_be_left_out(tmp_path: Path) -> None:
 
 
 def test_tiles_come_as_bricks(tmp_path: Path) -> None:
-    """A block of 16^3 equal bricks is one tile, another one is a tile of 8^3 by itself."""
+    """16^3 equal bricks are one tile, and a single brick is a tile of 8^3 voxels."""
     path = tmp_path / "a.vdb"
     cells = np.stack(np.meshgrid(*[np.arange(16)] * 3, indexing="ij"), -1).reshape(-1, 3)
     origins = np.concatenate([cells - 16, [[3, 3, 3]]]).astype(np.int32) * EDGE
@@ -128,7 +128,7 @@ def test_tiles_come_as_bricks(tmp_path: Path) -> None:
 
 
 def test_tiles_of_all_sizes(tmp_path: Path) -> None:
-    """Of 4096, 128 and 8 voxels a side; a brick in a tile leaves the rest of it as it is."""
+    """Tiles of 4096, 128 and 8 voxels per side. A brick inside a tile does not affect the rest."""
     path = tmp_path / "a.vdb"
     made = noise(1)
     made["origins"][:] = (4096 + 128, 0, 0)
@@ -178,14 +178,14 @@ def test_writing_needs_no_openvdb(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("kind", ["int32", "bool", "vec3i"])
 def test_a_type_that_is_not_read_is_named(tmp_path: Path, kind: str) -> None:
-    """Grids of other types are in the table, and reading one is a line that names its type."""
+    """The table lists grids of other types. Reading one gives an error with its type."""
     path = tmp_path / "a.vdb"
     vdb.write(path, [{"name": "d", **noise(1)}])
     data = path.read_bytes()
     word = b"Tree_float_5_4_3"
     other = f"Tree_{kind}_5_4_3".encode()
     at = data.index(word)
-    # The row of the table becomes longer or shorter, and all places behind it move.
+    # The table entry changes its length, so all offsets after it change.
     moved = len(other) - len(word)
     row = at + len(word) + 4
     places = struct.pack("<qqq", *(p + moved for p in struct.unpack_from("<qqq", data, row)))
@@ -224,7 +224,7 @@ def test_one_scheduler_of_threads(tmp_path: Path) -> None:
     assert done.stdout.strip() == "1"
 
 
-# What is broken
+# Broken files
 
 
 @pytest.mark.parametrize("keep", [0, 3, 8, 20, 60, 300, 0.5, 0.99])
@@ -270,7 +270,7 @@ def test_more_than_there_is_room_for_is_one_line(
 
 
 def huge(path: Path) -> None:
-    """A thousand million voxels, as some tiles."""
+    """Writes a billion voxels as a few tiles."""
     made = noise(1)
     made["boxes"] = [((0, 0, 0), (1023, 1023, 1023), 0.5)]
     vdb.write(path, [{"name": "density", **made}])
@@ -291,7 +291,7 @@ def test_a_thousand_million_voxels_are_one_line(
 
 @pytest.mark.slow
 def test_the_memory_limit_holds(tmp_path: Path) -> None:
-    """In the process that reads, whose limit the command sets."""
+    """The command sets the limit of the process that reads the file."""
     huge(tmp_path / "a.vdb")
     stage = tmp_path / "s.usda"
     stage.write_text(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which rays see what, holdouts and alpha."""
+"""Visibility by kind of ray, holdouts and alpha."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_a_holdout_is_a_hole(plain: wavecomb.Picture, tmp_path: Path) -> None:
     hole, rest = ball == 1, ball == 0
     assert hole.any() and (held.aovs["alpha"][hole] == 0).all() and not held.beauty[hole].any()
     assert np.isinf(held.depth[hole]).all()
-    # Shadows and light from it on all else are as they were, to the bit.
+    # Its shadows and its light on other objects stay equal bit for bit.
     np.testing.assert_array_equal(held.beauty[rest], plain.beauty[rest])
     by_stage = _render(tmp_path, "bool primvars:arnold:matte = 1")
     assert by_stage.beauty.tobytes() == held.beauty.tobytes()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes of the core, as SceneBuilder takes them: closed forms, checks."""
+"""Volumes of the core, added by SceneBuilder: closed forms, checks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SIZE = 24
 
 
 def grid_of(voxels: Any, lo: float, hi: float) -> Any:
-    """The voxels of a cube between lo and hi along each axis."""
+    """Returns the voxels of a cube between lo and hi along each axis."""
     step = (hi - lo) / (voxels.shape[0] - 1)
     place = np.diag([step, step, step, 1.0])
     place[3, :3] = lo
@@ -26,7 +26,7 @@ def grid_of(voxels: Any, lo: float, hi: float) -> Any:
 
 
 def picture(builder: Any, *, spp: int, depth: int = 1) -> Any:
-    """Mean colour of a small picture along -z from (0, 0, 4) before a wall of radiance 1 at -2."""
+    """Returns the mean colour along -z from (0, 0, 4), before a wall of radiance 1 at -2."""
     wall = builder.add_material("emissive", emission=(1.0, 1.0, 1.0))
     corners = np.array([[-9, -9, -2], [9, -9, -2], [9, 9, -2], [-9, 9, -2]], np.float32)
     mesh = builder.add_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), material=wall)
@@ -42,7 +42,7 @@ def picture(builder: Any, *, spp: int, depth: int = 1) -> Any:
 
 
 def test_an_absorbing_box_lets_through_the_exponential() -> None:
-    """exp(-sigma x) for each channel, within 0.1 % and the noise of the mean."""
+    """The transmittance is exp(-sigma x) for each channel, within 0.1 % and the measured noise."""
     builder = _core.SceneBuilder()
     builder.add_volume(
         IDENTITY, bounds=((-1, -1, -0.5), (1, 1, 0.5)), extinction=(0.2, 0.7, 1.4), albedo=(0, 0, 0)
@@ -56,7 +56,7 @@ def test_an_absorbing_box_lets_through_the_exponential() -> None:
 
 @pytest.mark.parametrize("kind", [np.float32, np.float16])
 def test_a_grid_that_grows_along_the_ray(kind: Any) -> None:
-    """Density 2 z on voxels between 0 and 1, and down to nothing within one voxel: exp(-depth)."""
+    """The density is 2 z between 0 and 1, and falls to 0 within a voxel: exp(-optical depth)."""
     voxels = np.zeros((16, 16, 16), kind)
     voxels[:] = np.linspace(0.0, 2.0, 16).astype(kind)
     builder = _core.SceneBuilder()
@@ -70,7 +70,7 @@ def test_a_grid_that_grows_along_the_ray(kind: Any) -> None:
 
 
 def test_emission_and_absorption() -> None:
-    """eps / sigma (1 - exp(-sigma x)) beside exp(-sigma x) of the wall."""
+    """eps / sigma (1 - exp(-sigma x)) in addition to exp(-sigma x) of the wall."""
     builder = _core.SceneBuilder()
     builder.add_volume(
         IDENTITY,
@@ -88,7 +88,7 @@ def test_emission_and_absorption() -> None:
 
 
 def h_function(albedo: float, mu: float) -> float:
-    """Chandrasekhar's H of isotropic scattering (Radiative Transfer, 1950, chapter V)."""
+    """Chandrasekhar's H for isotropic scattering (Radiative Transfer, 1950, chapter V)."""
     nodes, weights = leggauss(64)
     x, w = 0.5 * (nodes + 1), 0.5 * weights
 
@@ -103,7 +103,7 @@ def h_function(albedo: float, mu: float) -> float:
 
 
 def test_an_isotropic_half_space() -> None:
-    """Under even light it sends 1 - sqrt(1 - a) H(1) straight up: within 0.1 % and the noise."""
+    """Under uniform light, the radiance at normal exit is 1 - sqrt(1 - a) H(1), within 0.1 %."""
     albedos = (0.3, 0.6, 0.9)
     builder = _core.SceneBuilder()
     builder.add_volume(
@@ -126,7 +126,7 @@ def test_an_isotropic_half_space() -> None:
 
 
 def test_one_picture_whatever_renders_it() -> None:
-    """Integrators, lanes, threads, waves, regions and guiding change no bit."""
+    """Integrators, lanes, threads, waves, regions and guiding give the same bits."""
     rng = np.random.default_rng(7)
     voxels = np.where(rng.random((16, 16, 16)) < 0.5, 0.0, rng.random((16, 16, 16))) * 4.0
     builder = _core.SceneBuilder()
@@ -162,7 +162,7 @@ def test_one_picture_whatever_renders_it() -> None:
 
 
 def test_bad_volumes_are_named() -> None:
-    """One line each, which names the volume or the grid."""
+    """One line that names the volume or the grid."""
     builder = _core.SceneBuilder()
     box = ((-1, -1, -1), (1, 1, 1))
     for bad in (
@@ -187,7 +187,7 @@ def test_bad_volumes_are_named() -> None:
 
 
 def test_volumes_are_in_the_fingerprint() -> None:
-    """Another density is another scene."""
+    """Another density changes the fingerprint of the scene."""
 
     def scene(value: float) -> Any:
         builder = _core.SceneBuilder()

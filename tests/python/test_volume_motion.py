@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity blur of volumes: closed forms, one picture, stages."""
+"""Motion blur of volumes by velocity fields: closed forms, schedules, stages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SPEED = np.array([0.6, 0.0, 0.0])
 
 
 def grid_of(voxels: Any, low: Any, high: Any, **more: Any) -> Any:
-    """Voxels between two corners."""
+    """Returns voxels between two corners."""
     low, high = np.array(low, float), np.array(high, float)
     place = np.diag([*((high - low) / (np.array(voxels.shape[:3]) - 1)), 1.0])
     place[3, :3] = low
@@ -31,13 +31,13 @@ def grid_of(voxels: Any, low: Any, high: Any, **more: Any) -> Any:
 
 
 def wind(speed: Any = SPEED) -> Any:
-    """The same velocity everywhere."""
+    """Returns a constant velocity field."""
     values = np.broadcast_to(np.float32(speed), (8, 8, 8, 3)).copy()
     return grid_of(values, (-4, -4, -4), (4, 4, 4), is_signed=True)
 
 
 def picture(builder: Any, spp: int, **more: Any) -> Any:
-    """Seen along -z before a wall of radiance 1, orthographically."""
+    """Renders along -z before a wall of radiance 1, with an orthographic camera."""
     wall = builder.add_material("emissive", emission=(1.0, 1.0, 1.0))
     corners = np.array([[-9, -9, -2], [9, -9, -2], [9, 9, -2], [-9, 9, -2]], np.float32)
     mesh = builder.add_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), material=wall)
@@ -52,8 +52,10 @@ def picture(builder: Any, spp: int, **more: Any) -> Any:
 
 
 def seen_through_a_slab(x: Any, seconds: tuple[float, float], sigma: float, edge: float) -> Any:
-    """Mean over the shutter of exp(-sigma d(x - v t) L), d a slab of [-edge, edge] whose sides fall
-    to 0 over the voxel beyond it."""
+    """Returns the mean of exp(-sigma d(x - v t) L) over the shutter.
+
+    d is the density of a slab [-edge, edge], which falls linearly to 0 within a voxel.
+    """
     voxel = 2 * edge / 15
     times = np.linspace(*seconds, 801)
     at = np.abs(np.asarray(x)[..., None] - SPEED[0] * times)
@@ -64,7 +66,7 @@ def seen_through_a_slab(x: Any, seconds: tuple[float, float], sigma: float, edge
 
 @pytest.mark.parametrize("kind", [np.float32, np.float16])
 def test_the_opacity_of_a_slab_that_moves_evenly(kind: Any) -> None:
-    """By columns of the picture, and beyond where the grid itself is."""
+    """Compares columns of the image, also outside of the grid's bounds at the frame."""
     builder = _core.SceneBuilder()
     edge, sigma, seconds = 0.3, 2.0, (-0.5, 1.0)
     place = np.eye(4)
@@ -81,12 +83,12 @@ def test_the_opacity_of_a_slab_that_moves_evenly(kind: Any) -> None:
     error = rows.std(axis=0, ddof=1) / np.sqrt(len(rows)) + 1e-3
     assert np.all(np.abs(rows.mean(axis=0) - exact) < 5 * error)
     assert abs(rows.mean() - exact.mean()) < 2e-3
-    # It has been seen where it never is at the frame.
+    # The slab is visible where it is never at the frame time.
     assert exact[-4] < 0.95 and rows.mean(axis=0)[-4] < 0.96
 
 
 def test_light_moves_with_it() -> None:
-    """Emission alone: what a picture sums up is what it was, at the place that it has come to."""
+    """For emission alone, the image contains the total emission at the moved position."""
     ends = []
     for seconds in ((0.0, 0.0), (0.5, 0.5)):
         builder = _core.SceneBuilder()
@@ -106,7 +108,7 @@ def test_light_moves_with_it() -> None:
 
 
 def swirl() -> Any:
-    """Smoke whose density, colour and light move by velocities that differ."""
+    """Returns smoke whose density, colour and emission move by different velocities."""
     rng = np.random.default_rng(5)
     density = np.where(rng.random((16, 16, 16)) < 0.5, 0.0, rng.random((16, 16, 16)) * 6.0)
     builder = _core.SceneBuilder()
@@ -148,7 +150,7 @@ def test_one_picture_whatever_renders_it() -> None:
 
 
 def test_a_render_goes_on_bit_for_bit() -> None:
-    """Passes, and adaptive sampling, give what they give of what stands still."""
+    """Resumed passes and adaptive sampling work as without motion."""
     scene = swirl()
     once = wavecomb.render(scene, size=(16, 12), spp=16)
     parts = wavecomb.render(scene, size=(16, 12), spp=16, progressive=True)

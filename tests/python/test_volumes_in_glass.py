@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes inside of glass: closed forms, schedules."""
+"""Volumes inside glass: closed forms, schedules."""
 
 from __future__ import annotations
 
@@ -20,14 +20,16 @@ DENSE = np.array([0.4, 0.8, 1.2])
 
 
 def smoke(builder: Any, low: float, high: float, **more: Any) -> None:
-    """An even volume across the picture."""
+    """Adds a homogeneous volume across the image."""
     builder.add_volume(np.eye(4), bounds=((-3, -3, low), (3, 3, high)), **more)
 
 
 @pytest.mark.parametrize("layers", [{}, absorbing(SIGMA), {"nested_priority": 1.0}], ids=str)
 def test_smoke_in_glass_dims_what_passes(layers: Any) -> None:
-    """A slab of glass with smoke inside, of which a ray that passes once leaves a: seen through it
-    is (1 - R)^2 a / (1 - R^2 a^2) of what is below (Stokes 1862)."""
+    """A glass slab with smoke of transmittance a transmits (1 - R)^2 a / (1 - R^2 a^2).
+
+    Stokes 1862.
+    """
     builder = wavecomb.SceneBuilder()
     ior = 1.5
     slab(builder, -2.0, 0.0, filled(builder, ior, **layers))
@@ -43,8 +45,10 @@ def test_smoke_in_glass_dims_what_passes(layers: Any) -> None:
 
 
 def test_glass_dims_all_of_a_way_that_smoke_bends() -> None:
-    """White smoke that scatters straight on, in a block whose surface hardly does anything: of the
-    whole length in it exp(-sigma) is left, however many times light was scattered."""
+    """Absorption of glass applies to the whole path of light that smoke inside scatters.
+
+    The smoke is white and scatters forwards only, and the surface hardly reflects or refracts.
+    """
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, 0.0, filled(builder, 1.001, **absorbing(SIGMA)))
     smoke(builder, -1.9, -0.1, extinction=(1.5,) * 3, albedo=(1, 1, 1), anisotropy=0.9995)
@@ -56,7 +60,7 @@ def test_glass_dims_all_of_a_way_that_smoke_bends() -> None:
 
 
 def smoke_in_a_ball(**layers: Any) -> Any:
-    """White smoke in a ball of clear glass under a white sky."""
+    """Returns white smoke in a ball of clear glass under a white sky."""
     builder = wavecomb.SceneBuilder()
     mesh = ball(1.0, 16)
     number = builder.add_mesh(

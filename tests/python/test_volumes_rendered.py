@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes from file to picture: through the sandbox, and beside Arnold's."""
+"""Volumes from file to image: in the sandbox, and compared with Arnold."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def Camera "Cam" {
 
 
 def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
-    """exp(-sigma d s): a density of 1.5 over 8 voxels, which tapers off at either end."""
+    """exp(-sigma d s), with a density of 1.5 over 8 voxels that falls to 0 at both ends."""
     values = np.full((16, 8, 8, 8), 1.5, np.float16)
     cells = [[x, y, 0] for x in range(-2, 2) for y in range(-2, 2)]
     bricks = {"origins": np.array(cells, np.int32) * 8, "values": values}
@@ -63,7 +63,7 @@ def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
     assert loaded.volumes[0].grids[0].value == "half"
     image = wavecomb.render(loaded, size=(16, 16), spp=256).beauty
     found = image.reshape(-1, image.shape[-1])[:, :3].mean(axis=0)
-    # Seven steps between eight voxels, and at either end one that goes down to 0 evenly.
+    # Seven full steps between eight voxels, and at both ends a linear fall to 0.
     depth = 0.5 * 1.5 * 0.25 * (7 + 2 * 0.5)
     wanted = np.exp(-depth * -np.log([0.5, 0.25, 0.125]) / 2)
     assert found == pytest.approx(wanted, abs=0.01)
@@ -75,7 +75,7 @@ VIEW = (
     (-0.397505939, 0.244264171, 0.884490848, 0.0), (-63.5111198, 138.246094, 375.207275, 1.0),
 )  # fmt: skip
 FIELD_OF_VIEW = 54.4322243
-"""Of its test.ass, and so is the view; the sky of radiance 1 is not seen there."""
+"""Field of view of its test.ass, as is the camera. The sky of radiance 1 is hidden there."""
 
 
 def smoke_of_arnold(folder: Path, scatter: float) -> Any:
@@ -97,7 +97,7 @@ def Camera "Cam" {{
     float verticalAperture = {0.75 * wide}
 }}
 """)
-    # Arnold's default: light that was scattered once.
+    # Arnold's default is single scattering.
     picture = wavecomb.render(path, size=(160, 120), spp=16, max_depth=1)
     return picture.beauty[..., 0].astype(np.float64)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light that walks below surfaces: colours of flat walls, closed forms, furnaces, schedules."""
+"""Subsurface random walks: colours of flat walls, closed forms, furnaces, schedules."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FACES = np.array(
 
 
 def box(builder: Any, low: Any, high: Any, material: int, name: str = "") -> None:
-    """A closed box."""
+    """Adds a closed box."""
     ends = np.array([low, high], np.float32)
     corners = [[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
     mesh = builder.add_mesh(np.array(corners, np.float32), FACES, material=material, name=name)
@@ -31,13 +31,13 @@ def box(builder: Any, low: Any, high: Any, material: int, name: str = "") -> Non
 
 
 def skin(builder: Any, **values: Any) -> int:
-    """A material below whose surface all light walks."""
+    """Returns a material with subsurface weight 1 that all light enters."""
     layers = {"subsurface_weight": 1.0, "specular_weight": 0.0, "subsurface_radius": (1, 1, 1)}
     return int(builder.add_material("openpbr", openpbr={**layers, **values}))
 
 
 def slab(depth: float, spp: int = 64, size: int = 24, **values: Any) -> Any:
-    """A wide slab under even light of radiance 1 from everywhere, seen from above: its pixels."""
+    """Returns the pixels of a wide slab seen from above, under uniform light of radiance 1."""
     builder = wavecomb.SceneBuilder()
     half = 400.0
     box(builder, (-half, -half, -depth), (half, half, 0.0), skin(builder, **values))
@@ -64,10 +64,10 @@ def chandrasekhar(albedo: float) -> float:
 
 
 def color_of(albedo: float, anisotropy: float, n: int = 20) -> float:
-    """Spherical albedo of a half-space: adding and doubling of layers (van de Hulst 1980).
+    """Spherical albedo of a half-space, by adding and doubling of layers (van de Hulst 1980).
 
-    Intensities at the Gaussian cosines, averaged over azimuths; the phase function of Henyey and
-    Greenstein by Legendre polynomials.
+    Uses intensities at Gaussian cosines, averaged over azimuths, and the Henyey-Greenstein phase
+    function as a Legendre series.
     """
     nodes, weights = leggauss(n)
     mu, w = 0.5 * (nodes + 1), 0.5 * weights
@@ -85,7 +85,7 @@ def color_of(albedo: float, anisotropy: float, n: int = 20) -> float:
 
 
 def test_a_half_space_is_chandrasekhars() -> None:
-    """Within 0.5 % and noise, by channel: light that arrives evenly, isotropic collisions."""
+    """Under uniform light with isotropic scattering, within 0.5 % and noise, for each channel."""
     colors = (0.3, 0.6, 0.9)
     seen = slab(200.0, spp=256, subsurface_color=colors)
     for channel, color in enumerate(colors):
@@ -97,21 +97,21 @@ def test_a_half_space_is_chandrasekhars() -> None:
 
 @pytest.mark.parametrize("anisotropy", [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9])
 def test_the_albedo_of_a_collision_gives_the_colour(anisotropy: float) -> None:
-    """Within 0.5 % of what adding and doubling gives for a half-space."""
+    """Within 0.5 % of adding and doubling for a half-space."""
     for color in (0.02, 0.1, 0.3, 0.6, 0.85, 0.97):
         found = color_of(_core.walk_albedo(color, anisotropy), anisotropy)
         assert abs(found - color) < 0.005 * color
 
 
 def test_adding_and_doubling_is_chandrasekhars() -> None:
-    """For isotropic collisions."""
+    """Both formulas agree for isotropic scattering."""
     for albedo in (0.3, 0.9, 0.99):
         assert abs(color_of(albedo, 0.0) - chandrasekhar(albedo)) < 1e-4
 
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.3, 0.6, -0.3, -0.6])
 def test_a_flat_wall_has_the_colour_asked_for(anisotropy: float) -> None:
-    """Within 1 %, and noise."""
+    """Within 1 % and noise."""
     colors = (0.2, 0.5, 0.85)
     seen = slab(300.0, spp=192, subsurface_color=colors, subsurface_anisotropy=anisotropy)
     for channel, color in enumerate(colors):
@@ -121,7 +121,7 @@ def test_a_flat_wall_has_the_colour_asked_for(anisotropy: float) -> None:
 
 @pytest.mark.parametrize("depth", [0.5, 3.0])
 def test_white_walks_lose_nothing(depth: float) -> None:
-    """A furnace of colour 1, whose mean free paths differ by channel, within 0.5 %."""
+    """A furnace test of colour 1, with mean free paths that differ by channel, within 0.5 %."""
     seen = slab(
         depth, spp=256, subsurface_color=(1, 1, 1), subsurface_radius=(2.0, 1.0, 0.25),
         subsurface_anisotropy=0.3,
@@ -144,7 +144,7 @@ def test_a_clear_slab_shows_what_lies_below() -> None:
     builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
     settings = _core.Settings(width=16, height=16, spp=64, max_depth=3, filter="box")
     seen = _core.render(builder.build(), settings, None, None, None).beauty.reshape(-1, 3)
-    # A white Lambertian exit over a floor of even radiance.
+    # A white Lambertian exit above a floor of uniform radiance.
     assert np.allclose(seen.mean(axis=0), (1.0, 2.0, 3.0), rtol=0.01)
 
 
@@ -156,7 +156,7 @@ def third_exponential_integral(x: float) -> float:
 
 
 def test_a_black_slab_lets_through_what_misses_all_collisions() -> None:
-    """2 E_3(extinction depth) of light that enters evenly, by channel, within 0.5 % and noise."""
+    """2 E_3(optical depth) for uniform light, for each channel, within 0.5 % and noise."""
     radius = (1.0, 0.6, 0.3)
     depth = 0.5
     seen = slab(depth, spp=512, subsurface_color=(0, 0, 0), subsurface_radius=radius)
@@ -168,14 +168,14 @@ def test_a_black_slab_lets_through_what_misses_all_collisions() -> None:
 
 
 def add_ball(builder: Any, radius: float, material: int) -> None:
-    """Fine facets that are a sphere."""
+    """Adds a finely tessellated sphere."""
     mesh = ball(radius, 48)
     number = builder.add_mesh(mesh.points, mesh.faces.astype(np.uint32), material=material)
     builder.add_to_group(0, number)
 
 
 def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
-    """Chords of light that enters evenly have density l / (2 R^2); fine facets are a sphere."""
+    """Chords of uniform light have the density l / (2 R^2)."""
     radius, free_paths = 1.0, (2.0, 1.0, 0.5)
     builder = wavecomb.SceneBuilder()
     material = skin(builder, subsurface_color=(0, 0, 0), subsurface_radius=free_paths)
@@ -195,7 +195,7 @@ def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
 
 
 def scene(bounces_see_all: bool = True) -> Any:
-    """A box of skin with a coat, one within it, a floor, a lamp and a sky."""
+    """A box of skin with a coat, one inside it, a floor, a light and a sky."""
     builder = wavecomb.SceneBuilder()
     values = {
         "subsurface_color": (0.9, 0.5, 0.3),
@@ -222,7 +222,7 @@ def scene(bounces_see_all: bool = True) -> Any:
 
 
 def test_one_picture_for_all_schedules() -> None:
-    """Lanes, waves, threads, policies, packets and the reference: the same bits."""
+    """Lanes, waves, threads, policies, packets and the reference integrator give the same bits."""
     made = scene()
 
     def render(**settings: Any) -> Any:
@@ -243,7 +243,7 @@ def test_one_picture_for_all_schedules() -> None:
 
 
 def test_walks_see_what_bounces_see() -> None:
-    """What no bounce sees is met by no walk, in waves and in the reference alike."""
+    """Objects that are invisible to bounces are invisible to random walks, in both integrators."""
     made = scene(bounces_see_all=False)
     waves = wavecomb.render(made, size=(45, 30), spp=4, max_depth=6)
     alone = wavecomb.render(made, size=(45, 30), spp=4, max_depth=6, integrator="reference")
@@ -253,7 +253,7 @@ def test_walks_see_what_bounces_see() -> None:
 
 
 def test_guided_bounces_keep_the_mean() -> None:
-    """A field is learned of walks' ends as of all that is diffuse."""
+    """Guiding is trained on exits of random walks as on other diffuse vertices."""
     made = scene()
 
     def mean(guiding: str, seed: int) -> Any:
@@ -269,7 +269,7 @@ def test_guided_bounces_keep_the_mean() -> None:
 
 
 def test_lanes_stay_full() -> None:
-    """Walks that have ended make room."""
+    """Random walks that end leave their lanes to others."""
     counts = wavecomb.render(scene(), size=(160, 120), spp=4).stats["counts"]
     assert counts["walk_steps"] > 0.9 * counts["walk_lanes"]
 
@@ -284,7 +284,7 @@ def test_a_radius_that_is_not_finite_is_told() -> None:
 
 
 def test_what_comes_from_below_has_a_layer() -> None:
-    """All of a white wall that mirrors nothing, none of a matte one; a partition is the beauty."""
+    """Subsurface light has a layer, which a diffuse wall does not contribute to."""
     seen = []
     for radius in ((1, 1, 1), (0, 0, 0)):
         builder = wavecomb.SceneBuilder()
@@ -309,7 +309,7 @@ def test_what_comes_from_below_has_a_layer() -> None:
 
 @pytest.mark.parametrize("instanced", [False, True])
 def test_what_lies_within_is_not_met(instanced: bool) -> None:
-    """Strands and a body inside of another change nothing, whoever lies first on the way."""
+    """Strands and a mesh inside another body change nothing, whichever a ray meets first."""
 
     def picture(filled: bool) -> Any:
         builder = wavecomb.SceneBuilder()
@@ -344,7 +344,7 @@ def test_what_lies_within_is_not_met(instanced: bool) -> None:
 
 
 def lit_ball(builder: Any) -> None:
-    """A lamp beside what is at the origin, and a camera."""
+    """Adds a light beside the object at the origin, and sets a camera."""
     lamp = np.eye(4)
     lamp[3, :3] = (3.0, 2.0, 2.0)
     builder.add_light("sphere", lamp, color=(40, 40, 40), radius=0.5)
@@ -355,8 +355,7 @@ def lit_ball(builder: Any) -> None:
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.5])
 def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
-    """By brute force: that medium, traced as media in meshes are, in a skin that lets all light
-    through and scatters it evenly."""
+    """Equals the same medium rendered as a mesh interior in a diffusely transmitting skin."""
     colors, radii = np.array([0.8, 0.5, 0.3]), np.array([0.5, 0.25, 0.1])
 
     def walk(builder: Any) -> None:
@@ -406,6 +405,6 @@ def test_walks_are_a_medium_in_the_same_mesh(anisotropy: float) -> None:
     error = np.sqrt((a.var(axis=0, ddof=1) + b.var(axis=0, ddof=1)) / 6)
     off = np.abs(a.mean(axis=0) - b.mean(axis=0))
     scale = a.mean()
-    # Student's t of ten degrees, Sidak over 27 means at 1 %: 4.9.
+    # Student's t with ten degrees of freedom, Sidak over 27 means at 1 %: 4.9.
     assert np.all(off < 4.9 * error + 0.005 * scale)
     assert np.median(error) < 0.03 * scale

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene builder that records what it is given and checks what the native one relies on."""
+"""A scene builder that records its calls and checks the preconditions of the native one."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ INHERIT = 0xFFFFFFFF
 
 
 class Recorder:
-    """Stands in for ``_core.SceneBuilder``."""
+    """Replaces ``_core.SceneBuilder``."""
 
     def __init__(self):
         self.textures, self.materials, self.meshes, self.lights = [], [], [], []
@@ -63,7 +63,7 @@ class Recorder:
         asset_length=0,
         mesh_light=None,
     ):
-        steps = positions.shape[:-2]  # of the shutter, where it changes its shape
+        steps = positions.shape[:-2]  # shutter steps of a deforming mesh
         n, m = positions.shape[-2], len(indices)
         assert positions.dtype == np.float32 and positions.shape == (*steps, n, 3)
         assert indices.dtype == np.uint32 and indices.shape == (m, 3)
@@ -246,19 +246,19 @@ class Recorder:
     def build(self):
         return self
 
-    # What tests ask for.
+    # Queries for tests.
 
     def mesh(self, name):
-        """The mesh whose path ends so."""
+        """Returns the mesh whose path ends with ``name``."""
         (found,) = [mesh for mesh in self.meshes if mesh["name"].endswith(name)]
         return found
 
     def material_of(self, name):
-        """The material of a mesh, where it has one for all faces."""
+        """Returns the material of a mesh that has one material for all faces."""
         return self.materials[self.mesh(name)["material"]]
 
     def world_meshes(self):
-        """(mesh, transform, material id) of all that is seen, instances one by one."""
+        """Returns (mesh, transform, material id) for all visible meshes, once per instance."""
 
         def expand(group, matrix, inherited):
             for number in self.groups[group]["meshes"]:
@@ -274,7 +274,7 @@ class Recorder:
 
 
 def write(folder: Path, text: str, name: str = "stage.usda") -> Path:
-    """Writes a stage of some prims; braces may stand on one line with statements."""
+    """Writes a stage with these prims. Braces may be on one line with statements."""
     path = folder / name
     header = "" if text.startswith("#usda") else "#usda 1.0\n"
     path.write_text(header + text.replace("{", "{\n").replace("}", "\n}\n"))
@@ -282,14 +282,14 @@ def write(folder: Path, text: str, name: str = "stage.usda") -> Path:
 
 
 def load(folder: Path, text: str, **options) -> tuple[Recorder, LoadedStage]:
-    """Loads a stage of some prims; meshes stay as they are unless ``subdivision`` says more."""
+    """Loads a stage with these prims. Meshes stay as they are unless ``subdivision`` is given."""
     options.setdefault("subdivision", "off")
     loaded = load_stage(write(folder, text), builder_factory=Recorder, **options)
     return loaded.scene, loaded
 
 
 def said(loaded: LoadedStage) -> str:
-    """All that the report says."""
+    """Returns all messages of the report."""
     return "\n".join(loaded.report.lines())
 
 

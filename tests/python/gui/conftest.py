@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Windows without a screen. QT_QPA_PLATFORM chooses another platform than offscreen."""
+"""Fixtures for tests of the window without a screen. QT_QPA_PLATFORM overrides "offscreen"."""
 
 import gc
 import os
@@ -15,7 +15,7 @@ pytest.importorskip("pytestqt", reason="tests of the window need pytest-qt")
 
 @pytest.fixture(scope="session")
 def _modules():
-    """What is imported is no garbage: the collector need not look at it after every test."""
+    """Exempts imported modules from garbage collection, which runs after every test."""
     import wavecomb.gui.main_window  # noqa: F401
 
     gc.collect()
@@ -24,12 +24,13 @@ def _modules():
 
 @pytest.fixture(autouse=True)
 def _collected(qapp, _modules):
-    """What a test leaves behind is destroyed after it, on the window's thread.
+    """Destroys the garbage of a test after it, on the window's thread.
 
-    Tests make objects of Qt's with no window round them. Automatic collection would destroy those
-    that are in cycles on any thread that makes an object, in a later test, which may never end
-    (docs/decisions/window-threads.md). That nothing of the window's own is so is for
-    test_threads.py to show, in processes of their own in which all threads collect.
+    Tests create Qt objects without a window. Automatic collection would destroy reference cycles
+    with
+    such objects in a later test, on any thread that allocates, and may deadlock
+    (docs/decisions/window-threads.md). test_threads.py checks, in separate processes in which all
+    threads collect, that the window itself leaves no such cycles.
     """
     from PySide6.QtCore import QCoreApplication, QEvent
 
@@ -45,7 +46,7 @@ def _collected(qapp, _modules):
 
 @pytest.fixture(autouse=True)
 def _own_autosave(tmp_path, monkeypatch):
-    """No window finds the unsaved edits of another test."""
+    """Keeps windows from finding unsaved edits of other tests."""
     monkeypatch.setattr("wavecomb.gui.main_window.log_folder", lambda: tmp_path / "state")
 
 
@@ -61,7 +62,7 @@ def cornell(tmp_path_factory):
 
 @pytest.fixture
 def new_session(qtbot):
-    """Makes sessions that are ended with the test: new_session(width=96, ...)."""
+    """A function that makes sessions, which end with the test: new_session(width=96, ...)."""
     from wavecomb.gui.setup import Setup
     from wavecomb.gui.viewport.session import Session
 
@@ -79,7 +80,7 @@ def new_session(qtbot):
 
 @pytest.fixture
 def window(qtbot, qapp, tmp_path):
-    """An empty window with settings of its own, 96 x 96 pixels and 4 samples."""
+    """An empty window with separate settings, 96 x 96 pixels and 4 samples."""
     from PySide6.QtCore import QCoreApplication, QEvent, QSettings
 
     from wavecomb.gui import theme
@@ -95,13 +96,13 @@ def window(qtbot, qapp, tmp_path):
     yield made
     made.close()
     made.deleteLater()
-    # Not by itself between tests, and each change of colours would go through all old windows.
+    # Without this, old windows would remain and process every change of the theme.
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture
 def cornell_window(window, qtbot, cornell):
-    """The window with the Cornell box, rendered and on the screen."""
+    """A window with the Cornell box, rendered and displayed."""
     with qtbot.waitSignal(window.session.opened, timeout=10000):
         window.open(cornell)
     wait_final(qtbot, window.session)
@@ -111,7 +112,7 @@ def cornell_window(window, qtbot, cornell):
 
 @pytest.fixture
 def session(new_session, qtbot, cornell):
-    """Cornell at 96 x 96 with 4 samples, opened and shown to the end."""
+    """A session with the Cornell box at 96 x 96 with 4 samples, rendered."""
     made = new_session(width=96, height=96, spp=4)
     with qtbot.waitSignal(made.opened, timeout=10000):
         made.open(cornell)
@@ -120,7 +121,7 @@ def session(new_session, qtbot, cornell):
 
 
 def wait_final(qtbot, session, timeout=20000):
-    """Waits for the last frame of the session's present version; returns it."""
+    """Waits for the last frame of the session's current version and returns it."""
 
     def is_final():
         frame = session.last_frame

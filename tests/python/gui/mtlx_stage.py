@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small stage whose materials are MaterialX: constants, textures, weights, instances."""
+"""A small stage with MaterialX materials: constants, textures, weights, instances."""
 
 STAGE = """#usda 1.0
 (
@@ -174,11 +174,11 @@ def Xform "World"
     }
 }
 """
-"""Refers to a .mtlx file, to a layer that is not there, and binds without the schema applied."""
+"""Refers to a .mtlx file and to a missing layer, and binds without applying the schema."""
 
 
 def write_stage(folder):
-    """Writes the stage and its texture; gives its path."""
+    """Writes the stage and its texture, and returns the stage's path."""
     import numpy as np
 
     from wavecomb.picture.image import write_png
@@ -191,7 +191,7 @@ def write_stage(folder):
 
 
 def write_referring(folder):
-    """Writes the stage that refers to a .mtlx file; gives its path."""
+    """Writes the stage that refers to a .mtlx file, and returns its path."""
     (folder / "brick.mtlx").write_text(MTLX)
     path = folder / "referring.usda"
     path.write_text(REFERRING)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Somebody at a screen: an X server, a window manager, a mouse and a keyboard (xdotool)."""
+"""A simulated user: an X server, a window manager, a mouse and a keyboard (xdotool)."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ WIDE, HIGH = 1280, 800
 
 @contextlib.contextmanager
 def screen():
-    """An X server with a window manager; gives its DISPLAY."""
+    """Starts an X server with a window manager and yields its DISPLAY."""
     read, write = os.pipe()
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{WIDE}x{HIGH}x24", "-nolisten", "tcp"],
@@ -42,7 +42,7 @@ def screen():
 
 
 class Person:
-    """Looks at one window and acts on it through the X server."""
+    """A simulated user who sees one window and operates it through the X server."""
 
     def __init__(self, display, home, *arguments, size=(160, 120), spp=4):
         self.home = Path(home)
@@ -68,7 +68,7 @@ class Person:
     # ---- looking -------------------------------------------------------------------------------
 
     def ask(self, *question, seconds=60):
-        """What ``person_window.Look`` says."""
+        """Calls a method of ``person_window.Look`` in the window's process."""
         self.process.stdin.write(json.dumps(question) + "\n")
         self.process.stdin.flush()
         ready, _, _ = select.select([self._answers], [], [], seconds)
@@ -78,7 +78,7 @@ class Person:
         return json.loads(line)
 
     def wait(self, met, what, seconds=90):
-        """Until something is so."""
+        """Waits until a condition is met."""
         until = time.monotonic() + seconds
         while not met():
             assert self.process.poll() is None, f"the window has gone: {self.told()}"
@@ -86,7 +86,7 @@ class Person:
             time.sleep(0.03)
 
     def settled(self):
-        """Until the newest picture is whole and on the screen."""
+        """Waits until the newest image is complete and displayed."""
 
         def met():
             state = self.ask("state")
@@ -96,15 +96,15 @@ class Person:
         return self.ask("state")
 
     def told(self):
-        """What the process wrote to stdout and stderr."""
+        """Returns the output of the process on stdout and stderr."""
         return (self.home / "stderr.txt").read_text()
 
     def faults(self):
-        """Files that faults are written to."""
+        """Returns the crash reports."""
         return [str(path) for path in (self.home / "data").rglob("fault*")]
 
     def look(self, path):
-        """A picture of the screen; gives its pixels (h, w, 3) from 0 to 1."""
+        """Saves a screenshot and returns its pixels (h, w, 3) from 0 to 1."""
         import OpenImageIO as oiio
 
         assert self.ask("grab", str(path))
@@ -113,26 +113,26 @@ class Person:
         return pixels[..., :3]
 
     def picture(self, path):
-        """Of the screen, the part where the rendered picture is."""
+        """Returns the part of the screen that shows the rendered image."""
         x, y, wide, high = self.ask("picture")
         return self.look(path)[y : y + high, x : x + wide]
 
     # ---- hands ---------------------------------------------------------------------------------
 
     def do(self, *words):
-        """xdotool."""
+        """Runs xdotool."""
         subprocess.run(
             ["xdotool", *map(str, words)], env=self.env, check=True, capture_output=True, timeout=30
         )
 
     def click(self, rect, button=1):
-        """In the middle of a place."""
+        """Clicks the centre of a rectangle."""
         assert rect is not None
         x, y, wide, high = rect
         self.do("mousemove", x + wide // 2, y + high // 2, "sleep", 0.03, "click", button)
 
     def drag(self, start, by, button=2):
-        """With a button held, in steps."""
+        """Drags in steps with a pressed button."""
         words = ["mousemove", *start, "mousedown", button]
         for step in range(1, 7):
             words += ["mousemove", start[0] + by[0] * step // 6, start[1] + by[1] * step // 6]
@@ -140,11 +140,11 @@ class Person:
         self.do(*words, "mouseup", button)
 
     def key(self, *keys):
-        """Keys, as "ctrl+z"."""
+        """Presses keys such as "ctrl+z"."""
         self.do("key", "--delay", 20, *keys)
 
     def type(self, text):
-        """Letters."""
+        """Types text."""
         self.do("type", "--delay", 12, text)
 
     def menu(self, title, entry):
@@ -154,9 +154,9 @@ class Person:
         self.click(self.ask("menu", title, entry))
 
     def answer(self, dialog, text):
-        """Types a name into a dialog and is done with it."""
+        """Types a name into a dialog and confirms it."""
         self.wait(lambda: self.ask("state")["active"] == dialog, f"a {dialog}")
-        # The dialog looks at its folder first.
+        # The dialog reads its folder first.
         self.wait(lambda: (self.ask("focus") or [""])[0] == "QLineEdit", "a field for the name")
         self.key("ctrl+a")
         self.type(text)
@@ -165,7 +165,7 @@ class Person:
         self.wait(lambda: self.ask("state")["active"] != dialog, f"the {dialog} to close")
 
     def leave(self):
-        """Ends the program by its keys; nothing must have been said, no fault written."""
+        """Quits by keyboard, and asserts that there is no output and no crash report."""
         self.key("ctrl+q")
         try:
             assert self.process.wait(30) == 0, self.told()
@@ -175,7 +175,7 @@ class Person:
         assert self.faults() == []
 
     def close(self):
-        """Ends the process, however it is."""
+        """Ends the process in any state."""
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait(10)

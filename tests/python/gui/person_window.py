@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb view` as it is, and one who looks: where things are on the screen, and what they say.
+"""Runs `wavecomb view` and reports the positions and texts of its widgets.
 
-Run as `person_window.py FD view ...`. Questions come as lines of JSON on stdin, answers go to the
-file descriptor. It looks and never acts: whatever happens in the window comes from the X server.
+Run as `person_window.py FD view ...`. Reads questions as JSON lines from stdin and writes answers
+to the file descriptor FD. It never acts on the window: all input comes from the X server.
 """
 
 import json
@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 
 def on_screen(widget, rect=None):
-    """x, y, width and height on the screen."""
+    """Returns x, y, width and height in screen coordinates."""
     rect = widget.rect() if rect is None else rect
     corner = widget.mapToGlobal(rect.topLeft())
     return [corner.x(), corner.y(), rect.width(), rect.height()]
@@ -57,12 +57,12 @@ class Look:
         return on_screen(found[0]) if found else None
 
     def cross(self, dock):
-        """What closes a panel."""
+        """Returns the position of a panel's close button."""
         buttons = self.window.docks[dock].findChildren(QWidget, "qt_dockwidget_closebutton")
         return on_screen(buttons[0]) if buttons and buttons[0].isVisible() else None
 
     def window_on_screen(self):
-        """The window with its frame, and the screen."""
+        """Returns the window with its frame, and the screen."""
         frame, whole = self.window.frameGeometry(), self.window.screen().geometry()
         return [[r.x(), r.y(), r.width(), r.height()] for r in (frame, whole)]
 
@@ -74,7 +74,7 @@ class Look:
         return None
 
     def materials(self):
-        """Names of the materials, with the inputs that have a number to change."""
+        """Returns the paths of the materials."""
         return [row.path for row in self.scene.materials.model.rows]
 
     def material(self, path):
@@ -88,7 +88,7 @@ class Look:
         return None
 
     def numbers(self):
-        """Numbers of the chosen material that are in sight: name, place, text."""
+        """Returns name, position and text of the visible numeric fields of the chosen material."""
         panel = self.scene.materials
         port = panel.form.viewport()
         out = []
@@ -102,7 +102,7 @@ class Look:
         return out
 
     def menu(self, *names):
-        """A title of the menu bar, or an entry of the menu that is open."""
+        """Returns the position of a menu title, or of an entry in the open menu."""
         bar = self.window.menuBar()
         wanted = names[-1]
         where = QApplication.activePopupWidget() if len(names) > 1 else bar
@@ -118,18 +118,18 @@ class Look:
         return None if widget is None else [type(widget).__name__, widget.objectName()]
 
     def field(self):
-        """The text of the field that has the focus."""
+        """Returns the text of the field that has the focus."""
         widget = QApplication.focusWidget()
         return widget.text() if hasattr(widget, "text") else None
 
     def picture(self):
-        """Where the picture is on the screen."""
+        """Returns the position of the image on the screen."""
         port = self.window.viewport
         rect = port.picture_rect().toAlignedRect().intersected(port.rect())
         return on_screen(port, rect)
 
     def grab(self, path):
-        """What the screen shows, as a PNG."""
+        """Saves a screenshot as a PNG."""
         return QApplication.primaryScreen().grabWindow(0).save(path)
 
 

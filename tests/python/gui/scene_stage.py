@@ -131,7 +131,7 @@ class Xform "Part"
 
 
 def write_stage(folder):
-    """Writes the stage and its texture; gives its path."""
+    """Writes the stage and its texture, and returns the stage's path."""
     import numpy as np
 
     from wavecomb.picture.image import write_png

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The window as a person uses it: a real process, a real X server, mouse and keys; nothing breaks.
+"""The window operated like a user would: a real process and X server, mouse and keyboard.
 
-`make test-long` tries ten stages that differ most; pictures of the screen are kept in the folder
-that WAVECOMB_SCREENSHOTS names.
+`make test-long` runs ten very different stages. WAVECOMB_SCREENSHOTS names a folder for
+screenshots.
 """
 
 import contextlib
@@ -58,7 +58,7 @@ def person(display, tmp_path):
 
 
 def shot(tmp_path, name):
-    """Where a picture of the screen goes."""
+    """Returns the path of a screenshot."""
     folder = Path(os.environ.get("WAVECOMB_SCREENSHOTS") or tmp_path)
     folder.mkdir(parents=True, exist_ok=True)
     return folder / f"{name}.png"
@@ -85,7 +85,7 @@ def orbit(person, tmp_path, name):
 
 
 def select(person):
-    """Clicks about the picture until something is there."""
+    """Clicks on several points of the image until a prim is selected."""
     x, y, wide, high = person.ask("picture")
     for u, v in ((3, 3), (2, 4), (4, 4), (3, 2), (3, 4), (2, 2), (4, 2), (1, 3), (5, 3)):
         person.click([x + u * wide // 6, y + v * high // 6, 0, 0])
@@ -100,7 +100,7 @@ def select(person):
 
 
 def edit(person, tmp_path, name):
-    """Types a number into the first material that has one, takes it back, types it again."""
+    """Types a number into the first material that has one, undoes it, and types it again."""
     person.click(person.ask("tab", "Materials"))
     for path in person.ask("materials"):
         if path and person.ask("material", path):
@@ -135,7 +135,7 @@ def edit(person, tmp_path, name):
 
 
 def save(person, tmp_path, slot, value):
-    """The edits as a layer, and the picture as a file."""
+    """Saves the edits as a layer and the image as a file."""
     layer, picture = tmp_path / "my_edits.usda", tmp_path / "my picture.exr"
     for path in (layer, picture):
         path.unlink(missing_ok=True)
@@ -172,7 +172,7 @@ def compare(person, tmp_path, name):
 
 
 def use(person, tmp_path, name):
-    """What a person does with a stage that is open."""
+    """Performs the actions of a typical session on the open stage."""
     orbit(person, tmp_path, name)
     select(person)
     done = edit(person, tmp_path, name)
@@ -184,7 +184,7 @@ def use(person, tmp_path, name):
 
 @pytest.mark.slow
 def test_small_stages(person, tmp_path):
-    """MaterialX, .mtlx files, instances, no light, no camera, a layer that is missing, a fault."""
+    """MaterialX, .mtlx files, instances, no light, no camera, a missing layer, a broken stage."""
     looks, referring = write_stage(tmp_path), write_referring(tmp_path)
     broken = tmp_path / "broken.usda"
     broken.write_text(BROKEN)

@@ -32,7 +32,7 @@ def path(tmp_path, monkeypatch):
 
 @pytest.fixture
 def new_window(qtbot, tmp_path):
-    """Makes windows that have a stage open."""
+    """A function that makes windows with an open stage."""
     from wavecomb.gui.main_window import MainWindow
     from wavecomb.gui.setup import Setup
 

@@ -39,7 +39,7 @@ settings = { size = [16, 12], spp = 4 }
 
 @pytest.fixture
 def pages(monkeypatch):
-    """Pages that the window has opened in the browser."""
+    """Pages opened in the browser."""
     found = []
     monkeypatch.setattr(
         QDesktopServices, "openUrl", lambda url: found.append(Path(url.toLocalFile()))
@@ -112,7 +112,7 @@ def test_a_damaged_folder_is_a_message(qtbot, panel, pages, tmp_path):
 
 
 def choose(qtbot, panel, tmp_path):
-    """The tiny suite, stage "box" only."""
+    """Chooses the tiny suite with only the stage "box"."""
     suite = tmp_path / "tiny.toml"
     suite.write_text(TINY)
     choice = panel.choice
@@ -124,7 +124,7 @@ def choose(qtbot, panel, tmp_path):
 
 @pytest.mark.slow
 def test_a_suite_is_stopped_resumed_and_its_report_opened(qtbot, panel, pages, tmp_path, cornell):
-    """The viewport renders before and after, and pauses in between; the window never waits."""
+    """The viewport pauses during the benchmark, and the window never blocks."""
     session = panel._session
     with qtbot.waitSignal(session.opened, timeout=120000):
         session.open(cornell)

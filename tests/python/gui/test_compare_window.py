@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare as a user works it: keys, mouse, files dropped, live renders."""
+"""The comparison window: keys, mouse, dropped files, live renders."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHIFTED = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifie
 
 @pytest.fixture
 def window(qtbot, new_session):
-    """Without a stage."""
+    """A comparison window without a stage."""
     made = CompareWindow(new_session(width=48, height=48, spp=2))
     qtbot.addWidget(made)
     made.resize(900, 600)
@@ -32,7 +32,7 @@ def window(qtbot, new_session):
 
 @pytest.fixture
 def files(tmp_path):
-    """Two pictures that differ in one pixel, and one of another size."""
+    """Two images that differ in one pixel, and one of another size."""
     a = np.random.default_rng(1).random((20, 30, 3), np.float32)
     b = a.copy()
     b[4, 7] += np.float32(0.5)
@@ -66,7 +66,7 @@ def drop(widget, at, *paths):
 
 @pytest.fixture
 def pair(qtbot, window, files):
-    """A and B dropped together."""
+    """A window with A and B, dropped together."""
     drop(window.view, QPoint(10, 10), files["a"], files["b"])
     qtbot.waitUntil(lambda: window.a.side is not None and window.b.side is not None)
     settled(qtbot, window)
@@ -123,11 +123,11 @@ def test_keys_switch_flip_and_move_the_line(qtbot, pair):
     QTest.mouseMove(view, QPoint(round(view.width() * 0.75), 50))
     QTest.mouseRelease(view, LEFT, pos=QPoint(round(view.width() * 0.75), 50))
     assert view.wipe == pytest.approx(0.75, abs=0.01)
-    assert view.zoom is None  # the line moved, not the picture
+    assert view.zoom is None  # the line moved, not the image
 
 
 def test_what_a_wipe_shows(qtbot, pair):
-    """Left of the line A is painted, right of it B: the pixel that differs changes with it."""
+    """A is painted on the left of the line and B on the right, visible in the differing pixel."""
     pair.set_mode("wipe")
     view = pair.view
     at = view.target(0).topLeft()
@@ -163,7 +163,7 @@ def test_zoom_and_pan_are_linked_and_the_pixel_stays(qtbot, pair):
         QApplication.sendEvent(view, event)
     assert view.zoom is not None and view.pixel_at(at) == before
     twin = at - view.target(1).topLeft() + view.target(0).topLeft()
-    assert view.pixel_at(twin) == before  # the same place in A
+    assert view.pixel_at(twin) == before  # the same point in A
     QTest.mousePress(view, LEFT, pos=at.toPoint())
     QTest.mouseMove(view, (at + QPointF(40, 0)).toPoint())
     QTest.mouseRelease(view, LEFT, pos=(at + QPointF(40, 0)).toPoint())
@@ -195,7 +195,7 @@ def test_maps(qtbot, pair):
         image = pair.view.image("D")
         assert (image.width(), image.height()) == (30, 20)
         assert image.pixelColor(7, 4).lightness() > 0
-        if not kind.startswith("flip"):  # FLIP looks at the neighbours, too
+        if not kind.startswith("flip"):  # FLIP depends on neighbours
             assert image.pixelColor(20, 15).lightness() == 0
     combo.setCurrentIndex(combo.findData("z"))
     assert "needs a variance" in pair.view.message
@@ -230,7 +230,7 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
 
 @pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
-    """Another policy: bit for bit the same. Another seed: other noise. The viewport goes on."""
+    """Another policy gives equal bits, another seed other noise. The viewport continues."""
     window = CompareWindow(session)
     qtbot.addWidget(window)
     window.show()
@@ -259,7 +259,7 @@ def test_kept_picture_against_live_settings(qtbot, session):
         window.a.follow()
         assert window.a.side.name.startswith("viewport") and live in session.twins
         window.b.keep()
-        assert live not in session.twins  # it was given back
+        assert live not in session.twins  # it was released
     finally:
         window.shutdown()
 

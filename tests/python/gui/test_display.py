@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From floats to what the screen shows."""
+"""Conversion of floats to displayed colours."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_ocio_has_aces_and_shows_grey_as_grey():
     assert np.ptp(codes) <= 1 and 60 < codes[0, 0, 0] < 140
     brighter = display.develop(grey, 1.0, aces[0])
     assert brighter[0, 0, 0] > codes[0, 0, 0]
-    # Highlights are rolled off, not cut.
+    # Highlights are compressed, not clipped.
     hot = display.develop(np.full((2, 2, 3), 2.0, np.float32), 0.0, aces[0])
     assert hot.max() < 255
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions as layers: checked as they are typed, kept, shown."""
+"""Light path expressions as layers: checked while typing, kept, displayed."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_typed_checked_and_shown(cornell_window, qtbot):
     version = session.version
     display.choose_layer("lpe_direct")
     assert session.version == version, "a layer that is kept needs no new render"
-    # Another one of that name takes its place.
+    # Another expression of the same name replaces it.
     dialog = display.ask_expression()
     dialog.text.setText("CO")
     dialog.show_layer.click()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render > Send to a farm: the job is of what the window shows, and is watched."""
+"""Render > Send to a farm: the job matches the window's state and is monitored."""
 
 import json
 
@@ -32,7 +32,7 @@ def test_a_job_is_what_is_shown(cornell_window, tmp_path):
 
 @pytest.mark.slow
 def test_sent_and_watched(cornell_window, qtbot, tmp_path):
-    """With what was edited; the dialog says where the job stands."""
+    """The job includes the edits, and the dialog shows its progress."""
     window = cornell_window
     edits = window.scene.edits
     light = next(prim for prim in edits.edits.stage.Traverse() if prim.GetTypeName() == "RectLight")
@@ -59,7 +59,7 @@ def test_sent_and_watched(cornell_window, qtbot, tmp_path):
     layer = Sdf.Layer.FindOrOpen(str(tmp_path / "a.edits.usda"))
     assert layer and folder.job.stage == layer.realPath
     assert read_layers(output)["beauty"].shape == (96, 96, 3)
-    # What cannot be sent is said in the dialog.
+    # The dialog reports what cannot be sent.
     dialog.begin()
     qtbot.waitUntil(lambda: dialog.send.isEnabled(), timeout=60000)
     assert "is there already" in dialog.state.text()

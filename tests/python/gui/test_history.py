@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of undo: what joins, what the menu says, what is saved; and the way back of the camera."""
+"""Undo steps: merging, menu texts, saved state, and camera history."""
 
 import weakref
 
@@ -29,7 +29,7 @@ def stage_path(tmp_path_factory):
 
 
 class Steps:
-    """A number on a stage in memory, its steps, and a clock that is set by hand."""
+    """A number on a stage in memory, with its undo steps and a manual clock."""
 
     def __init__(self):
         stage = Usd.Stage.CreateInMemory()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was learned of the surface under the cursor: a map of directions, and shares of lights."""
+"""Learned data under the cursor: a map of directions, and selection probabilities of lights."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def test_a_map_keeps_what_there_is():
-    """The mean over the sphere is that of the bins, which are of equal solid angle."""
+    """The mean over the sphere equals that of the bins, which have equal solid angles."""
     density = np.random.default_rng(3).gamma(0.4, 1.0, (16, 16))
     height = 256
     values, _ = density_map(density, UP, np.array([1.0, 2.0, -3.0]), height)
@@ -30,13 +30,13 @@ def test_marks_are_where_the_map_has_the_direction(ahead):
     for row, column in ((0, 5), (16, 31), (20, 60), (31, 0)):
         x, y = map_point(vectors[row, column], axes)
         assert (x * 64, y * 32) == pytest.approx((column + 0.5, row + 0.5), abs=1e-6)
-    # Up is up; the middle is ahead; right is right.
+    # Up is at the top, forward in the middle, right on the right.
     assert vectors[0, 0] @ UP > 0.99
     assert axes[1] == pytest.approx(np.cross(axes[0], UP))
 
 
 def test_bins_are_those_of_the_core():
-    """As tests/cpp/test_guide.cpp has the map: folds at z = 0, +z in the middle."""
+    """The map of tests/cpp/test_guide.cpp: +z in the middle, folded at z = 0."""
     w = np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [0.6, 0.0, -0.8]], float)
     assert square_points(w) == pytest.approx(
         np.array([[0.5, 0.5], [1, 1], [1, 0.5], [0.5, 0], [1, 0.5 + 0.5 * (1 - np.sqrt(0.2))]]),
@@ -78,7 +78,7 @@ def test_the_panel_follows_the_cursor(cornell_window, qtbot):
     assert panel.map.image.width() == 2 * panel.map.image.height()
     assert "of bounces are guided" in panel.note.text()
     assert not panel.grab().isNull()
-    # What was clicked stays, where the cursor is not followed.
+    # With following off, the clicked point stays.
     density = panel.learned["density"]
     panel.follow.setChecked(False)
     panel.hover((60, 20))

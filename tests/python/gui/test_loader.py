@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the window reads of a stage: variants, edits over it, changes on disk, bounds."""
+"""Stage loading in the window: variants, edits, changes on disk, bounds."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ TIME, WORLD = Usd.TimeCode(1), Sdf.Path("/World")
 
 
 def opened(path: Path, **more: object) -> Read:
-    """A stage as the window opens it."""
+    """Opens a stage as the window does."""
     return read(Request(Source(path, **more)))  # type: ignore[arg-type]
 
 
 def written(folder: Path) -> Path:
-    """``RIG`` in a folder of its own."""
+    """Writes ``RIG`` to a separate folder."""
     inner = folder / "stage"
     inner.mkdir()
     (inner / "rig.usda").write_text(RIG)
@@ -136,7 +136,7 @@ class Xform "Arm"
 
 
 def choices(usd: Usd.Stage) -> dict[str, str]:
-    """The variants of the stage's root prim."""
+    """Returns the variants of the stage's root prim."""
     return {one.name: one.choice for one in StageEdits(usd, TIME).variant_sets(WORLD)}
 
 
@@ -147,7 +147,7 @@ def test_variants_that_are_asked_for_are_selected_in_the_window(tmp_path: Path) 
     session = got.usd.GetSessionLayer()
     assert dict(session.GetPrimAtPath("/World").variantSelections) == {"rig": "one"}
     assert choices(got.usd) == {"rig": "one", "look": ""}
-    session.Clear()  # undone: what the stage itself selects
+    session.Clear()  # undone: the stage's own selection
     assert choices(got.usd) == {"rig": "two", "look": ""}
 
 

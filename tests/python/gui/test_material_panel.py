@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of MaterialX in the panel: their own inputs, live edits, undo, and room for it all."""
+"""MaterialX materials in the panel: inputs, live edits, undo, layout."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def panel(new_session, qtbot, final, looks):
 
 @pytest.fixture
 def same_as_saved(tmp_path, final, qtbot):
-    """The picture at last, which is that of the edits as they are saved."""
+    """Waits for the final image and compares it with a render of the saved edits."""
 
     def check(panel):
         qtbot.waitUntil(lambda: not panel.session._jobs, timeout=20000)
@@ -104,7 +104,7 @@ def test_an_openpbr_material_shows_its_own_inputs(panel):
 
 
 def test_what_a_texture_drives_has_no_value(panel, qtbot):
-    """Every material can be looked at, whatever its inputs come from."""
+    """Every material can be selected, and driven inputs show their source in place of a value."""
     materials = panel.materials
     for number, row in enumerate(materials.model.rows):
         materials.view.selectRow(number)
@@ -136,7 +136,7 @@ EDITS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["Car", "Wood", "Standard", "Gltf"])
 def test_an_edit_is_what_is_saved(panel, same_as_saved, final, name, qtbot):
-    """One after the other, then all back; some are part of a graph or of a texture's use."""
+    """Each edit renders as its saved file, and undoing all edits restores the image."""
     materials = panel.materials
     materials.choose(f"{LOOKS}/{name}")
     before = final(panel.session).beauty
@@ -225,7 +225,7 @@ def test_all_is_seen_at_the_usual_width(qtbot, tmp_path, looks):
 
 @pytest.mark.slow
 def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
-    """A value that was typed is one step, however slowly; the field has no history of its own."""
+    """A typed value is one undo step, however slowly typed. The field has no separate undo."""
     window = make_window(qtbot, tmp_path, looks)
     materials, edits = window.scene.materials, window.scene.edits
     materials.choose(f"{LOOKS}/Car")
@@ -246,12 +246,12 @@ def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
     assert spin.value() == 0.5, "nothing more to take back"
     QTest.keyClick(spin, Qt.Key.Key_Y, Control)
     assert spin.value() == 0.75 and len(edits.lines()) == 1
-    # After Enter the next value is a step of its own.
+    # After Enter, the next value is a separate step.
     for text in ("0.25", "0.125"):
         type_value(spin, text)
     QTest.keyClick(spin, Qt.Key.Key_Z, Control)
     assert spin.value() == 0.25
-    # A search field keeps its own.
+    # A search field has its own undo.
     field = window.scene.tree.field
     window.scene.tabs.setCurrentIndex(0)
     field.setFocus()
@@ -262,7 +262,7 @@ def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
 
 
 def test_digits_are_typed_where_they_were_begun(qtbot):
-    """A value that the stage rounds to 32 bits does not take the cursor away."""
+    """Rounding of a value to 32 bits by the stage does not move the cursor."""
     field = NumberField("x", Range(0.0, 10.0, 0.0, 1.0))
     qtbot.addWidget(field)
     field.show()
@@ -285,7 +285,7 @@ def test_a_value_out_of_range_is_shown(qtbot):
 
 
 def test_what_usd_says_goes_to_the_notes(new_session, qtbot, final, tmp_path, capfd):
-    """The tree's stage is opened as the loader's: .mtlx files are no news, what is missing is."""
+    """Both USD stages of the window resolve .mtlx files, and a missing layer is reported."""
     path = write_referring(tmp_path)
     session = new_session(width=SIZE, height=SIZE, spp=1)
     panel = ScenePanel(session)

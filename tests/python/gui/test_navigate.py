@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras move as they should: pure functions of poses."""
+"""Camera navigation: pure functions of poses."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def looking(position=(0.0, 0.0, 10.0), window=(-0.4, 0.4, -0.3, 0.3), path="/Cam
 
 
 def project(pose, point, aspect=4 / 3):
-    """Place in the picture: x from -1 left to 1 right, y up; and the depth."""
+    """Returns image coordinates (x from -1 left to 1 right, y up) and the depth."""
     x0, x1, y0, y1 = pose.fitted(round(1200 * aspect), 1200)
     offset = np.asarray(point, float) - pose.position
     depth = -offset @ pose.back
@@ -42,7 +42,7 @@ def test_orbit_keeps_the_pivot_in_its_place(up):
     after, new_depth = project(moved, pivot)
     assert np.allclose(before, after, atol=1e-9) and depth == pytest.approx(new_depth)
     assert is_rigid(moved) and moved.path is None
-    # The horizon stays level: the camera's right has no part along the stage's up.
+    # The horizon stays level: the camera's right vector is orthogonal to the stage's up axis.
     assert abs(moved.right @ navigate.UPS[up]) < 1e-12
 
 

@@ -36,7 +36,7 @@ def panel(session: Any, qtbot: Any) -> PlotsPanel:
 
 
 def render(panel: PlotsPanel, session: Any, qtbot: Any, **settings: Any) -> None:
-    """One more run, to its end."""
+    """Renders once more, to the end."""
     if settings:
         session.change(**settings)
     else:
@@ -133,7 +133,7 @@ def test_figures_come_while_it_renders(panel: PlotsPanel, session: Any, qtbot: A
     session.resume()
     qtbot.waitUntil(lambda: len(run.looks) > count + 1, timeout=20000)
     assert panel.log.current.run is run
-    # A look counts no time that the render stood still.
+    # The time of a pause does not count.
     assert run.looks[count + 1].seconds - seconds < time.perf_counter() - begun - 1.0
     session.stop()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Three hundred things that a person might do, in no order that was planned: no fault, no leak."""
+"""Three hundred random user actions: no errors, no leaks."""
 
 import gc
 import random
@@ -16,7 +16,7 @@ from test_viewport import Alt, Control, Left, Middle, No, Right, Shift, drag, wh
 
 ACTIONS = 300
 SEED = 8
-# They open a dialog of the system, or end the window.
+# These open a system dialog or end the window.
 LEFT_OUT = {"action.open", "action.save", "action.save_as", "action.quit", "action.full_screen"}
 
 
@@ -126,14 +126,14 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
     bad = (QtMsgType.QtWarningMsg, QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg)
 
     def heard(kind, context, text):
-        # The offscreen platform says so of sizes and of raising windows.
+        # Messages of the offscreen platform about sizes and raising of windows.
         if kind in bad and not text.startswith("This plugin does not support"):
             faults.append(text)
 
     before = qInstallMessageHandler(heard)
     monkey = Monkey(window, cornell, broken)
     try:
-        play(monkey, 2 * ACTIONS // 3)  # what is made once is made now
+        play(monkey, 2 * ACTIONS // 3)  # allocates what is allocated only once
         gc.collect()
         threads, objects, resident = (
             threading.active_count(),
@@ -148,7 +148,7 @@ def test_random_actions(cornell_window, qtbot, cornell, tmp_path, monkeypatch):
         qtbot.waitUntil(lambda: not window.session._jobs, timeout=20000)
         window.session.restart()
         wait_final(qtbot, window.session, 30000)
-        # Threads of single jobs may be at their last one.
+        # A thread of a single job may still be running.
         qtbot.waitUntil(lambda: threading.active_count() <= threads + 1, timeout=20000)
         QTest.qWait(50)
         gc.collect()

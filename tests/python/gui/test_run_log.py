@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics as runs and series, rates, ratios and the table: no Qt."""
+"""Statistics as runs and series, rates, ratios and the table, without Qt."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MATERIAL = {**PROGRAM, "policy": "material"}
 
 
 def statistics(seconds: float, samples: float, length: float = 5.0) -> dict[str, Any]:
-    """Counters of a render of 2 records a sample, 8 of 16 lanes filled."""
+    """Returns statistics of a render with 2 records per sample, and 8 of 16 lanes filled."""
     records = int(2 * samples)
     return {
         "seconds": {"render": seconds},
@@ -49,7 +49,7 @@ def fill(
     log: RunLog, settings: dict[str, Any], speed: float, seconds: float = 4.0, *,
     picture: Any = "picture", noise: float = 0.0, seed: int = 1, looks: int = 12,
 ) -> None:  # fmt: skip
-    """A whole run at so many samples a second, twice as dear in its second half."""
+    """Adds a complete run with the given speed, half as fast in its second half."""
     rng = np.random.default_rng(seed)
     time = samples = 0.0
     dearness = np.where(np.arange(looks) < looks // 2, 1.0, 2.0)
@@ -176,7 +176,7 @@ def test_time_of_is_linear_between_looks() -> None:
 
 
 def test_runs_are_compared_at_equal_samples() -> None:
-    """The dear half of the picture is missing in one run; its rate is higher, its speed is not."""
+    """Without its expensive half, a run has a higher rate but equal speed at equal samples."""
     log = RunLog()
     fill(log, PROGRAM, 1.0)
     whole = log.series[0].run
@@ -205,7 +205,7 @@ def test_a_difference_holds_only_with_repeats() -> None:
 
 
 def test_no_difference_is_claimed_where_repeats_do_not_hold_it() -> None:
-    """One pair looks surely different, since the machine was slower then; repeats say otherwise."""
+    """One pair differs clearly since the machine was slower. Repeats show no difference."""
     log = RunLog()
     for i, drift in enumerate((1.2, 0.9, 1.1, 0.85)):
         fill(log, PROGRAM, 1.0, noise=0.01, seed=30 + i)
@@ -300,7 +300,7 @@ def test_amount(value: float, text: str) -> None:
 
 
 def test_quantiles_of_t() -> None:
-    """97.5 % of Student's density lie below: half of it, and what is between 0 and the quantile."""
+    """The integral of Student's density up to the quantile is 97.5 %."""
     for degrees in (1, 2, 7, 30):
         edges = np.linspace(0.0, t975(degrees), 20_001)
         x = (edges[1:] + edges[:-1]) / 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models of the scene panel without their views: what they say, and what edits make of it."""
+"""Models of the scene panel without views: their contents, and how edits change them."""
 
 import ast
 from pathlib import Path
@@ -45,7 +45,7 @@ def edits(new_session, qtbot, stage_path):
 
 
 class Told:
-    """Counts what a model says."""
+    """Counts the signals of a model."""
 
     def __init__(self, *signals):
         self.counts = [0] * len(signals)
@@ -57,7 +57,7 @@ class Told:
 
 
 def test_models_know_no_widgets():
-    """What is called a model, and what edits are."""
+    """Modules named as models or edits import no widgets."""
     room = Path(wavecomb.gui.__file__).parent
     found = [*room.rglob("*_model.py"), *(room / "scene").glob("*edits.py")]
     found += [room / "scene" / name for name in ("history.py", "render_sync.py")]
@@ -146,7 +146,7 @@ def test_materials_are_listed_with_costs(edits):
     ids = len(model.rows[red].ids)
     assert model.index(red, materials_model.RECORDS).data() == f"{1200 * ids:,}"
     assert model.index(red, materials_model.COST).data() == "41"
-    edits.session.reload()  # the stage is gone until it is read again
+    edits.session.reload()  # the stage is missing until it is read again
     assert model.rows == []
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scene panel with real keys and clicks; pictures are the edited stage's, bit for bit."""
+"""The scene panel with real keys and clicks; images equal renders of the edited stage."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def panel(open_panel, stage_path):
 
 @pytest.fixture
 def same_as_saved(tmp_path, final, qtbot):
-    """Waits for the picture and compares it with the saved edits, rendered by themselves."""
+    """Waits for the image and compares it with a render of the saved edits."""
 
     def check(panel):
         session = panel.session
@@ -72,7 +72,7 @@ def picture(path):
 
 
 def settle(qtbot, session):
-    """Until nothing is being read."""
+    """Waits until nothing is being read."""
     busy = []
     session.busy.connect(busy.append)
     qtbot.waitUntil(lambda: not session._jobs, timeout=20000)
@@ -109,7 +109,7 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
     hidden = same_as_saved(panel)
     before = picture(stage_path)
     assert (hidden != before).any()
-    # The eye shows it again; undo takes that back.
+    # The eye icon shows it again, and undo hides it.
     with qtbot.waitSignal(panel.session.opened, timeout=20000):
         click(view, row(panel, "/World/Things/Ball", VISIBILITY))
     assert (same_as_saved(panel) == before).all()
@@ -123,7 +123,7 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
 
 
 def test_keys_of_the_window(qtbot, stage_path, tmp_path):
-    """F in the tree frames, Ctrl+Z undoes, wherever the focus is in the window."""
+    """F in the tree frames the selection, and Ctrl+Z undoes with the focus anywhere."""
     from PySide6.QtCore import QSettings
 
     from wavecomb.gui.main_window import MainWindow
@@ -185,7 +185,7 @@ def test_material_parameters(panel, same_as_saved, stage_path, final):
     before = final(panel.session).beauty
     panel.tabs.setCurrentWidget(panel.materials)
     materials = panel.materials
-    # Equal materials stay apart.
+    # Materials with equal parameters are separate.
     names = [one.name for one in materials.model.rows]
     assert {"Red", "Wood", "Twin", "Gold"} <= set(names)
     materials.choose("/World/Looks/Red")
@@ -235,7 +235,7 @@ def test_edits_inside_instances_are_live_only(panel, final, qtbot, tmp_path):
     warned = []
     panel.session.warned.connect(warned.append)
     assert panel.edits.save(str(tmp_path / "e.usda")) and "1 edit(s) are not in it" in warned[0]
-    # It outlives a new reading of the stage.
+    # The edit survives reloads of the stage.
     for shown in (False, True):
         with qtbot.waitSignal(panel.session.opened, timeout=20000):
             panel.edits.set_visible(["/World/Things"], shown)
@@ -299,7 +299,7 @@ def test_lights_off_and_alone(panel, same_as_saved, qtbot, stage_path):
         click(view, model.index(0, 2), box(view))
     assert panel.edits.is_hidden("/World/Lights/Key")
     off = same_as_saved(panel)
-    assert len(model.rows) == 3  # one that is off is still listed
+    assert len(model.rows) == 3  # a hidden light is still listed
     for number in (1, 2):
         with qtbot.waitSignal(panel.session.opened, timeout=20000):
             click(view, model.index(number, 3), box(view))
@@ -372,7 +372,7 @@ def test_a_camera_is_looked_through(panel, qtbot):
 
 
 def test_edits_while_the_stage_is_read(panel, same_as_saved):
-    """What is changed meanwhile is in the picture at the end; the last reading counts."""
+    """Edits made while the stage is being read are in the final image."""
     panel.edits.set_visible(["/World/Things/Box"], False)
     panel.materials.choose("/World/Looks/Red")
     panel.materials.fields["base_color"].spins[1].setValue(0.7)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scheduling panel, by keys and clicks, over real renders."""
+"""The scheduling panel, operated by keys and clicks, over real renders."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def panel(session: Any, qtbot: Any) -> SchedulingPanel:
     made.resize(420, 900)
     made.show()
     qtbot.waitExposed(made)
-    session.restart()  # so that the light has seen a picture
+    session.restart()  # gives the indicator an image to compare with
     settle(made, session, qtbot)
     assert made.light.verdict.kind == "first"
     return made
 
 
 def settle(panel: SchedulingPanel, session: Any, qtbot: Any) -> None:
-    """Waits for the end of the render and for what the light says of it."""
+    """Waits for the end of the render and for the indicator."""
 
     def is_over() -> bool:
         frame = session.last_frame
@@ -54,7 +54,7 @@ def settle(panel: SchedulingPanel, session: Any, qtbot: Any) -> None:
 
 
 def choose(panel: SchedulingPanel, name: str, text: str) -> None:
-    """Opens a list and picks a line with the keyboard."""
+    """Opens a list and chooses a line with the keyboard."""
     box = panel.findChild(QComboBox, name)
     index = box.findText(text)
     assert index >= 0, (name, text)
@@ -78,14 +78,14 @@ def type_number(panel: SchedulingPanel, name: str, text: str) -> None:
 
 
 def click(panel: SchedulingPanel, name: str, kind: Any = QPushButton) -> None:
-    """Presses a button."""
+    """Clicks a button."""
     button = panel.findChild(kind, name)
     panel.ensureWidgetVisible(button)
     QTest.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
 def expect_same(panel: SchedulingPanel, session: Any, qtbot: Any, count: int) -> None:
-    """The picture is the same, and at least the count-th that was compared."""
+    """Asserts that the image is unchanged after at least ``count`` comparisons."""
     settle(panel, session, qtbot)
     assert panel.light.verdict.kind == "same", panel.light.verdict
     assert panel.light.book.checked >= count
@@ -224,7 +224,7 @@ def test_adaptive_sampling(panel: SchedulingPanel, session: Any, qtbot: Any) -> 
     settle(panel, session, qtbot)
     assert panel.light.verdict.kind == "first"
     choose(panel, "policy", "none")
-    expect_same(panel, session, qtbot, 1)  # the map of samples is the same, too
+    expect_same(panel, session, qtbot, 1)  # the sample counts are unchanged too
     choose(panel, "adaptive_mode", "noise")
     assert session.setup.noise == 0.5 and session.setup.adaptive == 0, "the target as it was"
     type_number(panel, "min_spp", "64")

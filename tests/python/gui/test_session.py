@@ -16,7 +16,7 @@ from wavecomb.picture.image import read_layers
 
 
 class Watched:
-    """Everything that a session says."""
+    """Records all signals of a session."""
 
     def __init__(self, session):
         self.frames, self.failures, self.versions, self.states = [], [], [], []
@@ -158,7 +158,7 @@ def test_cancel_within_100_ms(new_session, qtbot, cornell):
         waits.append(time.perf_counter() - begun)
         session.resume()
         qtbot.waitUntil(engine.is_busy, timeout=5000)
-    # The best of them: other processes may hold the cores at any one time.
+    # The minimum, since other processes may use the cores.
     assert min(waits) < 0.1 and sorted(waits)[2] < 0.5, waits
 
 
@@ -183,7 +183,7 @@ def test_pause_stop_and_resume(new_session, qtbot, cornell):
     qtbot.waitUntil(lambda: len(watched.frames) > 3, timeout=20000)
     session.pause()
     assert session.state == "paused"
-    # It stands still from its next look on, however long that takes on a busy machine.
+    # The pause starts at the next progress report, which may take long on a busy machine.
     qtbot.waitUntil(lambda: session.last_frame.status.get("paused"), timeout=20000)
     done = session.last_frame.status["samples_done"]
     qtbot.wait(200)
@@ -230,7 +230,7 @@ def test_moving_shows_reduced_pictures_then_the_whole_one(new_session, qtbot, co
         moves += 1
         qtbot.wait(8)
     shown = len(watched.frames)
-    # How much they are reduced is for the speed of the machine to say.
+    # The reduction depends on the speed of the machine.
     assert shown >= 5 and all(f.status.get("preview") for f, _ in watched.frames)
     session.settle()
     frame = final(session, 30000)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits in the session layer: as USD would make them, undone, and back as a layer."""
+"""Edits in the session layer: equal to USD's own, undo, and export as a layer."""
 
 import pytest
 from pxr import Sdf, Usd, UsdGeom
@@ -63,7 +63,7 @@ def path(tmp_path):
 
 
 class Edits:
-    """Edits of a stage with their steps of undo, and a clock that is set by hand."""
+    """Edits of a stage with undo steps and a manual clock."""
 
     def __init__(self, stage, time):
         self.of = StageEdits(stage, time)
@@ -75,7 +75,7 @@ class Edits:
         return getattr(self.of, name)
 
     def do(self, step):
-        """Makes what was planned."""
+        """Applies a planned step."""
         if step is not None:
             self.history.push(step)
         return step
@@ -84,7 +84,7 @@ class Edits:
         return self.do(self.of.plan(label, opinions))
 
     def undone(self):
-        """How many steps there are; all are taken back."""
+        """Undoes all steps and returns their number."""
         count = 0
         while self.history.stack.canUndo():
             self.history.undo()
@@ -113,7 +113,7 @@ def test_visibility_is_what_usd_would_make(path, edits, name, shown):
     other = open_stage(path)
     other.SetEditTarget(other.GetSessionLayer())
     prim = UsdGeom.Imageable.Get(other, name)
-    # At the time itself, since one is animated; ours are default values, which win over the file.
+    # USD needs the time, since one attribute is animated; our default values override the file.
     (prim.MakeVisible if shown else prim.MakeInvisible)(Usd.TimeCode(7))
     assert visible(edits.stage) == visible(other)
     for prim_path, seen in visible(edits.stage).items():
@@ -193,7 +193,7 @@ def test_saved_edits_give_the_same_picture(edits, path, tmp_path):
     assert (shown != wavecomb.render(path, **size).beauty).any()
     stage = Usd.Stage.Open(str(saved))
     assert UsdGeom.GetStageUpAxis(stage) == "Z" and stage.GetDefaultPrim().GetName() == "World"
-    # Over the edits further ones can be made.
+    # The exported layer can be edited further.
     more = Edits(open_stage(saved), Usd.TimeCode(7))
     more.do(more.visible([Sdf.Path("/World/A/C")], True))
     third = save_edits(more.stage, tmp_path / "sub" / "third.usda")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Threads beside the window's own nothing of Qt's, and no garbage of Python's holds any."""
+"""Worker threads hold no Qt objects, and Python's cyclic garbage contains none."""
 
 import gc
 import os
@@ -20,7 +20,7 @@ from wavecomb.gui import bridge
 from wavecomb.gui.worker import Errands, Worker, refuse_qt
 
 HARMLESS = (QColor, QPoint, QPointF, QRect, QRectF, QSize)
-"""Values without a lock or a thread of their own."""
+"""Value types without a lock or thread affinity."""
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def stage_path(tmp_path_factory):
 
 
 def owned(things):
-    """Those that are objects of Qt's, and still are there."""
+    """Returns the Qt objects that still exist."""
     return [
         one
         for one in things
@@ -40,7 +40,7 @@ def owned(things):
 
 
 class Saved:
-    """What Python's collector would have destroyed."""
+    """Collects the objects that Python's garbage collector would have destroyed."""
 
     def __enter__(self):
         gc.collect()
@@ -60,9 +60,9 @@ class Saved:
 
 
 def alone(test):
-    """Runs a test in a process of its own: what other tests left for the collector is not there.
+    """Runs a test in a separate process, without garbage of other tests.
 
-    Tests make objects of Qt's with no window round them, whose garbage PySide may not survive.
+    Tests create Qt objects without a window, and PySide may crash when they are collected.
     """
     if os.environ.get("WAVECOMB_ALONE"):
         return test
@@ -83,7 +83,7 @@ def alone(test):
 @pytest.mark.slow
 @alone
 def test_garbage_that_holds_qt_is_found(qapp):
-    """What the next test relies on."""
+    """Checks the method that the next test uses."""
 
     class Loop(QObject):
         def __init__(self):
@@ -98,7 +98,7 @@ def test_garbage_that_holds_qt_is_found(qapp):
 @pytest.mark.slow
 @alone
 def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
-    """Opened, used and closed: whichever thread collects, it has nothing of Qt's to destroy."""
+    """A window that was opened, used and closed leaves no Qt objects to any collecting thread."""
     warm = window_story.new_window(tmp_path, qapp)
     window_story.end(warm, qapp)
     del warm
@@ -114,7 +114,7 @@ def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
 @pytest.mark.slow
 @alone
 def test_a_session_alone_leaves_no_garbage(qapp, stage_path):
-    """Without a parent: it is gone with the last who has it."""
+    """A session without a parent is destroyed with its last reference."""
     from wavecomb.gui.setup import Setup
     from wavecomb.gui.viewport.session import Session
 
@@ -136,7 +136,7 @@ def test_a_session_alone_leaves_no_garbage(qapp, stage_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("times", [1, pytest.param(10, marks=pytest.mark.long)])
 def test_another_thread_may_collect(stage_path, tmp_path, times):
-    """It does so all the time while a window is used and closed; nothing stands still."""
+    """Another thread collects all the time while a window is used and closed. Nothing blocks."""
     script = str(Path(window_story.__file__))
     done = subprocess.run(
         [sys.executable, script, str(stage_path), str(tmp_path), str(times)],
@@ -150,7 +150,7 @@ def test_another_thread_may_collect(stage_path, tmp_path, times):
 
 
 class Told:
-    """What a worker says, and on which thread."""
+    """Records the signals of a worker and their threads."""
 
     def __init__(self, worker):
         self.done, self.failed, self.threads = [], [], set()
@@ -166,7 +166,7 @@ class Told:
 
 
 class Gate:
-    """Jobs that wait until they may go on."""
+    """Jobs that wait until the gate opens."""
 
     def __init__(self):
         self.open = threading.Event()
@@ -257,7 +257,7 @@ def test_a_worker_may_go_before_its_job(qapp, qtbot):
     worker.submit(gate.job("a"))
     shiboken6.delete(worker)
     gate.open.set()
-    qtbot.wait(50)  # the letter finds nobody
+    qtbot.wait(50)  # the result has no receiver
 
 
 def test_jobs_hold_nothing_of_qt(qapp, worker):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb view` from a shell: what is missing is told in a line; Xvfb shows the stage."""
+"""`wavecomb view` from a shell: missing parts are reported in a line; Xvfb shows the stage."""
 
 import os
 import signal
@@ -65,7 +65,7 @@ def test_a_signal_closes_it(cornell, tmp_path):
         [*COMMAND, str(cornell), "--size", "64", "64"], env=env, stderr=subprocess.PIPE, text=True
     )
     kept, until = tmp_path / "Wavecomb" / "Wavecomb.conf", time.monotonic() + 60
-    # The stage is open once it is among the recent files.
+    # A stage in the list of recent files is open.
     while not (kept.exists() and "cornell.usda" in kept.read_text()):
         assert window.poll() is None and time.monotonic() < until
         time.sleep(0.1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mouse and keyboard move the camera; zoom, shift, region and pick on the picture."""
+"""Mouse and keyboard move the camera; zoom, pan, region and picking in the image."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ Left, Middle, Right = (
 
 
 def drag(widget, button, start, end, modifiers=No, steps=4):
-    """Presses, moves in steps, releases. QTest.mouseMove knows no buttons, so moves are sent."""
+    """Presses, moves in steps and releases. Sends events, since QTest.mouseMove has no buttons."""
     start, end = QPointF(*start), QPointF(*end)
     QTest.mousePress(widget, button, modifiers, start.toPoint())
     for k in range(1, steps + 1):
@@ -70,7 +70,7 @@ def test_orbit(viewport, button, modifiers):
     assert np.linalg.norm(session.pose.position - pivot) == pytest.approx(
         np.linalg.norm(before.position - pivot)
     )
-    # To the right: the camera goes to its left.
+    # Dragging to the right moves the camera to its left.
     assert (session.pose.position - before.position) @ before.right < 0
     assert session.pose.path is None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bars, menus, messages, colours and what is kept of the window."""
+"""Toolbars, menus, messages, colours, and settings kept between windows."""
 
 import threading
 
@@ -210,7 +210,7 @@ def test_text_is_readable_in_both_colours(window, colours):
         high, low = sorted((luminance(a), luminance(b)), reverse=True)
         return (high + 0.05) / (low + 0.05)
 
-    # WCAG 2: 4.5 for text, 3 for graphics.
+    # WCAG 2 contrast: 4.5 for text, 3 for graphics.
     assert contrast(palette.windowText().color(), palette.window().color()) > 4.5
     assert contrast(palette.text().color(), palette.base().color()) > 4.5
     assert contrast(palette.buttonText().color(), palette.button().color()) > 4.5

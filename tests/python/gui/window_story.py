@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A window that is opened, used and closed, without pytest, for tests of threads and garbage.
+"""Opens, uses and closes a window without pytest, for tests of threads and garbage.
 
-Run as ``window_story.py STAGE FOLDER TIMES`` it does so while a thread collects Python's garbage
-all the time, and every other thread collects at every few objects that it makes.
+Run as ``window_story.py STAGE FOLDER TIMES``, it does so while one thread collects garbage all the
+time, and every other thread collects after every few allocations.
 """
 
 import faulthandler
@@ -20,7 +20,7 @@ SECONDS = 120
 
 
 def until(met, what):
-    """Lets the window work until something is so."""
+    """Processes events until a condition is met."""
     from PySide6.QtTest import QTest
 
     end = time.monotonic() + SECONDS
@@ -30,7 +30,7 @@ def until(met, what):
 
 
 def settled(window):
-    """Until nothing is read or written and the last picture is on the screen."""
+    """Waits until nothing is read or written and the last image is displayed."""
     session = window.session
 
     def met():
@@ -58,7 +58,7 @@ def new_window(folder, qapp):
 
 
 def use(window, stage, folder):
-    """Loads, looks about, edits, undoes, compares, saves; every dock and dialog is seen."""
+    """Loads, navigates, edits, undoes, compares and saves; shows every dock and dialog."""
     from PySide6.QtCore import Qt
     from PySide6.QtTest import QTest
 
