@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# `make render` and `make test` work on a fresh machine; `make help` lists the rest.
+# `make render` and `make test` work on a fresh machine. `make help` lists the other targets.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 MAKEFLAGS += --no-builtin-rules
@@ -7,12 +7,13 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 
 BUILD := build/editable
-# Sources of the core are compiled by sixes: a clean build is quicker, an edit dearer. OFF for who edits them.
+# Compile the core in unity batches of six sources. A clean build is faster, but rebuilding after an
+# edit is slower; OFF suits developers of the core.
 BATCH ?= ON
-# Lane widths: default means scalar lanes and the widest that the target has; all means every width it has. A build keeps the
-# widths it was last built with.
+# Lane widths: "default" means scalar lanes and the widest that the target supports, "all" means
+# every supported width. Later builds keep the widths of the last build.
 LANES ?= $(shell cat build/.lanes 2> /dev/null || echo default)
-# Of make test-asan: ON, or all.
+# Checks of make test-asan: ON or all.
 CHECKS ?= ON
 ASAN := build/asan$(if $(filter all,$(CHECKS)),-all)
 TSAN := build/tsan
@@ -20,22 +21,22 @@ WHEEL := build/wheel
 CLANG := build/clang
 ARM64 := build/arm64
 VENV := .venv/bin
-# Of make wheels: portable, or a list of instruction sets as of WAVECOMB_ISAS.
+# Libraries of make wheels: portable, or a list of instruction sets as in WAVECOMB_ISAS.
 ISAS ?= portable
-# Of make fuzz.
+# Options of make fuzz.
 MINUTES ?= 10
 SEED ?= 1
 JOBS ?= $(shell nproc 2> /dev/null || echo 2)
-# One build at a time per directory, whoever starts it.
+# Allows one build at a time per directory, also from different make processes.
 LOCK := $(if $(shell command -v flock),flock build/.lock)
 ASAN_LOCK := $(if $(LOCK),$(LOCK)-asan)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
-# The tools of the environment, also where a tool asks PATH.
+# Makes tools that search PATH find those of the environment.
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLists.txt tests/naive/CMakeLists.txt benchmarks/micro/CMakeLists.txt)
-# Directories too: their time changes when a file comes or goes.
+# Includes directories: their time changes when a file is added or removed.
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
@@ -44,7 +45,7 @@ CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro ex
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-# ---- set-up and build --------------------------------------------------------------------------------
+# ---- set-up and build -------------------------------------------------------------------------
 
 build/.setup: tools/setup tools/setup_embree tools/setup_openvdb tools/debs cmake/embree_probe.cpp cmake/openvdb_probe.cpp \
   constraints.txt pyproject.toml
@@ -58,7 +59,7 @@ lanes:
 build/.lanes: lanes
 	@mkdir -p build; [ "$$(cat $@ 2> /dev/null)" = "$(LANES)" ] || echo "$(LANES)" > $@
 
-# pip configures, builds and installs once; after a source edit CMake alone is quicker.
+# pip configures, builds and installs once. After an edit of a source, CMake alone is faster.
 build/.configured: build/.setup build/.lanes $(CMAKE_INPUTS) pyproject.toml $(wildcard .deps/openvdb/.complete)
 	@echo "build: configuring"
 	@$(LOCK) $(VENV)/python -m pip install -q --no-build-isolation --no-deps -e . --config-settings=build-dir=$(BUILD) \
@@ -78,8 +79,8 @@ setup: build/.setup ## Install what building needs (system packages, .venv, Embr
 setup-test: build/.setup-test
 build: build/.built ## Build the core and the Python module into .venv (editable); LANES=all: every lane width
 
-# Dependencies are what their wheels bring; Embree travels in this one where it is staged. auditwheel copies nothing: what it
-# would find in the system travels already.
+# Dependencies come from their own wheels. A staged Embree is part of this wheel. auditwheel must
+# not copy libraries: what it would take from the system is already included.
 wheels: build/.setup ## The wheel to pass on, in dist/: every instruction set and Python, tagged and checked by auditwheel
 	@$(VENV)/python -c 'import auditwheel' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'auditwheel>=6.8'
 	@echo "wheels: a library for each instruction set"
@@ -96,14 +97,15 @@ sdist: build/.setup ## The source distribution, in dist/
 	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
 	@ls dist/wavecomb-*.tar.gz
 
-# Uploads nothing: what to upload is printed.
+# Uploads nothing; prints what to upload.
 release: test-wheel test-sdist ## Build and test wheels and source distribution, and print what to upload
 	@$(VENV)/python -c 'import twine' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'twine>=6'
 	@$(VENV)/python tools/release
 
-# ---- use -----------------------------------------------------------------------------------------------
+# ---- use ---------------------------------------------------------------------------------------
 
-# The README's picture. Without the denoiser, which is an extra and may not be to be had, it has some noise.
+# The image of the README. Without the denoiser, which is optional and not available everywhere, it
+# is noisier.
 denoiser = $(VENV)/python -c 'import pyoidn' 2> /dev/null
 render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	@mkdir -p out
@@ -111,17 +113,17 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	@$(denoiser) || $(VENV)/python -m pip install -q -c constraints.txt 'pyoidn>=2.5' || true
 	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
 
-# Not a part of make test: MkDocs comes with its own extra.
+# Not part of make test, since MkDocs is in a separate extra.
 docs: build ## The documentation as a site in out/site
 	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
 	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
 	@command -v doxygen > /dev/null || echo "docs: without the C++ reference; apt install doxygen adds it"
 	@echo "wrote out/site/index.html"
 
-# ---- tests ---------------------------------------------------------------------------------------------
+# ---- tests -------------------------------------------------------------------------------------
 
-# Parts, what they need, their lanes and budgets: tests/parts.txt. Every part runs, so that one slip in layout does not hide
-# what the tests say; any failure fails the whole.
+# tests/parts.txt lists the parts with their requirements, lanes and time budgets. All parts run
+# even after a failure, so that a layout error does not hide failing tests.
 test: ## Lint, C++ tests, the same under sanitizers, pytest with one of each kind of what takes long
 	@python3 tools/run_parts $@
 
@@ -131,12 +133,13 @@ test-fast: ## Lint, C++ tests, pytest without the slow ones
 test-long: ## Everything, an hour or more: all tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers
 	@python3 tools/run_parts $@
 
-# Those that optimising may show something of; the others are in test-asan (tests/cpp/CMakeLists.txt).
+# Tests that depend on optimised code. The others are in test-asan (tests/cpp/CMakeLists.txt).
 test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole renders
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all: all tests, and every check in packets and tests, too, which takes five times as long to compile.
+# CHECKS=all builds all tests, with every check also in packets and tests, which takes five times as
+# long to compile.
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(ASAN_LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
 	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS) \
@@ -154,14 +157,14 @@ test-tsan: build/.setup-test ## C++ tests under ThreadSanitizer
 	TSAN_OPTIONS="suppressions=$(CURDIR)/tests/cpp/tsan.supp $(TSAN_OPTIONS)" \
 	  $(TSAN)/tests/cpp/wavecomb_tests --gtest_brief=1 $(if $(FILTER),--gtest_filter='$(FILTER)')
 
-# The naive integrator, which statistical tests compare with, and the program that writes .nvdb files.
+# The naive integrator, a reference for statistical tests, and the program that writes .nvdb files.
 build-test-tools: build
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_test_tools -j $(JOBS) -- --quiet
 
 test-py: build-test-tools build/.setup-test ## Python and statistical tests
 	@$(MAKE) --no-print-directory run-py
 
-# Without what has to be built before: as parts of make test, which has built it.
+# These run without prerequisites, as parts of make test, which has built them.
 run-py:
 	$(VENV)/python -m pytest -q -n $(JOBS)
 
@@ -171,7 +174,7 @@ run-py-fast:
 run-py-long:
 	WAVECOMB_LONG=1 $(VENV)/python -m pytest -q -n $(JOBS) -o faulthandler_timeout=7200
 
-# make test-long runs on a build of all lane widths; what was built before comes back at its end.
+# make test-long builds all lane widths, and restores the previous widths at its end.
 build-all-lanes:
 	@mkdir -p build; test -e build/.lanes-before || echo "$(LANES)" > build/.lanes-before
 	@$(MAKE) --no-print-directory build LANES=all
@@ -186,7 +189,7 @@ test-cpp-long: build build/.setup-test
 	  $(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet; \
 	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# Of a machine that has no compiler either: tests/packaging/test_empty_root.py.
+# tests/packaging/test_empty_root.py covers a machine without a compiler.
 test-wheel: wheels ## Install that wheel into a fresh environment and an empty root; render with each of its libraries
 	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv
 	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pip pytest dist/wavecomb-*.whl
@@ -196,15 +199,17 @@ test-wheel: wheels ## Install that wheel into a fresh environment and an empty r
 test-sdist: sdist build/.setup-test ## Build the source distribution in a folder of its own, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
-# Compiled with us, for another standard library or CPU than the distribution's.
+# Libraries compiled from source, since the distribution's are for another standard library or CPU.
 from_source := -DOpenSubdiv_SOURCE=$(CURDIR)/.deps/source/opensubdiv -DGoogleTest_SOURCE=/usr/src/googletest
-# Two lane widths, and little optimised: whether it compiles and passes, not how fast it is.
+# Two lane widths and little optimisation: these builds test correctness, not speed.
 clang_widths = 1;$(if $(shell grep -m 1 -o avx2 /proc/cpuinfo 2> /dev/null),8,4)
-# The newest; asked for when tools/setup has installed it.
+# The newest clang. Expanded when used, after tools/setup has installed it.
 CLANGXX ?= $$(ls /usr/bin/clang++-[0-9]* | sort -V | tail -n 1)
-# oneTBB's wheel is of libstdc++, and a process ends where a task of libc++ throws through it: what tests that is left out.
+# The oneTBB wheel uses libstdc++, and an exception from a libc++ task ends the process. Leave out
+# the test of that.
 clang_without := RayRecording.StopsAtItsLimit
-# Pictures as the reference integrator of GCC's build made them, the wave as the scalar integrator, and what Python calls.
+# The images were made by the reference integrator of the GCC build. Also compares the wavefront
+# with the scalar integrator, and tests functions called from Python.
 clang_python := test_golden test_exactness test_api test_python_policy
 
 build/.setup-clang: build/.setup-test
@@ -213,8 +218,8 @@ build/.setup-clang: build/.setup-test
 build/.setup-arm64: build/.setup
 	@$(LOCK) tools/setup arm64 && touch $@
 
-# The module is tried in an environment that has the packages of .venv, but not its editable Wavecomb (a .pth of another
-# environment is not read).
+# Tests the module in an environment with the packages of .venv but without its editable Wavecomb.
+# (Python ignores .pth files of another environment.)
 test-clang: build/.setup-clang ## C++ tests and the Python module by clang with libc++: as near as Linux comes to macOS
 	@test -e $(CLANG)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(CLANG) -G Ninja --log-level=NOTICE $(from_source) \
 	  -DCMAKE_CXX_COMPILER="$(CLANGXX)" -DCMAKE_CXX_FLAGS=-stdlib=libc++ -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" \
@@ -227,11 +232,12 @@ test-clang: build/.setup-clang ## C++ tests and the Python module by clang with 
 	  $(VENV)/python -c "$$folder" > "$$site/others.pth"
 	LD_LIBRARY_PATH=$(CURDIR)/.venv/lib $(CLANG)/venv/bin/python -m pytest -q -n $(JOBS) -k "not come_out and not odd_objects" $(clang_python:%=tests/python/%.py)
 
-# What is computed in lanes, and whole renders. Left out: statistics, which take hours under emulation and test formulas
-# that are the same everywhere, and containers. ARM64_TESTS=all has those, too.
+# Tests of code in lanes and of whole renders. Leaves out statistics, which take hours under
+# emulation and test formulas that do not depend on the CPU, and containers. ARM64_TESTS=all
+# includes them.
 arm64_tests := lanes rows math vec_frame warp sampler morton_hash camera_ray params programs variants surface texture curves \
   curve_clumps volumes subdivision accelerator motion wave renderer policies
-# Statistics of materials: minutes each under emulation.
+# Statistics of materials, which take minutes each under emulation.
 arm64_without := Programs.*Furnace*:Programs.DeltaLobes*:Programs.WeightIs*:Programs.Reciprocity*:Programs.MultipleScattering*
 ARM64_TESTS ?= $(subst $() ,;,$(strip $(arm64_tests)))
 test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for ARM64, under qemu
@@ -252,7 +258,7 @@ bench: build ## Micro-benchmarks; JSON goes to out/micro
 	@mkdir -p out/micro; for program in $(BUILD)/benchmarks/micro/micro_*; do [ -f $$program ] || continue; \
 	  echo "== $$program"; $$program --benchmark_out=out/micro/$${program##*/micro_}.json || exit 1; done
 
-# ---- style ---------------------------------------------------------------------------------------------
+# ---- style -------------------------------------------------------------------------------------
 
 lint: build/.setup-test ## Layout, layers, English, types; changes nothing
 	$(VENV)/ruff check --quiet .

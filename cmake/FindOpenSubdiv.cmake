@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-# OpenSubdiv's CPU library as the target OpenSubdiv::osdCPU. By its files: the CMake package of Debian 12 and
-# Ubuntu names static libraries that are not installed.
+# Defines the target OpenSubdiv::osdCPU, OpenSubdiv's CPU library. Searches for files, because the
+# CMake package of Debian 12 and Ubuntu refers to static libraries that it does not install.
 #
-# OpenSubdiv_ROOT leads to it where it is elsewhere. OpenSubdiv_NEEDS_OPENMP: it is linked with libgomp.
-# OpenSubdiv_SOURCE, the folder of its sources: what we need of it is compiled as we are, for another CPU or standard
-# library than the distribution's.
+# OpenSubdiv_ROOT: an additional folder to search.
+# OpenSubdiv_NEEDS_OPENMP: set if the library is linked with libgomp.
+# OpenSubdiv_SOURCE: folder of its sources. The required parts are then compiled with Wavecomb's
+# flags, for another CPU or standard library than the distribution's.
 
-# _osd_version(FOLDER): sets OpenSubdiv_VERSION to that of the headers in it.
+# _osd_version(FOLDER): sets OpenSubdiv_VERSION from the headers in FOLDER.
 function(_osd_version folder)
   file(STRINGS "${folder}/opensubdiv/version.h" version REGEX "define +OPENSUBDIV_VERSION +v[0-9_]+")
   string(REGEX MATCH "[0-9]+_[0-9]+_[0-9]+" version "${version}")
@@ -21,7 +22,7 @@ if(OpenSubdiv_SOURCE)
   target_include_directories(wavecomb_opensubdiv SYSTEM PUBLIC "${OpenSubdiv_SOURCE}")
   target_compile_features(wavecomb_opensubdiv PUBLIC cxx_std_14)
   target_compile_options(wavecomb_opensubdiv PRIVATE -w)
-  # By this name in what is exported, too.
+  # An imported target, so that exported targets refer to it by this name.
   add_library(OpenSubdiv::osdCPU INTERFACE IMPORTED)
   set_target_properties(OpenSubdiv::osdCPU PROPERTIES INTERFACE_LINK_LIBRARIES wavecomb_opensubdiv)
   set(OpenSubdiv_LIBRARY wavecomb_opensubdiv)

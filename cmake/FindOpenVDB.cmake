@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-# OpenVDB as the target OpenVDB::openvdb, by its files: the module that comes with it asks for Boost's and
-# Imath's packages, which nothing here needs.
+# Defines the target OpenVDB::openvdb. Searches for files, because OpenVDB's own module requires the
+# packages of Boost and Imath, which are not needed here.
 #
-# OpenVDB_ROOT leads to it, and to nothing else, where it is set.
+# OpenVDB_ROOT: if set, the only folder to search.
 set(_vdb_where "")
 if(OpenVDB_ROOT)
   set(_vdb_where PATHS "${OpenVDB_ROOT}" PATH_SUFFIXES include lib NO_DEFAULT_PATH)
 endif()
 find_path(OpenVDB_INCLUDE_DIR openvdb/openvdb.h ${_vdb_where})
 find_library(OpenVDB_LIBRARY openvdb ${_vdb_where})
-# Its headers convert halves by a table of Imath's.
+# OpenVDB's headers convert halves with a table in Imath.
 find_library(OpenVDB_IMATH_LIBRARY Imath ${_vdb_where})
 if(OpenVDB_INCLUDE_DIR)
   file(STRINGS "${OpenVDB_INCLUDE_DIR}/openvdb/version.h" OpenVDB_VERSION

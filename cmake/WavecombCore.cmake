@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# wavecomb_add_core: the core as a library. Called once for this tree, and once more for each instruction
-# set of WAVECOMB_ISAS.
+# wavecomb_add_core adds the core as a library. It is called once for this tree, and once more for
+# each instruction set in WAVECOMB_ISAS.
 
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.cpp")
-# wavecomb_read_rows(VAR FILE PATTERN): what matches in a header of src/wavecomb.
+# wavecomb_read_rows(VAR FILE PATTERN): sets VAR to the matches in a header of src/wavecomb.
 function(wavecomb_read_rows var file pattern)
   set(file "${PROJECT_SOURCE_DIR}/src/wavecomb/${file}")
   file(READ "${file}" text)
@@ -12,7 +12,8 @@ function(wavecomb_read_rows var file pattern)
   set(${var} ${rows} PARENT_SCOPE)
 endfunction()
 
-# Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)", "P(name, Class, ...)". Each has a header of its name.
+# Rows of WAVECOMB_PROGRAMS: "X(name, Class, ...)" or "P(name, Class, ...)". Each program has a
+# header with its name.
 wavecomb_read_rows(programs scene/programs.h "\n  [XP]\\([a-z_0-9]+, ")
 list(TRANSFORM programs REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
 file(GLOB program_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/*.h")
@@ -29,11 +30,12 @@ foreach(program IN LISTS program_headers)
       "(src/wavecomb/scene/programs.h) has no row for it")
   endif()
 endforeach()
-# Programs of what lies between surfaces: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". They have no
-# units of their own kind.
+# Programs of media: rows of WAVECOMB_MEDIUM_PROGRAMS, "M(name, Class, ...)". They have no separate
+# compilation units.
 wavecomb_read_rows(media scene/programs.h " M\\([a-z_0-9]+, ")
 list(TRANSFORM media REPLACE "^.*\\(([a-z_0-9]+), $" "\\1")
-# Variants, as "name:program": programs as they are, then rows of WAVECOMB_VARIANTS, "X(name, program, parts)".
+# Variants as "name:program": first the full programs, then rows of WAVECOMB_VARIANTS, "X(name,
+# program, parts)".
 wavecomb_read_rows(reduced scene/material_parts.h "\n  X\\([a-z_0-9]+, [a-z_0-9]+, ")
 list(TRANSFORM reduced REPLACE "^.*\\(([a-z_0-9]+), ([a-z_0-9]+), $" "\\1:\\2")
 set(variants ${programs} ${media})
@@ -42,29 +44,32 @@ list(APPEND variants ${reduced})
 set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$|/render/lane_kernels\\.cpp$")
-# With WAVECOMB_BATCH: these stay alone. Kinds of lights are told by the same few names; the other is Embree's.
+# Sources excluded from unity batches (WAVECOMB_BATCH): lights, which reuse the same local names,
+# and bare_traversal.cpp, which includes Embree.
 file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/*.cpp")
 list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp")
 set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/subdivision.cpp")
 set_source_files_properties(${alone} ${refiner} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(WAVECOMB_SANITIZE)
-  # OpenSubdiv's templates take a compiler three times as long to optimise under sanitizers as without.
+  # Sanitizers triple the time to optimise OpenSubdiv's templates.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
 file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h"
   "${PROJECT_SOURCE_DIR}/src/wavecomb/*.inl")
-# Only the core. Not all of -Wconversion: int to float is everyday in kernels that serve float and packets.
+# For the core only. -Wconversion would also warn about int to float, which is common in kernels.
 set(core_warnings -Wfloat-conversion)
 
-# What nearly every unit includes, of others; parsing it is half of what a small unit takes.
+# Third-party headers that nearly every unit includes. Parsing them is half of the compile time of a
+# small unit.
 set(wavecomb_pch <algorithm> <array> <chrono> <cmath> <cstring> <functional> <limits> <memory> <numeric>
   <optional> <span> <string> <utility> <vector> <drjit/packet.h>)
 
-# Rows of WAVECOMB_KERNELS, as "kind:set:widths:reduced".
+# Rows of WAVECOMB_KERNELS as "kind:set:widths:reduced".
 wavecomb_read_rows(kernels integrate/kernel_matrix.h "\n  X\\([a-z]+, [a-z]+, [a-z]+, [a-z]+, ")
 list(TRANSFORM kernels REPLACE "^.*\\(([a-z]+), ([a-z]+), ([a-z]+), ([a-z]+), $" "\\1:\\2:\\3:\\4")
 
-# wavecomb_kernel_units(VAR KIND SET WIDTH): units of a row of WAVECOMB_KERNELS in WIDTH lanes, made in the build tree.
+# wavecomb_kernel_units(VAR KIND SET WIDTH): generates the units of a row of WAVECOMB_KERNELS for
+# WIDTH lanes in the build tree.
 function(wavecomb_kernel_units var kind set width)
   set(units "")
   set(index 0)
@@ -82,9 +87,9 @@ function(wavecomb_kernel_units var kind set width)
   set(${var} ${units} PARENT_SCOPE)
 endfunction()
 
-# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): units of WIDTH lanes in a build whose widest lanes are WIDEST: those of
-# the rows of WAVECOMB_KERNELS, with the column `reduced` where REDUCED, and one for each *.lanes.cpp. They differ from
-# one width to the next by WAVECOMB_LANES.
+# wavecomb_lane_units(VAR WIDTH WIDEST REDUCED): generates the units for WIDTH lanes in a build
+# whose widest lanes are WIDEST: those of WAVECOMB_KERNELS (with its column `reduced` if REDUCED),
+# and one for each *.lanes.cpp. Units of different widths differ in WAVECOMB_LANES.
 function(wavecomb_lane_units var width widest reduced)
   set(all "")
   foreach(row IN LISTS kernels)
@@ -112,8 +117,8 @@ function(wavecomb_lane_units var width widest reduced)
   set(${var} ${all} PARENT_SCOPE)
 endfunction()
 
-# wavecomb_add_core(NAME FLAGS [STATIC]): the library NAME, compiled with FLAGS of wavecomb_add_flags. Scalar
-# units are always there: the reference integrator has their kernels.
+# wavecomb_add_core(NAME FLAGS [STATIC]): adds the library NAME, compiled with FLAGS from
+# wavecomb_add_flags. It always contains scalar units, whose kernels the reference integrator uses.
 function(wavecomb_add_core name flags)
   add_library(${name} ${ARGN} ${core_sources} ${core_headers})
   target_compile_features(${name} PUBLIC cxx_std_20)
@@ -135,7 +140,7 @@ function(wavecomb_add_core name flags)
     list(APPEND packets ${units})
   endforeach()
   wavecomb_lane_units(scalar 1 ${widest} ${reduced})
-  # lane_kernels() lists the widths of this library.
+  # lane_kernels() lists the lane widths of this library.
   set(table ${name}_lane_kernels)
   add_library(${table} OBJECT "${PROJECT_SOURCE_DIR}/src/wavecomb/render/lane_kernels.cpp")
   target_include_directories(${table} PRIVATE "${PROJECT_SOURCE_DIR}/src")
@@ -154,7 +159,7 @@ function(wavecomb_add_core name flags)
     target_link_libraries(${lanes} PRIVATE ${flags} embree TBB::tbb)
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${lanes}>)
   endforeach()
-  # What the units of kernels include, but for programs and for what is compiled for each of them.
+  # Headers that units of kernels include, except programs and code specific to each kernel.
   set(kernel_pch ${wavecomb_pch} <wavecomb/integrate/shared_kernels.h> <wavecomb/integrate/wave.h>
     <wavecomb/integrate/stages/order_rays.h>)
   foreach(step IN ITEMS interact emit sample_light scatter survive)

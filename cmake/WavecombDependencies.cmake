@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Finds Embree 4, oneTBB, OpenSubdiv, Dr.Jit's headers and Python; and OpenVDB, which may be missing.
+# Finds Embree 4, oneTBB, OpenSubdiv, Dr.Jit's headers, Python, and optionally OpenVDB.
 #
-# Embree: the distribution's first; else the one that tools/setup_embree staged in .deps/embree.
-# oneTBB: from where Embree came, so that one scheduler owns the threads: the distribution's beside the
-# distribution's Embree, the wheels' (tbb, tbb-devel) beside the staged one.
+# Embree comes from the distribution, or else from .deps/embree, where tools/setup_embree stages it.
+# oneTBB comes from the same source as Embree, so that a process has one scheduler: from the
+# distribution with its Embree, or from the wheels (tbb, tbb-devel) with the staged Embree.
 
 if(NOT DEFINED Python_EXECUTABLE AND EXISTS "${PROJECT_SOURCE_DIR}/.venv/bin/python")
   set(Python_EXECUTABLE "${PROJECT_SOURCE_DIR}/.venv/bin/python")
@@ -52,12 +52,12 @@ else()
   set(WAVECOMB_EMBREE_IS_STAGED FALSE)
 endif()
 
-# A debug build too takes the release library: Embree loads that one, and there is to be one.
+# Debug builds use the release library too. Embree loads that one, and a process needs a single one.
 set(TBB_FIND_RELEASE_ONLY ON)
 if(WAVECOMB_EMBREE_IS_STAGED)
   find_package(TBB CONFIG QUIET COMPONENTS tbb PATHS "${_hint_tbb}" NO_DEFAULT_PATH)
 else()
-  # Not by way of PATH, which may hold the environment's bin directory.
+  # Ignore PATH, which may contain the bin directory of the environment.
   find_package(TBB CONFIG QUIET COMPONENTS tbb NO_SYSTEM_ENVIRONMENT_PATH NO_CMAKE_ENVIRONMENT_PATH)
 endif()
 if(NOT TBB_FOUND)
@@ -74,7 +74,7 @@ else()
   set(WAVECOMB_TBB_IS_WHEEL FALSE)
 endif()
 
-# Far and Sdc of it; neither its evaluators nor OpenGL.
+# Uses Far and Sdc of OpenSubdiv, not its evaluators or OpenGL.
 list(APPEND CMAKE_MODULE_PATH "${PROJECT_SOURCE_DIR}/cmake")
 find_package(OpenSubdiv 3.4 MODULE QUIET)
 if(NOT OpenSubdiv_FOUND)
@@ -82,8 +82,8 @@ if(NOT OpenSubdiv_FOUND)
     "package (libosd-dev, opensubdiv-devel, opensubdiv), or pass -DOpenSubdiv_ROOT=.")
 endif()
 
-# OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake): linked with the oneTBB above, so from where
-# Embree came.
+# OpenVDB, for the plug-in that reads volumes (WavecombVdb.cmake). It must be linked with the oneTBB
+# above, so it comes from the same source as Embree.
 option(WAVECOMB_VDB "Python: build the plug-in that reads volumes, where OpenVDB is found" ON)
 set(WAVECOMB_STAGED_OPENVDB "${PROJECT_SOURCE_DIR}/.deps/openvdb")
 if(WAVECOMB_PYTHON AND WAVECOMB_VDB)

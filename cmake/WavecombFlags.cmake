@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-# wavecomb_private: what every translation unit of this tree is compiled with (core, tests, benchmarks,
+# wavecomb_private: compile options of every translation unit of this tree (core, tests, benchmarks,
 # bindings).
 #
-# Every unit gets the same floating-point flags: a formula gives the same bits wherever it is inlined.
+# All units use the same floating-point options, so that a formula gives the same bits wherever it
+# is inlined.
 
 include(CheckCXXSourceCompiles)
 
 set(WAVECOMB_LANE_WIDTHS "" CACHE STRING
   "Lane widths to build, of 1;4;8;16 (default: 1 and the widest that the target has); all: every width it has")
 
-# What is the same for every instruction set.
+# Options for every instruction set.
 add_library(wavecomb_common INTERFACE)
 target_compile_features(wavecomb_common INTERFACE cxx_std_20)
 target_compile_options(wavecomb_common INTERFACE
@@ -17,13 +18,14 @@ target_compile_options(wavecomb_common INTERFACE
   -Wall -Wextra -Wpedantic $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> -Wnon-virtual-dtor -Woverloaded-virtual -Wextra-semi -Wno-psabi
   # Masks of scalar lanes are bool.
   $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-bitwise-instead-of-logical>
-  # GCC 12 sees uninitialized and out-of-bounds vectors inside its own intrinsics once they are inlined.
+  # Once inlined, GCC 12's own intrinsics cause false warnings of uninitialized and out-of-bounds
+  # vectors.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
-# wavecomb_lean, linked last: what is left out of kernels in packets and of the tests' own units. Checks of
-# every reference to a packet, and of the scope of every packet, are 3/4 of the time that a compiler takes for
-# such a unit. The same templates in scalar lanes, and all the rest of the core, have every check;
-# WAVECOMB_SANITIZE=all gives them to packets and tests, too.
+# wavecomb_lean, linked last, removes sanitizer checks from packet kernels and test units. Checks of
+# every reference to a packet, and of every packet's scope, take 3/4 of the compile time of such a
+# unit. The same templates with scalar lanes, and the rest of the core, keep all checks.
+# WAVECOMB_SANITIZE=all keeps them everywhere.
 add_library(wavecomb_lean INTERFACE)
 if(WAVECOMB_SANITIZE)
   if(WAVECOMB_SANITIZE STREQUAL "thread")
@@ -39,7 +41,8 @@ if(WAVECOMB_SANITIZE)
   target_link_options(wavecomb_common INTERFACE ${_sanitize})
 endif()
 
-# _wavecomb_has(VAR ARCH EXPRESSION): VAR says whether the preprocessor expression holds under -march=ARCH.
+# _wavecomb_has(VAR ARCH EXPRESSION): sets VAR to whether a preprocessor expression holds with
+# -march=ARCH.
 function(_wavecomb_has var arch expression)
   set(CMAKE_REQUIRED_QUIET TRUE)
   if(arch)
@@ -50,9 +53,10 @@ function(_wavecomb_has var arch expression)
   set(${var} "${${key}}" PARENT_SCOPE)
 endfunction()
 
-# wavecomb_add_flags(NAME ARCH): the interface library NAME, for what is compiled with -march=ARCH (empty:
-# the compiler's default). Properties: WAVECOMB_WIDTHS, the lane widths that are built; WAVECOMB_LABEL, what
-# such a library is called in messages. The interface library NAME_widths defines WAVECOMB_HAS_LANES_<width>.
+# wavecomb_add_flags(NAME ARCH): adds the interface library NAME for code compiled with -march=ARCH
+# (empty: the compiler's default). Properties: WAVECOMB_WIDTHS, the lane widths to build;
+# WAVECOMB_LABEL, the name of the library in messages. The interface library NAME_widths defines
+# WAVECOMB_HAS_LANES_<width>.
 function(wavecomb_add_flags name arch)
   _wavecomb_has(_isa_4 "${arch}" "defined(__SSE4_2__) || defined(__ARM_NEON)")
   _wavecomb_has(_isa_8 "${arch}" "defined(__AVX2__) && defined(__FMA__)")
@@ -87,7 +91,7 @@ function(wavecomb_add_flags name arch)
     set(label default)
   endif()
   add_library(${name} INTERFACE)
-  # Sanitizers see the same code in fewer kernels (integrate/kernel_matrix.h).
+  # Sanitized builds have fewer kernels that contain the same code (integrate/kernel_matrix.h).
   set(reduced 0)
   if(WAVECOMB_SANITIZE AND NOT WAVECOMB_SANITIZE STREQUAL "all")
     set(reduced 1)
@@ -101,7 +105,8 @@ function(wavecomb_add_flags name arch)
   endif()
   target_compile_definitions(${name} INTERFACE WAVECOMB_MAX_LANES=${most}
     WAVECOMB_REDUCED_KERNELS=${reduced})
-  # Only for units that list the widths: the others compile to the same objects with fewer widths or more.
+  # Only for units that list the widths. Other units compile to the same objects for any set of
+  # widths.
   add_library(${name}_widths INTERFACE)
   foreach(width IN LISTS widths)
     target_compile_definitions(${name}_widths INTERFACE WAVECOMB_HAS_LANES_${width}=1)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# One Python module for each instruction set in WAVECOMB_ISAS, and the probe wavecomb._cpu that says which of
-# them a CPU runs. docs/decisions/isa.md has the reasons.
+# Adds one Python module for each instruction set in WAVECOMB_ISAS, and the module wavecomb._cpu
+# that reports which of them a CPU supports. docs/decisions/isa.md gives the reasons.
 
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
   set(_known x86-64-v2 x86-64-v3 x86-64-v4)
@@ -30,12 +30,12 @@ if(NOT WAVECOMB_HAS_CPU_LEVELS)
     "x86-64-v2 to x86-64-v4 (__builtin_cpu_supports); take GCC 12 or newer.")
 endif()
 
-# The probe runs on every CPU: the compiler's baseline, the C interface of Python, no library but libc.
+# wavecomb._cpu runs on every CPU: compiler's baseline, Python's C API, no library but libc.
 Python_add_library(wavecomb_cpu MODULE "${PROJECT_SOURCE_DIR}/bindings/cpu/cpu.cpp")
 target_compile_definitions(wavecomb_cpu PRIVATE Py_LIMITED_API=0x030A0000)
 target_link_libraries(wavecomb_cpu PRIVATE wavecomb_common)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
-  # It calls nothing of libc itself, and auditwheel asks which one it is for.
+  # It calls no libc function, but auditwheel needs the dependency to determine the libc.
   target_link_libraries(wavecomb_cpu PRIVATE "-Wl,--push-state,--no-as-needed" -l:libc.so.6 "-Wl,--pop-state")
 endif()
 set_target_properties(wavecomb_cpu PROPERTIES OUTPUT_NAME _cpu CXX_VISIBILITY_PRESET hidden

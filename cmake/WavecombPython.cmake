@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python module wavecomb._core, and the libraries that travel with it.
-# Everything here is in the install component `python`, relative to site-packages.
+# Adds the Python module wavecomb._core and the libraries that are installed with it. All rules use
+# the install component `python`, relative to site-packages.
 #
-# Without WAVECOMB_ISAS there is one module, wavecomb/_core. With it, each instruction set has its own in
-# wavecomb/lib/<isa>/_core, and wavecomb/_cpu says which of them this CPU runs; python/wavecomb/isa.py chooses.
+# Without WAVECOMB_ISAS, there is one module, wavecomb/_core. With it, each instruction set has a
+# module wavecomb/lib/<isa>/_core, wavecomb/_cpu reports which of them this CPU supports, and
+# python/wavecomb/isa.py chooses.
 
 execute_process(COMMAND "${Python_EXECUTABLE}" -m nanobind --cmake_dir
   OUTPUT_VARIABLE nanobind_ROOT OUTPUT_STRIP_TRAILING_WHITESPACE)
 find_package(nanobind CONFIG REQUIRED)
 
-# One file for every Python from 3.10 on: the stable ABI, with nanobind itself in the wheel nanobind-backend. With libc++
-# that does not work but on macOS (nb_defs.h says why): nanobind is linked in there, for this Python alone.
+# A stable-ABI module serves every Python from 3.10, with nanobind in the wheel nanobind-backend.
+# With libc++ this works on macOS only (see nb_defs.h). Elsewhere nanobind is linked statically, for
+# the current Python version only.
 check_cxx_source_compiles("#include <version>
 #ifndef _LIBCPP_VERSION
 #error no
@@ -21,7 +23,7 @@ if(WAVECOMB_HAS_LIBCXX AND NOT APPLE)
   set(WAVECOMB_PYTHON_ABI "")
 endif()
 
-# wavecomb_nanobind_module(NAME ARGUMENTS...): as nanobind_add_module.
+# wavecomb_nanobind_module(NAME ARGUMENTS...): like nanobind_add_module.
 function(wavecomb_nanobind_module name)
   if(WAVECOMB_PYTHON_ABI)
     nanobind_add_module(${name} BACKEND_MODULE nanobind_backend STABLE_ABI_VERSION ${WAVECOMB_PYTHON_ABI}
@@ -37,7 +39,7 @@ if(NOT binding_sources)
   message(FATAL_ERROR "bindings/ holds no *.cpp: there is no Python module to build.")
 endif()
 
-# An Embree that is neither staged nor the system's (embree_ROOT) is looked for where it was found.
+# An Embree that is neither staged nor in a system folder (embree_ROOT) needs an rpath.
 set(_embree_rpath "")
 if(NOT WAVECOMB_EMBREE_IS_STAGED)
   get_target_property(_embree_library embree LOCATION)
@@ -48,30 +50,33 @@ if(NOT WAVECOMB_EMBREE_IS_STAGED)
   endif()
 endif()
 
-# OpenSubdiv travels with us, and the OpenMP runtime that it is linked with where it is: no wheel has it.
+# Install OpenSubdiv with the module, and the OpenMP runtime if OpenSubdiv is linked with it, since
+# no wheel provides them.
 get_filename_component(_osd_library "${OpenSubdiv_LIBRARY}" REALPATH)
 set(_osd_link "")
 if(OpenSubdiv_NEEDS_OPENMP AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
   execute_process(COMMAND "${CMAKE_CXX_COMPILER}" -print-file-name=libgomp.so.1
     OUTPUT_VARIABLE _gomp_library OUTPUT_STRIP_TRAILING_WHITESPACE)
-  # A direct need of ours: it is then looked for where we say, and OpenSubdiv finds it loaded.
+  # A direct dependency uses our rpath. OpenSubdiv then finds the runtime already loaded.
   set(_osd_link "-Wl,--push-state,--no-as-needed" gomp "-Wl,--pop-state")
 endif()
 
-# wavecomb_add_module(NAME CORE FLAGS FOLDER): wavecomb/FOLDER/_core on top of the core library CORE.
+# wavecomb_add_module(NAME CORE FLAGS FOLDER): adds wavecomb/FOLDER/_core, which uses the core
+# library CORE.
 function(wavecomb_add_module name core flags folder)
   wavecomb_nanobind_module(${name} ${binding_sources})
   target_compile_definitions(${name} PRIVATE WAVECOMB_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${name} PRIVATE ${core} ${flags} TBB::tbb ${_osd_link})
   target_precompile_headers(${name} PRIVATE ${wavecomb_pch} <nanobind/nanobind.h> <nanobind/ndarray.h>)
-  # Nothing but its entry leaves the module: no other library is to be bound to code of its instruction set.
+  # Export only the entry point. Otherwise other libraries could bind to code for this instruction
+  # set.
   if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
     target_link_options(${name} PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
     set_property(TARGET ${name} APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/python_exports.map")
   endif()
-  # In site-packages/wavecomb: `lib` holds what we bring; ../../.. is <venv>/lib, where the tbb wheel puts
-  # libtbb.so.12 (not looked for when oneTBB is the distribution's). In the build tree the linked
-  # directories are enough.
+  # In site-packages/wavecomb, `lib` holds the installed libraries, and ../../.. is <venv>/lib with
+  # libtbb.so.12 of the tbb wheel (omitted if oneTBB is the distribution's). In the build tree, the
+  # linked directories suffice.
   string(REGEX REPLACE "[^/]+" ".." up "${folder}")
   if(up)
     string(APPEND up "/")
@@ -93,7 +98,8 @@ if(WAVECOMB_ISAS)
   include(cmake/WavecombIsas.cmake)
 else()
   wavecomb_add_module(wavecomb_python wavecomb_core wavecomb_private "")
-  # What the bindings really offer, to compare python/wavecomb/_core.pyi with: target wavecomb_stub.
+  # Target wavecomb_stub: the stub generated from the module, to compare with
+  # python/wavecomb/_core.pyi.
   nanobind_add_stub(wavecomb_stub EXCLUDE_FROM_ALL MODULE _core OUTPUT "${PROJECT_BINARY_DIR}/_core.pyi"
     PYTHON_PATH $<TARGET_FILE_DIR:wavecomb_python> DEPENDS wavecomb_python)
   if(BUILD_SHARED_LIBS)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python module wavecomb._vdb, which reads volumes through OpenVDB, in the install component `python`. It
-# knows nothing of the core, so one serves all instruction sets.
+# Adds the Python module wavecomb._vdb, which reads volumes with OpenVDB, in the install component
+# `python`. It does not depend on the core, so one module serves all instruction sets.
 message(STATUS "OpenVDB ${OpenVDB_VERSION} (${OpenVDB_LIBRARY})")
 
 file(GLOB _vdb_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/bindings/vdb/*.cpp")
@@ -16,7 +16,7 @@ set_target_properties(wavecomb_vdb PROPERTIES
   INSTALL_RPATH "${_vdb_rpath}"
   INSTALL_RPATH_USE_LINK_PATH OFF)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
-  # DT_RPATH, not DT_RUNPATH: it holds for what OpenVDB is linked with, too.
+  # DT_RPATH also applies to the dependencies of OpenVDB; DT_RUNPATH does not.
   target_link_options(wavecomb_vdb PRIVATE "-Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map"
     "-Wl,--disable-new-dtags")
   set_property(TARGET wavecomb_vdb APPEND PROPERTY LINK_DEPENDS "${PROJECT_SOURCE_DIR}/cmake/vdb_exports.map")
@@ -24,7 +24,7 @@ endif()
 install(TARGETS wavecomb_vdb LIBRARY DESTINATION wavecomb COMPONENT python)
 add_dependencies(wavecomb_python wavecomb_vdb)
 
-# What is staged travels with us.
+# Install the staged libraries with the module.
 string(FIND "${OpenVDB_LIBRARY}" "${WAVECOMB_STAGED_OPENVDB}/" _at)
 if(_at EQUAL 0)
   install(DIRECTORY "${WAVECOMB_STAGED_OPENVDB}/lib/" DESTINATION wavecomb/lib COMPONENT python

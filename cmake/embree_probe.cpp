@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Do Embree's headers and library agree? Compiled and run by tools/setup_embree, where the two come
-// from different releases. Checks the version, the compile-time options that change the layout of
-// RTCHit (instance levels, instance arrays) for one ray and for packets of 16, filter functions and
-// ray masks.
+// Checks that Embree's headers and library match. tools/setup_embree compiles and runs it if the
+// two come from different releases. Checks the version, the compile-time options that change the
+// layout of RTCHit (instance levels, instance arrays) for single rays and packets of 16, filter
+// functions and ray masks.
 #include <embree4/rtcore.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ void on_error(void*, RTCError, const char* message) {
 
 int filter_calls = 0;
 
-// Rejects everything in the half x < 0.25.
+// Rejects hits with x < 0.25.
 void filter(const RTCFilterFunctionNArguments* args) {
   ++filter_calls;
   for (unsigned i = 0; i < args->N; ++i) {
@@ -160,7 +160,7 @@ int main() {
   check(rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_TASKING_SYSTEM) == 1,
         "tasks run on oneTBB");
 
-  // The triangle itself, with a filter.
+  // The triangle itself, with a filter function.
   RTCScene object = rtcNewScene(device);
   RTCGeometry mesh = triangle(device);
   rtcSetGeometryIntersectFilterFunction(mesh, filter);
@@ -173,7 +173,7 @@ int main() {
   trace(object, 0.5f, 0.25f, 0x1u, {kNone, kNone, kNone}, "triangle, masked out");
   check(filter_calls >= 4, "the filter function is called");
 
-  // One instance, moved by 10 in x; and an array of two, at x = 20 and x = 30.
+  // One instance at x = 10, and an instance array with elements at x = 20 and x = 30.
   RTCScene world = rtcNewScene(device);
   RTCGeometry instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(instance, object);
@@ -197,7 +197,7 @@ int main() {
   rtcReleaseGeometry(array);
 #endif
   rtcCommitScene(world);
-  // An instance is number 0 of itself.
+  // A single instance has the instance index 0.
   trace(world, 10.5f, 0.25f, ~0u, {5, 3, 0}, "instance");
 #if defined(RTC_GEOMETRY_INSTANCE_ARRAY)
   trace(world, 20.5f, 0.25f, ~0u, {5, 7, 0}, "instance array, first");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Writes a grid with OpenVDB and reads it: tools/setup_openvdb runs it to see that headers and
-/// libraries agree. It includes what bindings/vdb does.
+/// Writes and reads a grid with OpenVDB. tools/setup_openvdb runs it to check that headers and
+/// libraries match. Includes the same headers as bindings/vdb.
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/File.h>

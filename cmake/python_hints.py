@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints where this Python keeps what the build takes from wheels.
+"""Prints the locations of build inputs that come from wheels.
 
-One line: Dr.Jit's include directory, and the directory of oneTBB's CMake config, divided by ';'.
-A part that is not installed is empty. Nothing is imported, so this is quick and works in isolated
+Output is one line: Dr.Jit's include directory and the directory of oneTBB's CMake config,
+separated by ';'. A missing part is empty. Imports no packages, so it is fast and works in isolated
 builds too.
 """
 

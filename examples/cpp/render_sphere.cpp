@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Builds a scene in C++ and renders it: a plastic sphere on a floor under a square light.
+// Builds a scene and renders it: a plastic sphere on a floor under a square light.
 //   cmake -S examples/cpp -B build/examples -DCMAKE_PREFIX_PATH=<where wavecomb is installed>
 //   cmake --build build/examples && build/examples/example_render_sphere
 #include <cmath>
@@ -15,7 +15,7 @@
 namespace wc = wavecomb;
 
 int main() try {
-  // A unit sphere of 64 x 32 quads, two triangles each. Normals of a sphere are its positions.
+  // A unit sphere of 64 x 32 quads, two triangles each. Its normals equal its positions.
   constexpr uint32_t kAround = 64, kUp = 32;
   std::vector<float> points;
   std::vector<uint32_t> triangles;
@@ -39,7 +39,7 @@ int main() try {
   grey.program = wc::ProgramId::kDiffuse;
   grey.base_color = {0.6f, 0.6f, 0.6f};
   const uint32_t red_id = builder.add_material(red), grey_id = builder.add_material(grey);
-  // Arrays are not copied: they must live as long as the scene.
+  // Arrays are not copied. They must live as long as the scene.
   builder.add_to_group(0, builder.add_mesh({.name = "sphere",
                                             .positions = points,
                                             .indices = triangles,
@@ -50,7 +50,7 @@ int main() try {
                                             .positions = floor_points,
                                             .indices = floor_triangles,
                                             .material = grey_id}));
-  wc::Light lamp;  // a square that shines along its -z, turned to shine down from y = 4
+  wc::Light lamp;  // a square that emits along its -z axis, rotated to face down from y = 4
   lamp.to_world = {{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}, {1, 4, 1}};
   lamp.width = lamp.height = 2;
   lamp.color = {12, 12, 12};
