@@ -42,7 +42,7 @@ CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro ex
 
 .PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist release render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 bench lint format clean
 
-help: ## This list
+help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # ---- set-up and build -------------------------------------------------------------------------
@@ -75,13 +75,13 @@ build/.built: build/.configured $(NATIVE_INPUTS)
 	  --prefix "$$($(VENV)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" > /dev/null
 	@touch $@
 
-setup: build/.setup ## Install what building needs (system packages, .venv, Embree 4)
+setup: build/.setup ## Install build dependencies (system packages, .venv, Embree 4)
 setup-test: build/.setup-test
-build: build/.built ## Build the core and the Python module into .venv (editable); LANES=all: every lane width
+build: build/.built ## Build the core and the Python module into .venv (editable); LANES=all builds every lane width
 
 # Dependencies come from their own wheels. A staged Embree is part of this wheel. auditwheel must
 # not copy libraries: what it would take from the system is already included.
-wheels: build/.setup ## The wheel to pass on, in dist/: every instruction set and Python, tagged and checked by auditwheel
+wheels: build/.setup ## Build the distributable wheel in dist/, with every instruction set, checked by auditwheel
 	@$(VENV)/python -c 'import auditwheel' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'auditwheel>=6.8'
 	@echo "wheels: a library for each instruction set"
 	@rm -rf $(WHEEL)/raw dist/wavecomb-*.whl
@@ -92,7 +92,7 @@ wheels: build/.setup ## The wheel to pass on, in dist/: every instruction set an
 	  $$($(VENV)/python -m zipfile -l $(WHEEL)/raw/wavecomb-*.whl | sed -n 's|^wavecomb/lib/\(lib[^ /]*\) .*|--exclude \1|p')
 	@ls dist/wavecomb-*.whl
 
-sdist: build/.setup ## The source distribution, in dist/
+sdist: build/.setup ## Build the source distribution in dist/
 	@rm -f dist/wavecomb-*.tar.gz
 	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
 	@ls dist/wavecomb-*.tar.gz
@@ -114,7 +114,7 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
 
 # Not part of make test, since MkDocs is in a separate extra.
-docs: build ## The documentation as a site in out/site
+docs: build ## Build the documentation site in out/site
 	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
 	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
 	@command -v doxygen > /dev/null || echo "docs: without the C++ reference; apt install doxygen adds it"
@@ -124,13 +124,13 @@ docs: build ## The documentation as a site in out/site
 
 # tests/parts.txt lists the parts with their requirements, lanes and time budgets. All parts run
 # even after a failure, so that a layout error does not hide failing tests.
-test: ## Lint, C++ tests, the same under sanitizers, pytest with one of each kind of what takes long
+test: ## Lint, C++ tests, sanitizers, pytest with a representative of each kind of long test
 	@python3 tools/run_parts $@
 
-test-fast: ## Lint, C++ tests, pytest without the slow ones
+test-fast: ## Lint, C++ tests, pytest without slow tests
 	@python3 tools/run_parts $@
 
-test-long: ## Everything, an hour or more: all tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers
+test-long: ## All tests with 10^6 samples, 500 random scenes, 100 kills, all sanitizers (over an hour)
 	@python3 tools/run_parts $@
 
 # Tests that depend on optimised code. The others are in test-asan (tests/cpp/CMakeLists.txt).
@@ -190,13 +190,13 @@ test-cpp-long: build build/.setup-test
 	  WAVECOMB_LONG=1 $(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
 # tests/packaging/test_empty_root.py covers a machine without a compiler.
-test-wheel: wheels ## Install that wheel into a fresh environment and an empty root; render with each of its libraries
+test-wheel: wheels ## Install the wheel into a fresh environment and an empty root; render with each library
 	@rm -rf $(WHEEL)/venv && $(VENV)/python -m venv $(WHEEL)/venv
 	@$(WHEEL)/venv/bin/python -m pip install -q -c constraints.txt pip pytest dist/wavecomb-*.whl
 	$(WHEEL)/venv/bin/python -m pytest -q -o faulthandler_timeout=3600 tests/python/test_isa.py tests/python/test_cli.py tests/packaging/test_wheel.py \
 	  tests/packaging/test_empty_root.py
 
-test-sdist: sdist build/.setup-test ## Build the source distribution in a folder of its own, and render
+test-sdist: sdist build/.setup-test ## Build the source distribution in a separate folder, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
 # Libraries compiled from source, since the distribution's are for another standard library or CPU.
@@ -220,7 +220,7 @@ build/.setup-arm64: build/.setup
 
 # Tests the module in an environment with the packages of .venv but without its editable Wavecomb.
 # (Python ignores .pth files of another environment.)
-test-clang: build/.setup-clang ## C++ tests and the Python module by clang with libc++: as near as Linux comes to macOS
+test-clang: build/.setup-clang ## C++ tests and the Python module with clang and libc++, which is close to macOS
 	@test -e $(CLANG)/build.ninja || $(LOCK) $(VENV)/cmake -S . -B $(CLANG) -G Ninja --log-level=NOTICE $(from_source) \
 	  -DCMAKE_CXX_COMPILER="$(CLANGXX)" -DCMAKE_CXX_FLAGS=-stdlib=libc++ -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" \
 	  -DWAVECOMB_LANE_WIDTHS="$(clang_widths)" -DWAVECOMB_BATCH=ON -DWAVECOMB_PYTHON=ON -DWAVECOMB_VDB=OFF -DWAVECOMB_TESTS=all
@@ -250,17 +250,17 @@ test-arm64: build/.setup-arm64 ## C++ tests of NEON lanes, cross-compiled for AR
 test-py-fast: build-test-tools build/.setup-test
 	@$(MAKE) --no-print-directory run-py-fast
 
-fuzz: build-test-tools build/.setup-test ## Broken inputs for MINUTES=10; those that are wrong are kept in out/fuzz
+fuzz: build-test-tools build/.setup-test ## Fuzz with broken inputs for MINUTES=10; keep failing ones in out/fuzz
 	nice $(VENV)/python tests/python/fuzz_stages.py --minutes $(MINUTES) --seed $(SEED) --jobs $(JOBS) --keep out/fuzz
 
-bench: build ## Micro-benchmarks; JSON goes to out/micro
+bench: build ## Run micro-benchmarks; JSON goes to out/micro
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_benchmarks -j $(JOBS) -- --quiet
 	@mkdir -p out/micro; for program in $(BUILD)/benchmarks/micro/micro_*; do [ -f $$program ] || continue; \
 	  echo "== $$program"; $$program --benchmark_out=out/micro/$${program##*/micro_}.json || exit 1; done
 
 # ---- style -------------------------------------------------------------------------------------
 
-lint: build/.setup-test ## Layout, layers, English, types; changes nothing
+lint: build/.setup-test ## Check layout, layers, English and types; changes nothing
 	$(VENV)/ruff check --quiet .
 	$(VENV)/ruff format --check --quiet . || { echo "lint: run make format"; exit 1; }
 	$(VENV)/python tools/check_layers
@@ -269,10 +269,10 @@ lint: build/.setup-test ## Layout, layers, English, types; changes nothing
 	  || { echo "lint: run make format"; exit 1; }
 	$(VENV)/mypy
 
-format: build/.setup-test ## Lay out all sources
+format: build/.setup-test ## Format all sources
 	$(VENV)/ruff check --quiet --fix-only .
 	$(VENV)/ruff format --quiet .
 	@printf '%s\n' $(CPP_FILES) | xargs -r $(VENV)/clang-format -i
 
-clean: ## Remove what was built (keeps .venv and .deps)
+clean: ## Remove build outputs (keeps .venv and .deps)
 	rm -rf build out

@@ -44,8 +44,8 @@ list(APPEND variants ${reduced})
 set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$|/render/lane_kernels\\.cpp$")
-# Sources excluded from unity batches (WAVECOMB_BATCH): lights, which reuse the same local names,
-# and bare_traversal.cpp, which includes Embree.
+# Sources excluded from unity batches (WAVECOMB_BATCH), because they reuse local names of others:
+# lights, and bare_traversal.cpp.
 file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/*.cpp")
 list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp")
 set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/subdivision.cpp")
