@@ -94,7 +94,7 @@ def splice(rng: random.Random, data: bytes) -> bytes:
 
 
 def tail_words(rng: random.Random, data: bytes) -> bytes:
-    """As ``huge_words``, but near the end, where .usdc has sections and .usdz file names."""
+    """Applies ``huge_words`` near the end, where .usdc has sections and .usdz file names."""
     start = len(data) * 2 // 3
     return data[:start] + huge_words(rng, data[start:])
 

@@ -28,7 +28,7 @@ def _write(folder: Path, text: str, name: str = "stage.usda") -> Path:
 
 
 def circles(rng: random.Random, folder: Path) -> Path:
-    """Prims that reference, inherit, specialise or contain each other at random."""
+    """Writes prims that reference, inherit, specialise or contain each other at random."""
     count = rng.randint(1, 8)
     names = [f"P{i}" for i in range(count)]
     files = [f"f{i}.usda" for i in range(rng.randint(0, 2))]
@@ -70,7 +70,7 @@ def circles(rng: random.Random, folder: Path) -> Path:
 
 
 def networks(rng: random.Random, folder: Path) -> Path:
-    """Shaders, node graphs and primvars that connect to each other at random."""
+    """Writes shaders, node graphs and primvars that connect to each other at random."""
     nodes = [f"N{i}" for i in range(rng.randint(1, 12))]
     ids = (
         "UsdPreviewSurface", "UsdUVTexture", "UsdTransform2d", "UsdPrimvarReader_float2",
@@ -108,7 +108,7 @@ def networks(rng: random.Random, folder: Path) -> Path:
 
 
 def deep(rng: random.Random, folder: Path) -> Path:
-    """Deep nesting of prims, references, instancers, shaders or sublayers."""
+    """Writes deeply nested prims, references, instancers, shaders or sublayers."""
     depth = rng.choice((10, 100, 300, 1000, 3000, 10000, 30000, 100000))
     how = rng.randrange(7)
     if how == 0:
@@ -152,7 +152,7 @@ def deep(rng: random.Random, folder: Path) -> Path:
 
 
 def doubling(rng: random.Random, folder: Path) -> Path:
-    """Each prim contains the next one at least twice, so that a few lines expand to billions."""
+    """Writes prims that contain the next one at least twice: a few lines, billions of prims."""
     levels, width = rng.choice(((6, 2), (10, 2), (14, 2), (30, 2), (8, 8), (3, 16), (64, 2)))
     how = rng.randrange(4)
     text = ""
@@ -175,7 +175,7 @@ def doubling(rng: random.Random, folder: Path) -> Path:
 
 
 def arrays(rng: random.Random, folder: Path) -> Path:
-    """Meshes and instancers whose arrays do not match each other."""
+    """Writes meshes and instancers whose arrays do not match each other."""
 
     def numbers(count: int, low: int, high: int) -> str:
         return ", ".join(str(rng.randint(low, high)) for _ in range(count))

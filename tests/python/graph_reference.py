@@ -18,7 +18,7 @@ def rotl(x, k):
 
 
 def jenkins(*words):
-    """Jenkins' lookup3 hash of 1 to 4 words."""
+    """Returns Jenkins' lookup3 hash of 1 to 4 words."""
     with np.errstate(over="ignore"):
         a = np.full(words[0].shape, 0xDEADBEEF + 4 * len(words) + 13, np.uint64).astype(np.uint32)
         b, c = a.copy(), a.copy()

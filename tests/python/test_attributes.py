@@ -288,7 +288,7 @@ def test_emission_by_a_primvar_is_aimed_at(tmp_path):
 
 
 def everything():
-    """A stage with cut-outs, all interpolations, instances, a subdivision surface and emission."""
+    """Returns a stage with cut-outs, all interpolations, instances, subdivision and emission."""
     random = np.random.default_rng(11)
     reader = READER.format(kind="float", name="there", fallback="1")
     cut = material("float inputs:opacity.connect = </Mat/P.outputs:result>\n"

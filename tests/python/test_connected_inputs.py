@@ -185,7 +185,7 @@ def test_files_by_a_primvar_are_listed(tmp_path):
 
 @pytest.mark.parametrize(("fallback", "listed"), [("(0.25, 0.75)", True), ("(0, 0)", False)])
 def test_a_fallback_of_texture_coordinates_is_listed(tmp_path, fallback, listed):
-    """Meshes without the primvar are at (0, 0), whatever the reader says."""
+    """Meshes without the primvar use (0, 0) and not the fallback of the reader."""
     oiio.ImageBuf(oiio.ImageSpec(2, 2, 3, "uint8")).write(str(tmp_path / "t.png"))
     varname = f'string inputs:varname = "st"\nfloat2 inputs:fallback = {fallback}'
     _, loaded = load(tmp_path, stage("", varname=varname))

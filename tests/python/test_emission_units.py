@@ -88,13 +88,13 @@ EMITTED = "float inputs:intensity = 250\ncolor3f inputs:color = (1, 0.5, 0.2)\n"
 
 @pytest.mark.parametrize("normalize", [False, True])
 def test_domes_are_of_the_same_unit(tmp_path: Path, normalize: bool) -> None:
-    """UsdLux: a dome ignores normalize."""
+    """UsdLux: domes ignore inputs:normalize."""
     light = f'def DomeLight "L" {{\n{EMITTED}bool inputs:normalize = {int(normalize)}\n}}'
     assert np.allclose(mean(tmp_path, light), 250 * COLOUR, rtol=1e-5)
 
 
 def illuminance(folder: Path, light: str) -> np.ndarray:
-    """Of a white square at the origin that faces +z."""
+    """Returns the illuminance of a white square at the origin that faces +z."""
     matte = (
         'def Material "M" {\ntoken outputs:surface.connect = </W/M/S.outputs:surface>\n'
         'def Shader "S" {\nuniform token info:id = "UsdPreviewSurface"\n'
@@ -119,9 +119,10 @@ def illuminance(folder: Path, light: str) -> np.ndarray:
 def test_distant_lights_are_divided_by_their_size_factor(
     tmp_path: Path, angle: float, normalize: bool, expected: float
 ) -> None:
-    """UsdLux: 1 for no angle, pi sin^2 of half the angle up to a hemisphere, then pi (2 - sin^2).
+    """The size factor is 1, pi sin^2(angle / 2), or pi (2 - sin^2) beyond a hemisphere.
 
-    Normalized, intensity is illuminance in lux. The square sees a hemisphere at most.
+    With inputs:normalize, intensity is the illuminance in lux. The square sees at most a
+    hemisphere of the light.
     """
     light = (
         f'def DistantLight "L" {{\n{EMITTED}float inputs:angle = {angle}\n'
@@ -143,8 +144,11 @@ def test_distant_lights_are_divided_by_their_size_factor(
 def test_points_shine_as_far_spheres(
     tmp_path: Path, radius: float, point: bool, normalize: bool, expected: float
 ) -> None:
-    """UsdLux: a hint that a sphere can be taken for one of no radius. Its illuminance at a distance
-    d is pi r^2 / d^2 of its luminance, or with an area of 4 pi r^2 that divides, 1 / (4 d^2)."""
+    """treatAsPoint lets a sphere light be replaced by one of radius 0.
+
+    The illuminance at distance d is pi r^2 / d^2 times the luminance. With inputs:normalize, which
+    divides by 4 pi r^2, it is 1 / (4 d^2).
+    """
     light = (
         f'def SphereLight "L" {{\n{EMITTED}float inputs:radius = {radius}\n'
         f"bool inputs:normalize = {int(normalize)}\nbool treatAsPoint = {int(point)}\n"

@@ -116,7 +116,7 @@ def vary_camera(stage):
 
 
 def vary_lens(stage):
-    """One frame's camera is invalid, and the next one has no depth of field."""
+    """Makes one frame's camera invalid, and gives the next one no depth of field."""
     camera = UsdGeom.Camera.Get(stage, "/World/Rig/Camera")
     ramp(camera.CreateFocalLengthAttr(), [50, 0, 50, 50])
     ramp(camera.CreateFStopAttr(), [0.5, 0.5, 0, 2])

@@ -37,7 +37,7 @@ def floor(stage):
 
 
 def corner(stage):
-    """A tetrahedron that fills little of its bounding box, with an unused point."""
+    """Adds a tetrahedron that fills little of its bounding box, with an unused point."""
     mesh = UsdGeom.Mesh.Define(stage, "/A")
     mesh.GetPointsAttr().Set([(0, 0, 0), (2, 0, 0), (0, 2, 0), (0, 0, 2), (90, 90, 90)])
     mesh.GetFaceVertexCountsAttr().Set([3, 3, 3, 3])
@@ -46,7 +46,7 @@ def corner(stage):
 
 
 def rounded(stage):
-    """A subdivided cube is nearly a ball, and much smaller than its control mesh."""
+    """Adds a subdivided cube, which is nearly a ball and much smaller than its control mesh."""
     mesh = UsdGeom.Mesh.Define(stage, "/A")
     at = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     mesh.GetPointsAttr().Set(at)
@@ -56,7 +56,7 @@ def rounded(stage):
 
 
 def crowd(stage):
-    """Many instances of a ball in two rotated point instancers."""
+    """Adds many instances of a ball in two rotated point instancers."""
     at = [Gf.Vec3f(4.0 * np.cos(k), 0.0, 4.0 * np.sin(k)) for k in range(900)]
     for name, turn in (("/P", 0.0), ("/Q", 70.0)):
         cloud = UsdGeom.PointInstancer.Define(stage, name)

@@ -269,7 +269,7 @@ def test_auto_decides_alike_whatever_the_schedule(tmp_path: Path) -> None:
     }
     first = wavecomb.render(scene, **part)
     assert first.stats["guiding"]["used"]
-    # After a hundredth of the samples shows a gain, training continues as with "on".
+    # A hundredth of the samples shows the gain. Then training goes to its full length.
     assert first.stats["guiding"]["paths"] > 1.5 * 480 * 320 * 132 / 100
     ways: list[dict[str, Any]] = [{"threads": 1, "lanes": 1, "wave_size": 64, "policy": "none"}]
     if is_long():

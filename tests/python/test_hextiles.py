@@ -9,7 +9,7 @@ from wavecomb.usd.materialx.nodes import images
 
 
 def reference(uv, tiling, rotation, scales, offsets):
-    """mx_hextile_coord in NumPy: coordinates (3, n, 2), rotations (3, n) and weights (3, n)."""
+    """Evaluates mx_hextile_coord: coordinates (3, n, 2), rotations (3, n), weights (3, n)."""
     coord = uv * tiling
     st = coord * 2 * np.sqrt(3)
     skewed = np.stack([st[:, 0] - 0.57735027 * st[:, 1], 1.15470054 * st[:, 1]], 1)

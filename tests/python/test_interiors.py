@@ -129,7 +129,7 @@ def test_shadow_rays_bring_what_passes() -> None:
     [({"shadow": False}, 0.0), ({"bounces": False}, 2.0), ({"camera": False}, 2.0)],
 )
 def test_fog_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> None:
-    """Light through a slab of 2: shadow rays decide, whatever bounces and cameras see."""
+    """Only visibility to shadow rays decides over fog of thickness 2 that light passes."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -155,7 +155,7 @@ def test_fog_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> 
     ],
 )
 def test_fog_around_a_floor_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> None:
-    """The camera above it: its ray's length in fog is 1, and the shadow ray's."""
+    """Camera rays and shadow rays each pass 1 unit of fog, unless it is invisible to them."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -174,8 +174,7 @@ def test_fog_around_a_floor_dims_the_rays_that_see_it(rays: dict[str, bool], pas
     ("rays", "passes"), [({}, 2.0), ({"bounces": False}, 1.0), ({"camera": False}, 1.0)]
 )
 def test_paths_know_that_they_have_left_fog(rays: dict[str, bool], passes: float) -> None:
-    """Through fog to a mirror, back through it to a ceiling above the camera, which is lit by a
-    lamp between both: the shadow ray is outside."""
+    """Paths pass fog to a mirror and back to a ceiling, whose shadow rays are outside of it."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -198,7 +197,7 @@ def test_paths_know_that_they_have_left_fog(rays: dict[str, bool], passes: float
 @pytest.mark.parametrize("how", ["visibility", "shadow link"])
 @pytest.mark.parametrize("ior", [1.0, 1.5])
 def test_what_casts_no_shadow_neither_stops_nor_dims_light(ior: float, how: str) -> None:
-    """A slab of fog or glass above a floor, in a scene whose paths know what they are inside of."""
+    """A slab of fog or glass without shadows does not change the light on the floor below."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -218,7 +217,7 @@ def test_what_casts_no_shadow_neither_stops_nor_dims_light(ior: float, how: str)
 
 
 def test_shadow_rays_meet_bounds_close_behind_a_cut_out() -> None:
-    """A card that is half there, a short way below the slab: light that passes it is dimmed."""
+    """Light that passes a half-present card close below a slab is still dimmed by the slab."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -350,7 +349,7 @@ def test_lamps_draw_distances_in_meshes() -> None:
 
 
 def scene(hidden: bool = False) -> Any:
-    """A glass of a cloudy liquid that reaches into its walls, fog about it, and a floor."""
+    """Returns a glass with a cloudy liquid that overlaps its walls, fog around it, and a floor."""
     builder = wavecomb.SceneBuilder()
     glass = filled(builder, 1.5, nested_priority=1.0)
     juice = filled(
@@ -386,7 +385,7 @@ def scene(hidden: bool = False) -> Any:
 
 @pytest.mark.parametrize(("equiangular", "hidden"), [("off", False), ("on", False), ("off", True)])
 def test_one_picture_for_all_schedules(equiangular: str, hidden: bool) -> None:
-    """Lanes, waves, threads, policies, packets and the reference: the same bits."""
+    """Lanes, waves, threads, policies, packets and the reference integrator give the same bits."""
     made = scene(hidden)
 
     def render(**settings: Any) -> Any:
@@ -510,7 +509,7 @@ def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
 
 
 def stone_in_glass(layers: dict[str, Any], low: float = -1.5) -> Any:
-    """A shining block in a block of glass from -2 to 1, or, from ``low``, below it."""
+    """Returns an emissive block from ``low``, in or below a block of glass from -2 to 1."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, 1.0, filled(builder, 1.5, **layers))
     glow = builder.add_material("emissive", emission=(1.0, 2.0, 3.0))
@@ -519,7 +518,7 @@ def stone_in_glass(layers: dict[str, Any], low: float = -1.5) -> Any:
 
 
 def test_what_lies_in_absorbing_glass_is_dimmed() -> None:
-    """exp(-sigma t) of the way out; a path does not end at the glass on that segment."""
+    """The light is dimmed by exp(-sigma t), although paths hit the block and not the glass."""
     clear = seen_from_above(stone_in_glass({}), spp=16)
     tinted = seen_from_above(stone_in_glass(absorbing(SIGMA)), spp=16)
     assert clear.mean() > 0.5
@@ -527,7 +526,7 @@ def test_what_lies_in_absorbing_glass_is_dimmed() -> None:
 
 
 def lit_stone(seed: int, as_volume: bool) -> Any:
-    """A grey block in rough glass that absorbs, or that is clear and filled with a volume."""
+    """Renders a grey block in absorbing rough glass, or in clear glass filled with a volume."""
     builder = wavecomb.SceneBuilder()
     low, high = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)
     box(builder, low, high, filled(builder, 1.5, 0.4, **({} if as_volume else absorbing(SIGMA))))
@@ -542,7 +541,7 @@ def lit_stone(seed: int, as_volume: bool) -> Any:
 
 
 def test_a_stone_in_absorbing_glass_is_one_in_an_absorbing_volume() -> None:
-    """Each segment between the glass and the stone counts, which no interface of the glass ends."""
+    """Absorption counts on segments that end at the stone instead of at the glass."""
     mesh = np.array([lit_stone(seed, False) for seed in range(8)])
     volume = np.array([lit_stone(seed, True) for seed in range(8, 16)])
     error = np.sqrt(mesh.var(axis=0, ddof=1) / 8 + volume.var(axis=0, ddof=1) / 8)
@@ -551,7 +550,7 @@ def test_a_stone_in_absorbing_glass_is_one_in_an_absorbing_volume() -> None:
 
 
 def refuses_light_paths(builder: Any) -> bool:
-    """Whether paths have to know what they are inside of, which light paths do not."""
+    """Returns whether light paths are refused, because absorbing glass contains objects."""
     camera = np.eye(4)
     camera[3, 2] = 5.0
     builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
@@ -567,13 +566,13 @@ def refuses_light_paths(builder: Any) -> bool:
 
 @pytest.mark.parametrize(("low", "refused"), [(-1.5, True), (-2.5, False), (-2.2, True)])
 def test_light_paths_do_not_go_with_objects_in_absorbing_glass(low: float, refused: bool) -> None:
-    """An object inside, one that the glass stands on, and one that reaches into it."""
+    """Objects inside or reaching into the glass are refused, the one below it is not."""
     assert refuses_light_paths(stone_in_glass(absorbing(SIGMA), low)) == refused
     assert not refuses_light_paths(stone_in_glass({}, low))
 
 
 def glass_ball(builder: Any, inwards: bool = False, radius: float = 1.0, **layers: Any) -> int:
-    """A ball of absorbing glass around the origin; or a hollow of that size."""
+    """Adds a ball of absorbing glass around the origin, or with ``inwards`` a hollow."""
     mesh = ball(radius, 24)
     faces = mesh.faces.astype(np.uint32)
     material = filled(builder, 1.5, **{**absorbing(SIGMA), **layers})
@@ -593,7 +592,7 @@ def quad(builder: Any, z: float, half: float) -> None:
     ("z", "refused"), [(-0.9, True), (-1.0, False), (-1.1, False), (0.3, True)]
 )
 def test_a_ball_that_is_sunk_into_a_floor_holds_a_part_of_it(z: float, refused: bool) -> None:
-    """Two triangles none of whose vertices is in the glass."""
+    """The floor intersects the glass, although none of its vertices is inside."""
     builder = wavecomb.SceneBuilder()
     builder.add_to_group(0, glass_ball(builder))
     quad(builder, z, 50.0)
@@ -614,7 +613,7 @@ def test_what_is_in_a_hollow_is_not_in_the_glass(hollow: bool, refused: bool) ->
     ("kind", "refused"), [("dome", False), ("distant", False), ("sphere", True)]
 )
 def test_lights_in_absorbing_glass(kind: str, refused: bool) -> None:
-    """Those that are at no place are in no glass."""
+    """Lights without a position are in no glass."""
     builder = wavecomb.SceneBuilder()
     builder.add_to_group(0, glass_ball(builder))
     builder.add_light(kind, np.eye(4), color=(1, 1, 1), **({"radius": 0.1} if refused else {}))
@@ -622,7 +621,7 @@ def test_lights_in_absorbing_glass(kind: str, refused: bool) -> None:
 
 
 def test_placed_glass_holds_what_is_inside_of_it() -> None:
-    """An instance that is moved, scaled and mirrored, and a floor beside it or in it."""
+    """The glass is a moved, scaled and mirrored instance, and the floor is beside it or in it."""
     for z, refused in ((0.0, False), (2.2, True)):
         builder = wavecomb.SceneBuilder()
         group = builder.add_group()
@@ -635,7 +634,7 @@ def test_placed_glass_holds_what_is_inside_of_it() -> None:
 
 
 def test_a_search_in_many_meshes_takes_no_time() -> None:
-    """Thousands of glasses on a floor of many triangles, and as many objects beside them."""
+    """The search is fast with thousands of glasses and objects on a large floor."""
     import time
 
     def seconds(layers: dict[str, Any]) -> float:
@@ -666,7 +665,7 @@ def test_a_search_in_many_meshes_takes_no_time() -> None:
         builder.set_camera(camera, projection="orthographic", window=(-1, 1, -1, 1))
         scene = builder.build()
         spent = time.process_time() - begin
-        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")  # nothing is in the glass
+        wavecomb.render(scene, size=(4, 4), spp=1, transport="light")  # the glass is empty
         return spent
 
     seconds({})

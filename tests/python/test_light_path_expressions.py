@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions: contents, partitions that add up, and requests for them."""
+"""Light path expressions: their light, partitions that add up, and how to request them."""
 
 from __future__ import annotations
 

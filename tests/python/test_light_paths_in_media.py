@@ -16,7 +16,7 @@ SIZE = 12
 
 
 def stage(medium: str) -> Any:
-    """A stage with a glass ball, a light and a medium."""
+    """Returns a stage with a glass ball, a light and a medium."""
     builder = wavecomb.SceneBuilder()
     looks = {
         "skin": {"subsurface_weight": 1.0, "subsurface_radius": (1, 1, 1)},

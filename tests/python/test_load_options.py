@@ -30,7 +30,7 @@ def command_of(got: dict[str, Any]) -> click.Command:
 
 
 def run(*arguments: str) -> dict[str, Any]:
-    """A function that parses arguments and returns the options."""
+    """Returns a function that parses arguments and returns the options."""
     got: dict[str, Any] = {}
     result = CliRunner().invoke(command_of(got), ["shot.usd", *arguments])
     assert result.exit_code == 0, result.output

@@ -138,7 +138,7 @@ def calls_to_read(path: Path, count: int, kind: str) -> int:
         prim.AddTranslateOp().Set(Gf.Vec3d(2.0 * i, 0.0, 0.0))
     stage.Save()
     profile = cProfile.Profile()
-    wavecomb.load(path)  # imports and caches are not costs of a prim
+    wavecomb.load(path)  # do not count imports and caches
     with profile:
         wavecomb.load(path)
     return sum(entry.callcount for entry in profile.getstats())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that a material passes from USD to its kernel: few enough to be read in one sitting."""
+"""The number of files that a material passes from USD to its kernel is limited."""
 
 import functools
 import sys
@@ -20,10 +20,10 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(wavecomb.__file__).parent
 
 MOST = 23
-"""Files of Python and C++ together."""
+"""Number of files, Python and C++ together."""
 
 NOT_ON_THE_PATH = {"isa.py", "usd/stage/report.py"}
-"""The choice of the native library, and the messages about the stage."""
+"""Files that do not count: choice of the native library, and messages about the stage."""
 
 NATIVE = (
     "bindings/materials.cpp",  # add_material and add_texture
@@ -82,7 +82,7 @@ OPEN_PBR = """
 
 @pytest.fixture
 def traced(monkeypatch):
-    """Files of the package whose functions run while materials are read and added."""
+    """Collects the files whose functions run while materials are read and added."""
     files, depth = set(), [0]
 
     def note(frame, event, _):

@@ -108,7 +108,7 @@ trying("private", lambda: (own / "x").write_text("x"))
 
 
 def test_no_network_and_no_other_process(place: Path) -> None:
-    """Abstract sockets, sockets in hidden folders, shared memory, signals and priorities."""
+    """Sockets, shared memory, signals and priorities of other processes are out of reach."""
     with contextlib.ExitStack() as stack:
         listening = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
         port = listening.getsockname()[1]
@@ -144,7 +144,7 @@ trying("terminal", lambda: __import__("fcntl").ioctl(0, 0x5412, b"x"))
 
 
 def test_it_inherits_nothing(place: Path) -> None:
-    """No open file descriptor, and no environment variable that affects Python's imports."""
+    """The child inherits no open file, and no variable that affects Python's imports."""
     (place / "json.py").write_text("raise SystemExit(77)")
     with (place / "secret/key").open("r+") as key:
         os.set_inheritable(key.fileno(), True)

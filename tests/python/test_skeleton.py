@@ -73,7 +73,7 @@ def make_stage(*, mesh_order=None, indices, weights, each, constant=False, metho
 
 
 def skinned(time, indices, weights, rest=POINTS):
-    """Linear blend skinning: world positions (n, 3) and normals. ``indices`` refer to JOINTS."""
+    """Returns world positions (n, 3) and normals by linear blending. ``indices``: into JOINTS."""
     (turn_b, at_b), (turn_a, at_a) = pose(time)
     local = [
         Gf.Matrix4d(turn_a, Gf.Vec3d(at_a)),

@@ -16,7 +16,7 @@ def turn(a, b, c):
 
 
 def every_ear(flat):
-    """Ear clipping that checks every corner in each step, as a reference."""
+    """Clips ears by checking every corner in each step, as a reference."""
 
     def is_ear(a, b, c):
         if turn(flat[a], flat[b], flat[c]) <= 0:

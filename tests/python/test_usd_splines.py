@@ -247,7 +247,7 @@ def test_what_cannot_be_drawn_is_left_out(tmp_path, text, says):
 
 
 def two_nurbs(knots="0, 0, 0, 0, 1, 1, 1, 1", point="0, 1, 0", more=""):
-    """Two cubics, each of one segment; the knots and the last point are those of the second."""
+    """Returns two cubic curves of one segment each. The arguments apply to the second."""
     return f"""def NurbsCurves "C" {{
         int[] curveVertexCounts = [4, 4]
         point3f[] points = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0),
@@ -279,7 +279,7 @@ def test_one_bad_curve_is_left_out_alone(tmp_path, text, says):
 
 
 def test_parts_of_many_nurbs_curves(tmp_path, monkeypatch):
-    """Prims of many segments are worked out part by part: the same points."""
+    """Evaluating many segments in blocks gives the same points."""
     text = two_nurbs()
     whole = load(tmp_path, text)[0].mesh("C")["positions"]
     monkeypatch.setattr("wavecomb.usd.geometry.strands._AT_ONCE", 1)

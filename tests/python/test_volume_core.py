@@ -162,7 +162,7 @@ def test_one_picture_whatever_renders_it() -> None:
 
 
 def test_bad_volumes_are_named() -> None:
-    """One line that names the volume or the grid."""
+    """The error is one line that names the volume or the grid."""
     builder = _core.SceneBuilder()
     box = ((-1, -1, -1), (1, 1, 1))
     for bad in (

@@ -53,7 +53,7 @@ def slab(depth: float, spp: int = 64, size: int = 24, **values: Any) -> Any:
 
 
 def chandrasekhar(albedo: float) -> float:
-    """Spherical albedo of an isotropic half-space: 1 - 2 sqrt(1 - a) int mu H(mu) dmu."""
+    """Returns 1 - 2 sqrt(1 - a) int mu H(mu) dmu, the albedo of an isotropic half-space."""
     nodes, weights = leggauss(64)
     mu, w = 0.5 * (nodes + 1), 0.5 * weights
     h = np.ones_like(mu)
@@ -64,7 +64,7 @@ def chandrasekhar(albedo: float) -> float:
 
 
 def color_of(albedo: float, anisotropy: float, n: int = 20) -> float:
-    """Spherical albedo of a half-space, by adding and doubling of layers (van de Hulst 1980).
+    """Returns the albedo of a half-space by adding and doubling (van de Hulst 1980).
 
     Uses intensities at Gaussian cosines, averaged over azimuths, and the Henyey-Greenstein phase
     function as a Legendre series.
@@ -97,7 +97,7 @@ def test_a_half_space_is_chandrasekhars() -> None:
 
 @pytest.mark.parametrize("anisotropy", [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9])
 def test_the_albedo_of_a_collision_gives_the_colour(anisotropy: float) -> None:
-    """Within 0.5 % of adding and doubling for a half-space."""
+    """The colour is within 0.5 % of adding and doubling for a half-space."""
     for color in (0.02, 0.1, 0.3, 0.6, 0.85, 0.97):
         found = color_of(_core.walk_albedo(color, anisotropy), anisotropy)
         assert abs(found - color) < 0.005 * color
@@ -111,7 +111,7 @@ def test_adding_and_doubling_is_chandrasekhars() -> None:
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.3, 0.6, -0.3, -0.6])
 def test_a_flat_wall_has_the_colour_asked_for(anisotropy: float) -> None:
-    """Within 1 % and noise."""
+    """The colour is exact within 1 % and noise."""
     colors = (0.2, 0.5, 0.85)
     seen = slab(300.0, spp=192, subsurface_color=colors, subsurface_anisotropy=anisotropy)
     for channel, color in enumerate(colors):
@@ -149,7 +149,7 @@ def test_a_clear_slab_shows_what_lies_below() -> None:
 
 
 def third_exponential_integral(x: float) -> float:
-    """E_3(x), by substitution: int_0^1 mu exp(-x / mu) dmu."""
+    """Returns E_3(x), by substitution int_0^1 mu exp(-x / mu) dmu."""
     nodes, weights = leggauss(96)
     mu, w = 0.5 * (nodes + 1), 0.5 * weights
     return float((w * mu * np.exp(-x / mu)).sum())
@@ -195,7 +195,7 @@ def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
 
 
 def scene(bounces_see_all: bool = True) -> Any:
-    """A box of skin with a coat, one inside it, a floor, a light and a sky."""
+    """Returns a box of skin with a coat, one inside it, a floor, a light and a sky."""
     builder = wavecomb.SceneBuilder()
     values = {
         "subsurface_color": (0.9, 0.5, 0.3),
@@ -275,7 +275,7 @@ def test_lanes_stay_full() -> None:
 
 
 def test_a_radius_that_is_not_finite_is_told() -> None:
-    """One line that names the material."""
+    """The error is one line that names the material."""
     builder = wavecomb.SceneBuilder()
     with pytest.raises(ValueError, match=r"skin.*finite"):
         builder.add_material(

@@ -16,7 +16,7 @@
 
 namespace wavecomb {
 
-/// Result of learning to aim, with statistics.
+/// Result of the pilot that learns where to aim, with statistics.
 struct LightAiming {
   LightAim aim;        ///< without spheres: paths are not aimed
   uint64_t paths = 0;  ///< training paths
