@@ -21,8 +21,6 @@ LEVELS = {
     "crypto_asset": "CryptoAsset",
 }
 """AOV -> name in files."""
-RANKS = 6
-"""(id, coverage) pairs of a pixel."""
 
 
 def is_crypto(layer: str) -> bool:

@@ -22,7 +22,8 @@ from wavecomb.gui.scheduling.run_log import (
     take_look,
 )
 from wavecomb.gui.scheduling.run_rates import compare, compare_runs, moments, rate, t975, time_of
-from wavecomb.gui.scheduling.run_table import COLUMNS, amount, as_csv, as_text, rows
+from wavecomb.gui.scheduling.run_table import COLUMNS, as_csv, as_text, rows
+from wavecomb.run.progress import count_text
 
 PROGRAM = {"policy": "program", "lanes": 0, "roulette": "throughput"}
 MATERIAL = {**PROGRAM, "policy": "material"}
@@ -296,7 +297,7 @@ def test_text_and_csv() -> None:
     ("value", "text"), [(0, "0"), (12.34, "12.3"), (999.7, "1 k"), (4.567e9, "4.57 G")]
 )
 def test_amount(value: float, text: str) -> None:
-    assert amount(value) == text
+    assert count_text(value) == text
 
 
 def test_quantiles_of_t() -> None:

@@ -26,9 +26,9 @@ from wavecomb.gui import theme
 from wavecomb.gui.list_view import compact
 from wavecomb.gui.scheduling.plots import Bar, Bars, Legend
 from wavecomb.gui.scheduling.run_log import Series
-from wavecomb.gui.scheduling.run_table import amount
 from wavecomb.gui.table_model import Cell, Table
 from wavecomb.gui.widgets import named, search_field
+from wavecomb.run.progress import count_text
 
 ORDERS = {
     "time": "By shading time: records x nanoseconds.",
@@ -264,7 +264,7 @@ class MaterialsTab(QWidget):
             tip = (
                 f"{row.name} ({row.program})\nmeasured {row.measured_ns:.0f} ns, predicted "
                 f"{row.predicted_ns:.0f} ns, calibrated {row.calibrated_ns:.0f} ns\n"
-                f"{amount(row.records)} records, {100 * row.share:.1f} % of shading"
+                f"{count_text(row.records)} records, {100 * row.share:.1f} % of shading"
             )
             costs.append(Bar(i - 0.19, 0.36, 0.0, row.predicted_ns, predicted_colour(), tip))
             costs.append(Bar(i + 0.19, 0.36, 0.0, row.measured_ns, measured_colour(), tip))
@@ -282,7 +282,7 @@ class MaterialsTab(QWidget):
                 (
                     (row.short, row.name),
                     (row.program, row.program),
-                    (amount(row.records), row.records),
+                    (count_text(row.records), row.records),
                     (f"{100 * row.share:.1f} %", row.share),
                     ns(row.measured_ns),
                     ns(row.predicted_ns),

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from wavecomb.gui import theme
 from wavecomb.gui.scheduling.run_log import Look, Run, Series, ratio
 from wavecomb.gui.scheduling.run_rates import stretches
-from wavecomb.gui.scheduling.run_table import amount
+from wavecomb.run.progress import count_text
 from wavecomb.run.stats import PHASES
 
 pg.setConfigOptions(antialias=True)
@@ -47,7 +47,7 @@ class AmountAxis(pg.AxisItem):
 
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
         """Texts of ticks."""
-        return [amount(value * scale) for value in values]
+        return [count_text(value * scale) for value in values]
 
 
 class Plot(pg.PlotWidget):

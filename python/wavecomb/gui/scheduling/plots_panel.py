@@ -15,9 +15,9 @@ from wavecomb.gui.scheduling.choices import recipe_of, scheduling_of
 from wavecomb.gui.scheduling.plots import Curves, Legend, PhasePlot
 from wavecomb.gui.scheduling.run_log import Run, RunLog, Series, labels, last_of
 from wavecomb.gui.scheduling.run_rates import moments, rate
-from wavecomb.gui.scheduling.run_table import amount
 from wavecomb.gui.scheduling.runs_tab import RunsTab
 from wavecomb.gui.viewport.session import Frame, Session
+from wavecomb.run.progress import count_text
 
 MAX_CURVES = 6
 EMPTY = "Open a stage: figures appear while it renders."
@@ -200,7 +200,7 @@ def summary(series: Series | None) -> str:
         return EMPTY
     run = series.run
     samples = rate(run, "samples")
-    text = f"{amount(samples.value)} samples/s and {amount(rate(run, 'rays').value)} rays/s"
+    text = f"{count_text(samples.value)} samples/s and {count_text(rate(run, 'rays').value)} rays/s"
     if samples.is_short:
         return f"{text} over {samples.seconds:.1f} s: too few looks to mean anything."
     spread = f"± {100 * samples.spread:.0f} % from stretch to stretch"

@@ -12,6 +12,7 @@ from typing import Any
 
 from wavecomb.gui.scheduling.run_log import FIELDS, RunLog, Series, labels, last_of
 from wavecomb.gui.scheduling.run_rates import Ratio, compare, rate, rate_of
+from wavecomb.run.progress import count_text
 
 COLUMNS = (
     "settings",
@@ -79,13 +80,13 @@ def _row(series: Series, label: str, base: Series | None) -> Row:
     waves = series.settings.get("integrator") != "reference"
     texts = (
         label,
-        known(amount(samples.value)),
+        known(count_text(samples.value)),
         f"{100 * samples.spread:.0f} %" if samples.stretches >= 2 else "",
         *(("1", "", "base") if is_base else _ratio_texts(ratio)),
         f"{run.shading_ns():.0f}" if waves and run.last.records else "",
         f"{100 * run.lane_utilisation():.0f} %" if waves and run.last.packet_lanes else "",
         f"{run.run_length():.1f}" if waves and run.run_length() else "",
-        known(amount(rays.value)),
+        known(count_text(rays.value)),
         str(len(series.runs)),
         series.changed,
     )
@@ -100,18 +101,6 @@ def _ratio_texts(ratio: Ratio | None) -> tuple[str, str, str]:
     if ratio.short or not math.isfinite(ratio.high):
         return f"({ratio.value:.2f})", "", ratio.verdict()
     return f"{ratio.value:.2f}", f"{ratio.low:.2f} to {ratio.high:.2f}", ratio.verdict()
-
-
-def amount(value: float) -> str:
-    """A number with a prefix, three digits.
-
-    >>> amount(1234567.0), amount(999.4), amount(0)
-    ('1.23 M', '999', '0')
-    """
-    for limit, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if value >= 0.9995 * limit:
-            return f"{value / limit:.3g} {prefix}"
-    return f"{value:.3g}"
 
 
 def as_text(table: Sequence[Row]) -> str:

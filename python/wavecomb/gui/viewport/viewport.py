@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QKeyEvent,
@@ -376,7 +376,3 @@ class Viewport(PictureView):
     def sizeHint(self) -> QSize:
         """Roomy."""
         return QSize(theme.em(50), theme.em(34))
-
-    def global_of(self, x: float, y: float) -> QPoint:
-        """Where a point of the picture is in the widget, whole pixels."""
-        return self.from_picture(QPointF(x, y)).toPoint()
