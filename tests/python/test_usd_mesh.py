@@ -79,7 +79,7 @@ def test_faces_stay_in_order_and_holes_and_lines_go():
     ("counts", "indices", "words"),
     [
         ([3, -3], [0, 1, 2], "negative"),
-        ([3, 4], [0, 1, 2], "add up"),
+        ([3, 4], [0, 1, 2], "add up to 7, but there are 3"),
         ([3], [0, 1, 9], "out of range"),
         ([3], [0, 1, -1], "out of range"),
         ([2], [0, 1], "no faces"),

@@ -118,3 +118,24 @@ def test_one_mean(
     ratio, error = renders / exact(height), renders.std(ddof=1) / 2 / exact(height)
     assert error < 0.01
     assert abs(ratio.mean() - 1.0) < 0.003 + 4 * error
+
+
+def test_every_way_gives_the_same_picture(tmp_path: Path) -> None:
+    """Lanes, waves, threads and the reference integrator, with bounces that meet the square."""
+    write_image(tmp_path / "stripes.exr", stripes(), "float")
+    prims = [
+        camera((0, 1.0, 2.0), (0, 0.1, 0), half=0.4),
+        material("M", "diffuse", diffuseColor=(ALBEDO,) * 3),
+        ground("M", 20),
+        GLOW,
+        square(0.3),
+    ]
+    stage = wavecomb.load(write_stage(tmp_path / "stage.usda", *prims))
+
+    def render(**settings: Any) -> Any:
+        return wavecomb.render(stage, size=(24, 16), spp=4, max_depth=3, **settings).beauty
+
+    first = render()
+    assert first.mean() > 0.01
+    for other in ({"integrator": "reference"}, {"lanes": 1}, {"wave_size": 64, "threads": 2}):
+        assert np.array_equal(render(**other), first), other

@@ -58,8 +58,10 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
     """
     if len(counts) and counts.min() < 0:
         raise MeshError("a face has a negative number of corners")
-    if int(counts.sum(dtype=np.int64)) != len(indices):
-        raise MeshError("the face counts do not add up to the number of face indices")
+    if (corners := int(counts.sum(dtype=np.int64))) != len(indices):
+        raise MeshError(
+            f"the face counts add up to {corners}, but there are {len(indices)} face indices"
+        )
     if len(indices) and int(indices.view(np.uint32).max()) >= len(bad):
         raise MeshError("a face index is out of range")
     owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)

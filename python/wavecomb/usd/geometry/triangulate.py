@@ -89,7 +89,9 @@ def triangulate(
         raise MeshError("a face has a negative number of corners")
     total = low * len(counts) if low == high else int(counts.sum(dtype=np.int64))
     if total != len(indices):
-        raise MeshError("the face counts do not add up to the number of face indices")
+        raise MeshError(
+            f"the face counts add up to {total}, but there are {len(indices)} face indices"
+        )
     # Negative ones are large as unsigned.
     if total and int(np.maximum.reduce(indices.view(np.uint32))) >= len(points):
         raise MeshError("a face index is out of range")
