@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "wavecomb/light/escape.h"
 #include "wavecomb/light/light.h"
 #include "wavecomb/scene/light_builder.h"
 

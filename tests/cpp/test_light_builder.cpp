@@ -4,6 +4,7 @@
 #include "lane_testing.h"
 #include "light_testing.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/light/light.inl"
 
 namespace wavecomb {
 namespace {

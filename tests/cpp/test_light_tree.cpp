@@ -8,6 +8,7 @@
 
 #include "lane_testing.h"
 #include "light_tree_testing.h"
+#include "wavecomb/light/light.inl"
 #include "wavecomb/scene/light_cluster.h"
 #include "wavecomb/scene/light_tree.h"
 

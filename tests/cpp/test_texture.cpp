@@ -8,7 +8,7 @@
 #include "lane_testing.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/hash.h"
-#include "wavecomb/texture/lookup.h"
+#include "wavecomb/texture/lookup.inl"
 #include "wavecomb/texture/pyramid.h"
 
 namespace wavecomb {

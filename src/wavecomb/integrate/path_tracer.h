@@ -15,6 +15,7 @@
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/single_rays.h"
 #include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/integrate/steps/escape.h"
 #include "wavecomb/integrate/steps/survive.h"
 #include "wavecomb/learn/guide.h"
 #include "wavecomb/surface/hit.h"

@@ -17,6 +17,8 @@
 #define WAVECOMB_SHARED_KERNELS(KEYWORD, F)                                                        \
   KEYWORD template LightSample<F> sample_light<F>(const LightView&, const LightReceiver<F>&,       \
                                                   const F&, const F&, const F&, const Mask<F>&);   \
+  KEYWORD template UInt<F> chosen_light<F>(const LightView&, const LightReceiver<F>&, const F&,    \
+                                           const Mask<F>&);                                        \
   KEYWORD template LightHit<F> light_hit<F>(const LightView&, const UInt<F>&,                      \
                                             const LightReceiver<F>&, const Vec3<F>&, const F&,     \
                                             const Mask<F>&);                                       \

@@ -17,24 +17,10 @@
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows.h"
 #include "wavecomb/core/vec.h"
+#include "wavecomb/light/receiver.h"
 #include "wavecomb/scene/light_data.h"
 
 namespace wavecomb {
-
-/// Where light is to arrive.
-template <typename F>
-struct LightReceiver {
-  Vec3<F> p;
-  /// Normal on the side that light has to come from, as pack_normal gives it; 0: any side.
-  UInt<F> normal;
-  UInt<F> seed;  ///< of bits below those of the number that chooses
-  F time;        ///< of the shutter, where lights move: mid-shutter, unless it is set
-
-  /// Light may come from any side.
-  LightReceiver(const Vec3<F>& p_) : p(p_), normal(0u), seed(0u), time(0.5f) {}
-  explicit LightReceiver(const Vec3<F>& p_, const UInt<F>& normal_)
-      : p(p_), normal(normal_), seed(0u), time(0.5f) {}
-};
 
 /// A light and the probability of its choice. pdf 0: no light.
 template <typename F>
@@ -42,15 +28,6 @@ struct LightChoice {
   UInt<F> light;
   F pdf;
 };
-
-/// A unit vector in ten bits a component, never 0.
-template <typename F>
-inline UInt<F> pack_normal(const Vec3<F>& n) {
-  const auto steps = [](const F& x) {
-    return UInt<F>(to_int<F>(clamp(F(fma(x, F(511.f), F(512.5f))), F(1.f), F(1023.f))));
-  };
-  return steps(n.x) | (steps(n.y) << 10) | (steps(n.z) << 20);
-}
 
 namespace detail {
 
@@ -77,14 +54,6 @@ template <typename F>
 inline Angle<F> angle_of_cosine(const F& cosine) {
   const F c = clamp(cosine, F(-1.f), F(1.f));
   return {c, safe_sqrt(fma(F(-c), c, F(1.f)))};
-}
-
-template <typename F>
-inline Vec3<F> unpack_normal(const UInt<F>& n) {
-  const auto component = [](const UInt<F>& steps) {
-    return F((F(Int<F>(steps & 1023u)) - 512.f) * (1.f / 511.f));
-  };
-  return {component(n), component(UInt<F>(n >> 10)), component(UInt<F>(n >> 20))};
 }
 
 /// I of the child whose 8 words are at r.

@@ -10,6 +10,7 @@
 #include "wavecomb/integrate/shading_record.h"
 #include "wavecomb/integrate/stages/order_rays.h"
 #include "wavecomb/integrate/steps/emit.h"
+#include "wavecomb/integrate/steps/escape.h"
 #include "wavecomb/integrate/steps/survive.h"
 #include "wavecomb/integrate/wave.h"
 #include "wavecomb/surface/hit.h"

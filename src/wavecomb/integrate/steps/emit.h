@@ -69,18 +69,6 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
 
-/// Radiance of the environment met by a path that left the scene.
-template <typename F>
-inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings& settings,
-                                     uint32_t depth, const PathState<F>& path,
-                                     const Mask<F>& active) {
-  const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
-  const Color<F> le =
-      escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active, depth == 0,
-                          path.link, path.joined(), path.time, path.diffuse);
-  return clean<F>(path.throughput * le, clamp_limit(settings, depth));
-}
-
 /// What a path gets of the surface at a vertex that glows itself. Notes the emitter for AOVs.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
