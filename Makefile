@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 
 BUILD := build/editable
-# Compile the core in unity batches of six sources. A clean build is faster, but rebuilding after an
+# Compile sources in unity batches. A clean build is faster, but rebuilding after an
 # edit is slower; OFF suits developers of the core.
 BATCH ?= ON
 # Lane widths: "default" means scalar lanes and the widest that the target supports, "all" means
@@ -138,8 +138,7 @@ test-cpp: build build/.setup-test ## C++ tests of values, lanes and whole render
 	@$(LOCK) $(VENV)/cmake --build $(BUILD) --target wavecomb_tests -j $(JOBS) -- --quiet
 	$(VENV)/ctest --test-dir $(BUILD) -j $(JOBS) --verbose --output-on-failure --no-tests=error
 
-# CHECKS=all builds all tests, with every check also in packets and tests, which takes five times as
-# long to compile.
+# CHECKS=all builds all tests, kernels and checks, which takes five times as long to compile.
 test-asan: build/.setup-test ## C++ tests of memory and whole renders under AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(ASAN)/build.ninja || $(ASAN_LOCK) $(VENV)/cmake -S . -B $(ASAN) -G Ninja --log-level=NOTICE \
 	  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-Og -g1" -DWAVECOMB_SANITIZE=$(CHECKS) -DWAVECOMB_TESTS=$(CHECKS) \

@@ -54,6 +54,23 @@ if(WAVECOMB_SANITIZE)
   # Sanitizers triple the time to optimise OpenSubdiv's templates.
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
+# Sources of scene/, render/ and core/ whose speed no render notices (checks, tables, the plan of a
+# render) are compiled with -O1, which takes a compiler two thirds of the time. Excepted are loops
+# over vertices, texels, pixels and training samples.
+set(cold ${core_sources})
+list(FILTER cold INCLUDE REGEX "/src/wavecomb/(scene|render|core)/[a-z_]+\\.cpp$")
+foreach(name IN ITEMS scene/fingerprint scene/image_distribution scene/light_cluster scene/light_motion scene/light_tree
+    scene/mesh_attributes scene/mesh_tangents scene/object_bounds scene/parallel scene/scene_records scene/triangle_means
+    scene/volume_grid scene/volume_motion scene/walk_data render/adaptive render/allotment render/bounce_reader
+    render/guide_training render/light_parts render/picture_tiles render/pixel_order)
+  set(source "${PROJECT_SOURCE_DIR}/src/wavecomb/${name}.cpp")
+  if(NOT source IN_LIST cold)
+    message(FATAL_ERROR "cmake/WavecombCore.cmake lists ${source}, which is not there")
+  endif()
+  list(REMOVE_ITEM cold "${source}")
+endforeach()
+list(APPEND cold ${refiner})
+list(REMOVE_ITEM core_sources ${cold})
 file(GLOB_RECURSE core_headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/wavecomb/*.h"
   "${PROJECT_SOURCE_DIR}/src/wavecomb/*.inl")
 # For the core only. -Wconversion would also warn about int to float, which is common in kernels.
@@ -69,7 +86,7 @@ wavecomb_read_rows(kernels integrate/kernel_matrix.h "\n  X\\([a-z]+, [a-z]+, [a
 list(TRANSFORM kernels REPLACE "^.*\\(([a-z]+), ([a-z]+), ([a-z]+), ([a-z]+), $" "\\1:\\2:\\3:\\4")
 
 # wavecomb_kernel_units(VAR KIND SET WIDTH): generates the units of a row of WAVECOMB_KERNELS for
-# WIDTH lanes in the build tree.
+# WIDTH lanes in the build tree. SET is `programs`, `variants` or `first` (the first program).
 function(wavecomb_kernel_units var kind set width)
   set(units "")
   set(index 0)
@@ -77,9 +94,12 @@ function(wavecomb_kernel_units var kind set width)
     string(REGEX MATCH "^(.*):(.*)$" row "${row}")
     set(member "${CMAKE_MATCH_1}")
     set(program "${CMAKE_MATCH_2}")
-    if(NOT program IN_LIST media AND (set STREQUAL "variants" OR member STREQUAL program))
+    if(NOT program IN_LIST media AND (set STREQUAL "variants" OR member STREQUAL program)
+        AND (NOT set STREQUAL "first" OR index EQUAL 0))
       set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
       configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/${kind}.lanes.cpp.in" "${unit}" @ONLY)
+      # Sanitized builds with WAVECOMB_BATCH have a unit for each program and width.
+      set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}")
       list(APPEND units "${unit}")
     endif()
     math(EXPR index "${index} + 1")
@@ -100,6 +120,12 @@ function(wavecomb_lane_units var width widest reduced)
     if(reduced)
       list(GET row 3 widths)
     endif()
+    if(widths STREQUAL "first")
+      set(widths every)
+      if(width GREATER 1)
+        set(set first)
+      endif()
+    endif()
     if(widths STREQUAL "every"
         OR (widths MATCHES "^(scalar|ends)$" AND width EQUAL 1)
         OR (widths MATCHES "^(widest|ends)$" AND width EQUAL widest AND width GREATER 1))
@@ -109,6 +135,10 @@ function(wavecomb_lane_units var width widest reduced)
   endforeach()
   foreach(source IN LISTS lane_sources)
     get_filename_component(name "${source}" NAME_WE)
+    # kHasVolumePackets
+    if(reduced AND width GREATER 1 AND name MATCHES "^volume")
+      continue()
+    endif()
     file(RELATIVE_PATH source "${PROJECT_SOURCE_DIR}/src" "${source}")
     set(unit "${PROJECT_BINARY_DIR}/lanes/all_${name}_${width}.cpp")
     file(CONFIGURE OUTPUT "${unit}" CONTENT "#define WAVECOMB_LANES ${width}\n#include \"${source}\"\n")
@@ -129,8 +159,25 @@ function(wavecomb_add_core name flags)
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:${flags}> embree TBB::tbb
     OpenSubdiv::osdCPU)
   get_target_property(widths ${flags} WAVECOMB_WIDTHS)
-  target_precompile_headers(${name} PRIVATE ${wavecomb_pch})
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 6)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10
+    DEFINE_SYMBOL "")  # as precompiled headers that others own are compiled
+  set(cold_target ${name}_cold)
+  add_library(${cold_target} OBJECT ${cold})
+  target_include_directories(${cold_target} PRIVATE "${PROJECT_SOURCE_DIR}/src")
+  target_compile_options(${cold_target} PRIVATE ${core_warnings})
+  target_link_libraries(${cold_target} PRIVATE ${flags} embree TBB::tbb)
+  if(NOT WAVECOMB_SANITIZE)
+    target_compile_options(${cold_target} PRIVATE -O1)
+  endif()
+  target_precompile_headers(${cold_target} PRIVATE ${wavecomb_pch})
+  if(WAVECOMB_SANITIZE)
+    target_precompile_headers(${name} REUSE_FROM ${cold_target})
+  else()
+    # GCC 12 fails where a precompiled header of -O1 is used with -O3.
+    target_precompile_headers(${name} PRIVATE ${wavecomb_pch})
+  endif()
+  set_target_properties(${cold_target} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10)
+  target_sources(${name} PRIVATE $<TARGET_OBJECTS:${cold_target}>)
   list(GET widths -1 widest)
   list(REMOVE_ITEM widths 1)
   set(packets "")
@@ -158,6 +205,10 @@ function(wavecomb_add_core name flags)
     target_compile_options(${lanes} PRIVATE ${core_warnings})
     target_link_libraries(${lanes} PRIVATE ${flags} embree TBB::tbb)
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${lanes}>)
+    if(WAVECOMB_SANITIZE)
+      # Elsewhere kernels stay alone, since GCC limits inlining by the size of a unit.
+      set_target_properties(${lanes} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP)
+    endif()
   endforeach()
   # Headers that units of kernels include, except programs and code specific to each kernel.
   set(kernel_pch ${wavecomb_pch} <wavecomb/integrate/shared_kernels.h> <wavecomb/integrate/wave.h>
@@ -167,11 +218,6 @@ function(wavecomb_add_core name flags)
   endforeach()
   target_precompile_headers(${name}_scalar PRIVATE ${kernel_pch})
   if(packets)
-    target_link_libraries(${name}_packets PRIVATE wavecomb_lean)
-    if(WAVECOMB_SANITIZE)
-      target_precompile_headers(${name}_packets PRIVATE ${kernel_pch})
-    else()
-      target_precompile_headers(${name}_packets REUSE_FROM ${name}_scalar)
-    endif()
+    target_precompile_headers(${name}_packets REUSE_FROM ${name}_scalar)
   endif()
 endfunction()

@@ -22,19 +22,15 @@ target_compile_options(wavecomb_common INTERFACE
   # vectors.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
-# wavecomb_lean, linked last, removes sanitizer checks from packet kernels and test units. Checks of
-# every reference to a packet, and of every packet's scope, take 3/4 of the compile time of such a
-# unit. The same templates with scalar lanes, and the rest of the core, keep all checks.
-# WAVECOMB_SANITIZE=all keeps them everywhere.
-add_library(wavecomb_lean INTERFACE)
+# Checks of every reference and of every scope double the compile time of kernels and containers, and
+# quadruple that of packets. WAVECOMB_SANITIZE=all, as in `make test-long`, enables them.
 if(WAVECOMB_SANITIZE)
   if(WAVECOMB_SANITIZE STREQUAL "thread")
     set(_sanitize -fsanitize=thread -fno-omit-frame-pointer)
   else()
     set(_sanitize -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
     if(NOT WAVECOMB_SANITIZE STREQUAL "all")
-      target_compile_options(wavecomb_lean INTERFACE
-        -fno-sanitize=null,alignment,object-size,vptr -fno-sanitize-address-use-after-scope)
+      list(APPEND _sanitize -fno-sanitize=null,alignment,object-size,vptr -fno-sanitize-address-use-after-scope)
     endif()
   endif()
   target_compile_options(wavecomb_common INTERFACE ${_sanitize})

@@ -56,10 +56,18 @@ constexpr typename BatchKernels<F>::value_type plain_batch_kernel() {
   else
     return nullptr;
 }
+template <typename Bsdf, typename F>
+constexpr typename BatchKernels<F>::value_type general_batch_kernel() {
+  constexpr size_t kProgram = id_of<Bsdf, F>();
+  if constexpr (kProgram < kSurfaceProgramCount && !has_program_kernels(kProgram, kWidth<F>))
+    return &shade_batch<Program<static_cast<ProgramId>(kProgram), float>, float, kEverything>;
+  else
+    return &shade_batch<Bsdf, F, kEverything>;
+}
 template <typename F, typename... Bsdf>
 constexpr auto batch_kernels(ProgramList<Bsdf...>) {
   BatchKernels<F> kernels{};
-  ((kernels[id_of<Bsdf, F>()] = &shade_batch<Bsdf, F, kEverything>), ...);
+  ((kernels[id_of<Bsdf, F>()] = general_batch_kernel<Bsdf, F>()), ...);
   return for_variants(kernels);
 }
 template <typename F, typename... Bsdf>

@@ -5,28 +5,36 @@
 #include <string>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/integrate/kernel_matrix.h"
 #include "wavecomb/integrate/reference.h"
 #include "wavecomb/integrate/wave_integrator.h"
 
 namespace wavecomb {
 
+namespace {
+template <size_t W>
+LaneKernels kernels_of() {
+  return {&run_wave<W>, &run_wave_in_volumes < kHasVolumePackets ? W : 1 >, &time_material<W>};
+}
+}  // namespace
+
 LaneKernels lane_kernels(uint32_t lanes) {
   switch (lanes) {
 #ifdef WAVECOMB_HAS_LANES_1
     case 1:
-      return {&run_wave<1>, &run_wave_in_volumes<1>, &time_material<1>};
+      return kernels_of<1>();
 #endif
 #ifdef WAVECOMB_HAS_LANES_4
     case 4:
-      return {&run_wave<4>, &run_wave_in_volumes<4>, &time_material<4>};
+      return kernels_of<4>();
 #endif
 #ifdef WAVECOMB_HAS_LANES_8
     case 8:
-      return {&run_wave<8>, &run_wave_in_volumes<8>, &time_material<8>};
+      return kernels_of<8>();
 #endif
 #ifdef WAVECOMB_HAS_LANES_16
     case 16:
-      return {&run_wave<16>, &run_wave_in_volumes<16>, &time_material<16>};
+      return kernels_of<16>();
 #endif
     default:
       return {};
