@@ -221,8 +221,8 @@ class Renders:
         return found.of_mean() if "merge_radius" in variant.settings else found
 
 
-def examine(scene: RandomScene, seed: int) -> Iterator[Result]:
-    """Compares all variants of a scene, suspicious ones again with more samples."""
+def examine(scene: RandomScene, seed: int, repeats: int = len(MORE)) -> Iterator[Result]:
+    """Compares all variants of a scene, suspicious ones up to ``repeats`` times again."""
     from wavecomb import _core
 
     renders = Renders(scene)
@@ -232,7 +232,7 @@ def examine(scene: RandomScene, seed: int) -> Iterator[Result]:
         try:
             found = renders.compare(variant, 0)
             turn = 0
-            while found.worst >= SUSPICION and turn < len(MORE):
+            while found.worst >= SUSPICION and turn < repeats:
                 turn += 1
                 found = renders.compare(variant, turn)
         except _core.Error as error:
@@ -263,6 +263,10 @@ def main() -> int:
     parser.add_argument("seed", nargs="?", type=int, help="of one stage")
     parser.add_argument("--from", dest="first", type=int, default=0, metavar="SEED")
     parser.add_argument("--count", type=int, default=30, help="stages, where no seed is given")
+    parser.add_argument(
+        "--repeats", type=int, default=len(MORE), choices=range(len(MORE) + 1),
+        help="of what looks suspicious, with more samples; fewer are quicker and less sure",
+    )  # fmt: skip
     parser.add_argument("--minutes", type=float, help="start no stage after so many minutes")
     parser.add_argument("-o", "--out", type=Path, default=ROOT / "out" / "pairs")
     options = parser.parse_args()
@@ -280,7 +284,7 @@ def main() -> int:
                 old.unlink()
             scene = make_scene(seed, folder, enclosure=True)
             bad = False
-            for result in examine(scene, seed):
+            for result in examine(scene, seed, options.repeats):
                 compared += 1
                 refused += result.found is None
                 fault = result.is_fault(len(SINGLE) * len(seeds))

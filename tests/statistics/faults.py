@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts known faults of light transport back, and shows that pairs.py names each.
+
+    .venv/bin/python tests/statistics/faults.py              # builds in out/faults: 5 to 15 minutes
+    .venv/bin/python tests/statistics/faults.py --keep       # with the build that is there
+
+The tree is copied, one line of each fix is undone, and the program is built once with all faults,
+for scalar lanes. Each fault has a stage in which the others do not show. The exit code is 0 where
+pairs.py finds all of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+OUT = ROOT / "out" / "faults"
+TREE, BUILD, VENV = OUT / "tree", OUT / "build", OUT / "venv"
+LIBRARIES = (Path(sys.prefix) / "lib", ROOT / ".deps" / "embree" / "lib")
+"""Of the environment, where the module of another one finds oneTBB and Embree."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that was fixed.
+
+    Attributes:
+        name: What was wrong.
+        seed: Stage of pairs.py that shows it.
+        changes: (file, text of the fix, text without the fix).
+    """
+
+    name: str
+    seed: int
+    changes: tuple[tuple[str, str, str], ...]
+
+
+STEPS = "src/wavecomb/integrate/steps/"
+FAULTS = (
+    Fault(
+        "light samples through a smooth thin wall end in the light itself",
+        342,
+        (
+            (
+                STEPS + "connection.h",
+                "near.distance = select(crossing, max(F(distance - closer), F(0.f)), distance);",
+                "near.distance = select(crossing & (closer > 1e30f), F(0.f), distance);",
+            ),
+            (STEPS + "connection.h", "if (any(lifted)) {", "if (any(lifted) && v.depth > 1000) {"),
+        ),
+    ),
+    Fault(
+        "light samples pass through the surface of a subsurface body",
+        38,
+        (
+            (
+                STEPS + "sample_light.h",
+                "valid = valid & not_(at.bsdf.enters(wo, wi));",
+                "valid = valid & not_(at.bsdf.enters(wo, wi) & Mask<F>(false));",
+            ),
+        ),
+    ),
+    Fault(
+        "guiding with cosine sampling uses the density of the BSDF",
+        29,
+        (
+            (
+                STEPS + "guide_bounce.h",
+                "const F unguided = bounce_pdf(v, at.bsdf, wo, seen, wi, e);",
+                "const F unguided = e.pdf;",
+            ),
+        ),
+    ),
+    Fault(
+        "light paths at a maximum depth of 0 show light that is scattered once",
+        12,
+        (
+            (
+                "src/wavecomb/render/renderer.cpp",
+                "if (used.max_depth == 0) used.transport = Transport::kPath;",
+                "",
+            ),
+        ),
+    ),
+    Fault(
+        "absorbing glass dims other segments of light paths than of camera paths",
+        27,
+        (
+            (
+                "src/wavecomb/scene/contents.cpp",
+                "if (!any_) return false;",
+                "if (!any_ || meshes_.size() < 1000000) return false;",
+            ),
+        ),
+    ),
+)
+
+
+def copy_tree() -> None:
+    """Copies what git knows and the working tree has, and puts the faults back."""
+    shutil.rmtree(TREE, ignore_errors=True)
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    for name in filter(None, listed.stdout.split("\0")):
+        if (ROOT / name).is_file():
+            (TREE / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, TREE / name)
+    for fault in FAULTS:
+        for name, fixed, faulty in fault.changes:
+            text = (TREE / name).read_text()
+            if text.count(fixed) != 1:
+                sys.exit(f"faults: {name} has no line '{fixed}' any more; adapt {fault.name!r}")
+            (TREE / name).write_text(text.replace(fixed, faulty))
+
+
+def build() -> None:
+    """Builds the module and an environment that has it."""
+    tools = Path(sys.prefix) / "bin"
+    definitions = {
+        "CMAKE_BUILD_TYPE": "Release",
+        "CMAKE_CXX_FLAGS_RELEASE": "-O1 -DNDEBUG",
+        "WAVECOMB_PYTHON": "ON",
+        "WAVECOMB_VDB": "OFF",
+        "WAVECOMB_BATCH": "ON",
+        "WAVECOMB_LANE_WIDTHS": "1",
+    }
+    flags = [f"-D{name}={value}" for name, value in definitions.items()]
+    (TREE / ".deps").unlink(missing_ok=True)
+    for name in (".deps", ".venv"):
+        if not (TREE / name).exists():
+            (TREE / name).symlink_to(ROOT / name)
+    run([tools / "cmake", "-S", TREE, "-B", BUILD, "-G", "Ninja", "--log-level=NOTICE", *flags])
+    run([tools / "cmake", "--build", BUILD, "--target", "wavecomb_python", "--", "--quiet"])
+    shutil.rmtree(VENV, ignore_errors=True)
+    run([sys.executable, "-m", "venv", "--without-pip", VENV])
+    folder = "import sysconfig; print(sysconfig.get_path('platlib'))"
+    site, others = (
+        Path(subprocess.check_output([python, "-c", folder], text=True).strip())
+        for python in (VENV / "bin" / "python", sys.executable)
+    )
+    run([tools / "cmake", "--install", BUILD, "--component", "python", "--prefix", site])
+    shutil.copytree(TREE / "python" / "wavecomb", site / "wavecomb", dirs_exist_ok=True)
+    # Packages of this environment, but not its editable Wavecomb: a .pth there is not read.
+    (site / "others.pth").write_text(f"{others}\n")
+
+
+def run(words: list[object]) -> None:
+    """Runs a command; ends with its exit code where it fails."""
+    done = subprocess.run([str(word) for word in words], stdout=subprocess.DEVNULL)
+    if done.returncode:
+        sys.exit(done.returncode)
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--keep", action="store_true", help="take the build that is there")
+    if not parser.parse_args().keep:
+        copy_tree()
+        build()
+    missed = 0
+    libraries = os.pathsep.join(str(folder) for folder in LIBRARIES)
+    for fault in FAULTS:
+        pairs = ROOT / "tests" / "statistics" / "pairs.py"
+        command = [VENV / "bin" / "python", pairs, str(fault.seed), "--repeats", "1"]
+        environment = {**os.environ, "LD_LIBRARY_PATH": libraries}
+        done = subprocess.run(command, capture_output=True, text=True, env=environment)
+        lines = [line for line in done.stdout.splitlines() if "FAULT" in line]
+        missed += not lines
+        print(f"{fault.name}: stage {fault.seed}: {'found' if lines else 'MISSED'}")
+        for line in lines or [done.stderr[-2000:]]:
+            print(f"    {line}", flush=True)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
