@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "lane_testing.h"
 #include "wavecomb/material/params.h"
 
 namespace wavecomb {
@@ -153,9 +154,7 @@ void expect_lanes_equal_scalar(const MaterialView& view) {
 }
 
 TEST_F(ParamsTest, UniformAndMixedLanesEqualScalar) {
-  expect_lanes_equal_scalar<4>(view_);
-  expect_lanes_equal_scalar<8>(view_);
-  expect_lanes_equal_scalar<16>(view_);
+  lane_testing::for_each_packet([&]<typename F>() { expect_lanes_equal_scalar<kWidth<F>>(view_); });
 }
 
 template <size_t W>
@@ -183,9 +182,7 @@ void expect_own_by_material(const MaterialView& view) {
 TEST_F(ParamsTest, WhatAProgramHasToItselfIsItsMaterials) {
   const ProgramParameterRecord own[3] = {{{1, 2, 3, 4}}, {{5, 6, 7, 8}}, {{9, 10, 11, 12}}};
   view_.own = own;
-  expect_own_by_material<4>(view_);
-  expect_own_by_material<8>(view_);
-  expect_own_by_material<16>(view_);
+  lane_testing::for_each_packet([&]<typename F>() { expect_own_by_material<kWidth<F>>(view_); });
   const auto scalar = detail::own_values<4, float>(view_, 1u, true);
   EXPECT_EQ(scalar[3], 8.f);
 }
