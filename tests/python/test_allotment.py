@@ -126,8 +126,8 @@ def test_time_limit(cornell: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--noise", "0.1"], "give one"),
-        (["--region", "0", "0", "8", "8"], "whole picture"),
+        (["--noise", "0.1"], "set only one"),
+        (["--region", "0", "0", "8", "8"], "whole image"),
         (["--film-memory", "0.1"], "--allocate error needs all of it"),
     ],
 )

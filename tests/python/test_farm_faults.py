@@ -318,7 +318,8 @@ def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
     future = _Future(full)
     run._flying[future] = _Batch([Task(0, 3)])
     client.amounts["one"] = 0
-    run._take(future)
+    run._fetch(future)
+    run._take(*run._ended.get(timeout=1))
     assert [batch.tiles for batch in run._ready] == [[Task(0, 3)]] and not run._out.failed
     run._look()
     assert run._capacity() == 1

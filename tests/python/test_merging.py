@@ -93,8 +93,8 @@ def test_stopped_renders_go_on(stages: Any) -> None:
         ({"transport": "bdpt"}, "merge_radius"),
         ({"noise": 0.05}, "errors of pixels"),
         ({"error": True}, "errors of pixels"),
-        ({"aovs": ("direct",)}, "parts of the light"),
-        ({"aovs": ("lpe:a=CD.*",)}, "parts of the light"),
+        ({"aovs": ("direct",)}, "AOVs that split the beauty"),
+        ({"aovs": ("lpe:a=CD.*",)}, "AOVs that split the beauty"),
     ],
 )
 def test_what_it_does_not_go_with(stages: Any, way: dict[str, Any], named: str) -> None:

@@ -218,7 +218,7 @@ usd
         encoding="utf-8",
     )
     test = arnold.to_stage(tmp_path / "test", tmp_path / "out" / "scene.usda")
-    assert "arnold:lambert is diffuse" in test.notes and test.space == "rec709"
+    assert "arnold:lambert becomes diffuse" in test.notes and test.space == "rec709"
     picture = wavecomb.render(test.stage, size=(16, 12), spp=4, max_depth=1)
     # Radiance 2^2 times albedo / pi at normal incidence; the square fills the image.
     expected = 4 * 0.8 * np.array([0.5, 0.25, 0.125]) / np.pi

@@ -126,7 +126,7 @@ def test_values_of_a_scene() -> None:
         ({"materials": {0: {"base_color": (1, 2)}}}, "base_color must be 3 numbers"),
         ({"materials": {0: {"ior": -1.0}}}, "'/floor' has an ior of 0 or less"),
         ({"materials": {9: {}}}, "material 9 is not there"),
-        ({"materials": {"floor": {}}}, "number of the material"),
+        ({"materials": {"floor": {}}}, "material index"),
         ({"lights": {1: {"color": (-1, 0, 0)}}}, r"'/bulb': color is \(-1, 0, 0\); each must be 0"),
         ({"lights": {1: {"radius": "big"}}}, "'/bulb': radius must be a number"),
         ({"lights": {1: {"texture": 0}}}, "'/bulb' has no parameter 'texture' that can be"),
