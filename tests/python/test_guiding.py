@@ -186,7 +186,7 @@ def test_a_damaged_field_is_refused(cornell: Any, stopped: dict[str, Any]) -> No
     rng = np.random.default_rng(6)
     for cut in (0, 1, 3, 90, good.size - 1):
         if cut > 0:
-            with pytest.raises(_core.Error, match="start anew|train a new one"):
+            with pytest.raises(_core.Error, match=r"start anew|train a new one"):
                 _core.render(cornell, settings, state={**stopped, "learned.field": good[:cut]})
     refused = 0
     for _ in range(30):
