@@ -119,7 +119,7 @@ TEST(PathExpression, ErrorsNameThePlace) {
   EXPECT_NE(message_of("a", "C{99}").find("at most 64"), std::string::npos);
   EXPECT_NE(message_of("a", "<RD>L").find("write C first"), std::string::npos);
   EXPECT_NE(message_of("a b", "C.*").find("letters, digits and underscores"), std::string::npos);
-  EXPECT_NE(message_of("a", "CsL").find("straight"), std::string::npos);
+  EXPECT_NE(message_of("a", "CsL").find("cut-outs"), std::string::npos);
   EXPECT_NE(message_of("a", std::string(200, '(')).find("nested too deep"), std::string::npos);
   EXPECT_EQ(message_of("a", "C.*<L.'nobody'>"), "");  // group names are resolved with the scene
   EXPECT_THROW(PathAutomaton(std::vector<NamedExpression>{{"a", "C.*<L.'nobody'>"}}, kKeys), Error);

@@ -4,6 +4,7 @@
 
 #include "curve_testing.h"
 #include "wave_testing.h"
+#include "wavecomb/integrate/kernel_matrix.h"
 
 namespace wavecomb {
 namespace {
@@ -387,7 +388,11 @@ TEST(Wave, CountsAgreeWithTheReference) {
   EXPECT_EQ(a.shadow_rays, b.shadow_rays);
   EXPECT_EQ(a.records, b.records);
   EXPECT_GE(b.packet_lanes, b.records);
-  EXPECT_EQ(b.packet_lanes, b.packets * lane_widths().back());
+  // Reduced builds shade most programs in scalar lanes.
+  if (WAVECOMB_REDUCED_KERNELS)
+    EXPECT_LE(b.packet_lanes, b.packets * lane_widths().back());
+  else
+    EXPECT_EQ(b.packet_lanes, b.packets * lane_widths().back());
   EXPECT_GT(run.wave().bytes(), 512u * 100);
 }
 
