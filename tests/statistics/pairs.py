@@ -139,7 +139,7 @@ class Renders:
     def __init__(self, scene: RandomScene) -> None:
         self.scene = scene
         self.stages: dict[str, Any] = {}
-        self.plain: dict[int, Array] = {}
+        self.references: dict[tuple[str, int], Array] = {}
         self.trained: dict[str, Any] = {}
 
     def stage(self, load: dict[str, Any]) -> Any:
@@ -157,14 +157,31 @@ class Renders:
         common = {"size": (SIZE, SIZE), "threads": 1, "max_depth": self.scene.depth}
         return {**PLAIN, **common, "fresnel": fresnel, **changes}
 
-    def batches(self, variant: Variant | None, more: int, first: int) -> Array:
-        """``BATCHES`` renders of a variant, or with plain settings, (n, height, width, 3)."""
+    def reference(self, variant: Variant) -> Variant:
+        """What a variant is compared with: plain settings, or light paths.
+
+        Camera paths cannot find a point or a direction through a smooth lobe, and light paths can.
+        So where a stage has both, only renders with light paths agree with each other.
+        """
+        transport = variant.settings.get("transport", "path")
+        unseen = {"sun light", "point light"} & set(self.scene.features)
+        hidden = self.scene.delta and unseen and transport != "path"
+        return Variant("light", {"transport": "light"}, {}) if hidden else Variant("plain", {}, {})
+
+    def reference_batches(self, variant: Variant, more: int, first: int) -> Array:
+        """Batches of ``reference``, rendered once."""
+        reference = self.reference(variant)
+        key = reference.name, more
+        if key not in self.references:
+            self.references[key] = self.batches(reference, more, first)
+        return self.references[key]
+
+    def batches(self, variant: Variant, more: int, first: int) -> Array:
+        """``BATCHES`` renders of a variant, (n, height, width, 3)."""
         import wavecomb
 
-        if variant is None and more in self.plain:
-            return self.plain[more]
-        stage = self.stage(variant.load if variant else {})
-        settings = self.settings(variant.settings if variant else {})
+        stage = self.stage(variant.load)
+        settings = self.settings(variant.settings)
         if settings["guiding"] == "on":
             settings["learn_from"] = self.field(stage, settings)
         # Light selection and roulettes learn from pilot renders whose size depends on the samples.
@@ -172,10 +189,7 @@ class Renders:
             wavecomb.render(stage, spp=SPP * more, seed=seed, **settings).beauty
             for seed in range(first, first + BATCHES)
         ]
-        batches = np.stack([np.asarray(one, np.float64) for one in renders])
-        if variant is None:
-            self.plain[more] = batches
-        return batches
+        return np.stack([np.asarray(one, np.float64) for one in renders])
 
     def field(self, stage: Any, settings: dict[str, Any]) -> Any:
         """A render that has trained a guiding field with these settings."""
@@ -214,7 +228,7 @@ class Renders:
         more = (1, *MORE)[turn]
         found = judge(
             self.batches(variant, more, 1000 * turn + 500),
-            self.batches(None, more, 1000 * turn),
+            self.reference_batches(variant, more, 1000 * turn),
             tolerance=self.tolerance(variant),
         )
         # Merging blurs what mirrors show: of the image, only the mean stays.

@@ -94,8 +94,8 @@ def test_light_that_is_lost_is_a_fault(tmp_path: Path, monkeypatch: pytest.Monke
     """A variant that is 5 % too dark is detected at once; an equal one passes."""
     true = Renders.batches
 
-    def darker(self: Renders, variant: Variant | None, more: int, first: int) -> Any:
-        dark = variant is not None and variant.name == "cosine"
+    def darker(self: Renders, variant: Variant, more: int, first: int) -> Any:
+        dark = variant.name == "cosine"
         return true(self, variant, 1, first) * np.float64(0.95 if dark else 1.0)
 
     monkeypatch.setattr(Renders, "batches", darker)
