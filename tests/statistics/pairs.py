@@ -158,7 +158,7 @@ class Renders:
         return {**PLAIN, **common, "fresnel": fresnel, **changes}
 
     def reference(self, variant: Variant) -> Variant:
-        """What a variant is compared with: plain settings, or light paths.
+        """Returns the settings to compare a variant with: plain ones, or light paths.
 
         Camera paths cannot find a point or a direction through a smooth lobe, and light paths can.
         So where a stage has both, only renders with light paths agree with each other.
