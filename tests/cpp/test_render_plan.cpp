@@ -87,7 +87,7 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
                                     cache);
     EXPECT_EQ(context.guide, nullptr) << "pilots change nothing of the render";
     WaveContext used = context;
-    found.apply(used, *scene);
+    found.apply(used);
     EXPECT_EQ(used.guide != nullptr, found.training->field != nullptr);
     return found;
   };

@@ -9,6 +9,7 @@
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/render/lane_kernels.h"
 #include "wavecomb/render/pixel_order.h"
+#include "wavecomb/render/render_plan.h"
 #include "wavecomb/scene/light_tree.h"
 
 namespace wavecomb::wave_testing {
@@ -65,13 +66,7 @@ class WaveRun {
     context_.measures_costs = true;
     context_.histories = histories;
     reference_ = std::make_unique<ReferenceIntegrator>(context_, 1);
-    const Bounds& b = scene_->bounds();
-    if (b.empty()) return;
-    const float lo[3] = {b.lo.x, b.lo.y, b.lo.z}, hi[3] = {b.hi.x, b.hi.y, b.hi.z};
-    for (int i = 0; i < 3; ++i) {
-      context_.grid.lo[i] = lo[i];
-      context_.grid.scale[i] = hi[i] > lo[i] ? 1024.f / (hi[i] - lo[i]) : 0.f;
-    }
+    context_.grid = order_grid(scene_->bounds());
   }
   WaveRun(const WaveRun&) = delete;
   WaveRun& operator=(const WaveRun&) = delete;

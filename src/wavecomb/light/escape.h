@@ -29,9 +29,8 @@ inline F infinite_emission_density(const LightView& view, uint32_t light, const 
 
 }  // namespace detail
 
-/// Radiance * MIS weight of infinite light `light` for a ray that left `from` and the scene along
-/// dir, as
-/// escaped_radiance sums them up.
+/// Returns radiance times MIS weight of infinite light `light` for a ray from `from` along `dir`
+/// that leaves the scene: one term of escaped_radiance.
 template <typename F>
 inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& from,
                                         const Vec3<F>& dir, const F& bsdf_pdf,
@@ -65,11 +64,10 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
   return hit.radiance * weight;
 }
 
-/// Sum over all infinite lights of radiance * MIS weight for a ray that left `from` and the scene
-/// along dir;
-/// the weight is balance(bsdf_pdf, pdf of sample_light), or 1 where bsdf_is_delta (camera rays
-/// too); `share` of the bounce is diffuse. `ratio`: PathState::ratio, where lights send paths,
-/// which then share in the weight.
+/// Returns the sum over all infinite lights of radiance times MIS weight for a ray from `from`
+/// along `dir` that leaves the scene. The weight is the balance heuristic of `bsdf_pdf` and the pdf
+/// of light sampling, or 1 for delta bounces and camera rays. `share`: diffuse fraction of the
+/// bounce by color. `ratio`: PathState::ratio; if lights send paths, these take part in the weight.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
                                  const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,

@@ -17,34 +17,31 @@ std::shared_ptr<const GuideTraining> training_for(const PilotInput& input,
 
 }  // namespace
 
-void PilotResults::apply(WaveContext& context, const Scene& scene) {
-  if (lights) {
-    lights->weighed.apply(context.scene.lights);
-    if (context.joins_light()) send_paths(scene, context.scene.lights);
-  }
-  if (aiming && aiming->aim.count > 0) context.scene.lights.aim = &aiming->aim;
-  if (training && training->field) {
-    guide_ = view_of(*training);
-    context.guide = &guide_;
-  }
+void PilotResults::apply(WaveContext& context) const {
+  context.scene.lights = light_view;
+  if (training->field) context.guide = &guide_view;
 }
 
 PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
   const RenderPlan& plan = input.plan;
   WaveContext context = input.context;
+  LightView& view = context.scene.lights;
   PilotResults found;
   found.lights = cache.lights.get(input.scene, plan.accelerator, plan.view, input.light_settings,
                                   input.stopped);
-  found.apply(context, *input.scene);
+  found.lights->weighed.apply(view);
+  if (context.joins_light()) send_paths(*input.scene, view);
   input.costs.start(context, plan.kernels, input.profile, input.halted);
   if (plan.settings.joins_light() && plan.settings.light_aim) {
     found.aiming = input.aiming;
     if (!found.aiming)
       found.aiming = std::make_shared<const LightAiming>(
           learn_to_aim(context, *input.scene, plan.waves, input.stopped));
-    found.apply(context, *input.scene);
+    if (found.aiming->aim.count > 0) view.aim = &found.aiming->aim;
   }
+  found.light_view = view;
   found.training = training_for(input, context, cache);
+  if (found.training->field) found.guide_view = view_of(*found.training);
   return found;
 }
 

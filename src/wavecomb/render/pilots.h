@@ -37,14 +37,14 @@ struct PilotCache {
 struct PilotResults {
   std::shared_ptr<const LightCalibration> lights;  ///< null: not calibrated yet
   std::shared_ptr<const LightAiming> aiming;       ///< null: paths from lights are not aimed
-  std::shared_ptr<const GuideTraining> training;   ///< null: not trained yet; may have no field
+  /// Never null; without a field before and unless it is trained.
+  std::shared_ptr<const GuideTraining> training = std::make_shared<const GuideTraining>();
+  LightView light_view;  ///< lights with calibrated weights, and aimed if they send paths
+  GuideView guide_view;  ///< of the field of `training`, if it has one
 
   /// Makes the waves of `context` use these results. Contract: this object outlives the use of the
   /// context and does not change meanwhile.
-  void apply(WaveContext& context, const Scene& scene);
-
- private:
-  GuideView guide_;
+  void apply(WaveContext& context) const;
 };
 
 /// Input of the pilots.

@@ -32,19 +32,6 @@ std::vector<std::unique_ptr<SchedulingPolicy>> make_policies(const std::string& 
   return policies;
 }
 
-/// Returns the grid over the scene for Morton codes.
-OrderGrid order_grid(const Bounds& bounds) {
-  OrderGrid grid;
-  if (bounds.empty()) return grid;
-  const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
-  const float hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
-  for (int i = 0; i < 3; ++i) {
-    grid.lo[i] = lo[i];
-    grid.scale[i] = hi[i] > lo[i] ? 1024.f / (hi[i] - lo[i]) : 0.f;
-  }
-  return grid;
-}
-
 WaveSetup wave_setup(const Settings& settings) {
   return {choose_lanes(settings.lanes), thread_count(settings),
           wave_size_for(settings, settings.rendered().pixels())};
@@ -70,6 +57,18 @@ uint32_t wave_size_for(const Settings& settings, uint64_t pixels) {
   const uint64_t share = std::max<uint64_t>(64, total / (uint64_t{thread_count(settings)} * 4));
   return static_cast<uint32_t>(
       std::min<uint64_t>(settings.wave_size != 0 ? settings.wave_size : kDefaultWaveSize, share));
+}
+
+OrderGrid order_grid(const Bounds& bounds) {
+  OrderGrid grid;
+  if (bounds.empty()) return grid;
+  const float lo[3] = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
+  const float hi[3] = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
+  for (int i = 0; i < 3; ++i) {
+    grid.lo[i] = lo[i];
+    grid.scale[i] = hi[i] > lo[i] ? 1024.f / (hi[i] - lo[i]) : 0.f;
+  }
+  return grid;
 }
 
 uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wave_size) {
@@ -102,7 +101,10 @@ RenderPlan::RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator,
     owned_policies_ = make_policies(settings.policy);
     for (const auto& owned : owned_policies_) policies.push_back(owned.get());
   }
-  if (settings.joins_light()) check_light_paths(scene, settings);
+  if (settings.joins_light()) {
+    check_light_paths(scene, settings);
+    lights_without_paths = wavecomb::lights_without_paths(scene);
+  }
 }
 
 Film RenderPlan::make_film() const {
@@ -122,7 +124,7 @@ WaveContext RenderPlan::make_context(Film& film, RenderCosts& costs, RayRecorder
     return (one->columns() & kPositionColumn) != 0;
   });
   const bool is_single = settings.traversal == Traversal::kSingle;
-  WaveContext context{
+  return {
       .scene = view,
       .accel = &accelerator,
       .settings = &settings,
@@ -138,11 +140,10 @@ WaveContext RenderPlan::make_context(Film& film, RenderCosts& costs, RayRecorder
       .measures_costs = costs.measures(),
       .recorder = recorder,
       .aovs = &aovs,
+      .splat_filter = settings.joins_light() ? &splat_filter : nullptr,
       .light_paths = light_share.paths(),
       .visible = visible,
   };
-  if (settings.joins_light()) context.splat_filter = &splat_filter;
-  return context;
 }
 
 }  // namespace wavecomb

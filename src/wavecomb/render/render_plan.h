@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -19,6 +20,7 @@
 #include "wavecomb/render/wave_setup.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/policy.h"
+#include "wavecomb/schedule/ray_order.h"
 
 namespace wavecomb {
 
@@ -28,6 +30,9 @@ uint32_t thread_count(const Settings& settings);
 /// Returns the number of paths in a wave of a render of `pixels` pixels: that of the settings or
 /// 4096, but small enough that every thread gets several waves.
 uint32_t wave_size_for(const Settings& settings, uint64_t pixels);
+
+/// Returns the grid over the scene for Morton codes.
+OrderGrid order_grid(const Bounds& bounds);
 
 /// Returns the samples per pixel that a pass of a render adds if it is not adaptive. For images
 /// smaller than a wave, returns enough to fill a wave.
@@ -62,6 +67,8 @@ struct RenderPlan {
   Region window;             ///< pixels of the film
   SplatFilter splat_filter;  ///< pixel filter of connections from light paths to the camera
   SceneView view;            ///< with the light tree, if lights are selected by it
+  /// Names of the lights that send no paths, if others do.
+  std::vector<std::string> lights_without_paths;
 
   /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;

@@ -74,7 +74,7 @@ void RenderRun::work(PilotCache& cache, const TrialShared& shared,
           .halted = [this] { return watch_.halted(); },
       },
       cache);
-  pilots_.apply(context_, *scene_);
+  pilots_.apply(context_);
   if (shared.aiming) *shared.aiming = pilots_.aiming;
   // Set only now, since the pilots measure light.
   if (options_.wants_camera_squares) context_.camera_squares = scene_brightness(*scene_);
@@ -111,9 +111,7 @@ void RenderRun::take_snapshot(bool is_finished) {
   check_textures();
   film_.note_light_paths();
   if (!options_.snapshot) return;
-  static const GuideTraining kNothing;
-  const GuideTraining& training = pilots_.training ? *pilots_.training : kNothing;
-  options_.snapshot({film_, loop_.pass(), training, loop_.status(), is_finished,
+  options_.snapshot({film_, loop_.pass(), *pilots_.training, loop_.status(), is_finished,
                      plan_.aovs.kept_names, [this] { return statistics(); }});
 }
 
@@ -134,10 +132,10 @@ RenderStatistics RenderRun::statistics() const {
   s.resumed_samples = status.resumed_samples;
   s.error = status.error;
   s.allotment = loop_.allotment();
-  if (pilots_.training) s.guiding = pilots_.training->statistics;
+  s.guiding = pilots_.training->statistics;
   if (const LightAiming* aiming = pilots_.aiming.get(); aiming && aiming->paths > 0)
     s.light_aiming = {aiming->aim.count, aiming->paths, aiming->seconds};
-  if (plan_.settings.joins_light()) s.lights_without_paths = lights_without_paths(*scene_);
+  s.lights_without_paths = plan_.lights_without_paths;
   add_up(runner_, context_, *scene_, costs_, s);
   s.scene_bytes = scene_->bytes();
   s.accelerator_bytes = plan_.accelerator.bytes();

@@ -14,6 +14,7 @@
 #include "wavecomb/scene/material_data.h"
 #include "wavecomb/scene/object_bounds.h"
 #include "wavecomb/scene/triangle_columns.h"
+#include "wavecomb/scene/wide_map.h"
 
 namespace wavecomb {
 namespace {
@@ -112,6 +113,7 @@ struct Glass {
   Bounds bounds;  ///< in world space
   uint32_t mesh;
   const Instance* instance;
+  WideMap to_mesh;  ///< from world space
 };
 
 /// A binary tree of bounds, split at the median of their centres.
@@ -191,7 +193,8 @@ class Search {
     each_placed([&](uint32_t mesh, const Instance& instance) {
       if (!uses_glass(mesh, instance)) return false;
       const Bounds bounds = placed_bounds(mesh, instance);
-      if (!bounds.empty()) all.push_back({bounds, mesh, &instance});
+      if (!bounds.empty())
+        all.push_back({bounds, mesh, &instance, WideMap(instance.to_world).inverse()});
       return false;
     });
     glass_.emplace(std::move(all));
@@ -256,7 +259,7 @@ class Search {
         columns.emplace(meshes_[g.mesh]);
         tests_ += meshes_[g.mesh].triangle_count();
       }
-      left += columns->faces_left(inverse(g.instance->to_world, p), tests_);
+      left += columns->faces_left(g.to_mesh.point(p), tests_);
       return false;
     });
     return left > 0;
@@ -296,12 +299,6 @@ class Search {
   static Bounds shrunk(Bounds b) {
     const Point by = (b.hi - b.lo) * kMargin;
     return {b.lo + by, b.hi - by};
-  }
-  /// A point of world space in the space of an instance, which no singular map places.
-  static Point inverse(const Affine& m, const Point& p) {
-    const Point v = p - m.t, x = m.axis(0), y = m.axis(1), z = m.axis(2);
-    return Point(dot(v, cross(y, z)), dot(v, cross(z, x)), dot(v, cross(x, y))) *
-           (1.f / m.determinant());
   }
 
   std::span<const Mesh> meshes_;

@@ -51,6 +51,13 @@ struct WideMap {
     }
     return r;
   }
+  /// The image of a point.
+  Vec3<float> point(const Vec3<float>& p) const {
+    const auto row = [&](const double (&r)[4]) {
+      return static_cast<float>(r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3]);
+    };
+    return {row(m[0]), row(m[1]), row(m[2])};
+  }
   /// As kernels read it.
   void put(float (&to)[12]) const {
     for (int i = 0; i < 12; ++i) to[i] = static_cast<float>(m[i / 4][i % 4]);
