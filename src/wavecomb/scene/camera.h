@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The camera as data.
+/// Camera parameters of a scene.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@ namespace wavecomb {
 enum class Projection : uint32_t {
   kPerspective,
   kOrthographic,
-  kLatlong,  ///< longitude to the right, latitude up: all directions in one picture
+  kLatlong,  ///< Equirectangular, all directions: longitude to the right, latitude up
 };
 
-/// What gives way where the shapes of window and picture differ: UsdRender's
+/// Policy for windows whose aspect ratio differs from the image's: UsdRender's
 /// aspectRatioConformPolicy.
 enum class Conform : uint32_t {
   kExpandAperture,
@@ -26,52 +26,58 @@ enum class Conform : uint32_t {
   kAdjustPixelAspectRatio,
 };
 
-/// Where a shutter that rolls over the picture begins.
+/// Image edge at which a rolling shutter begins.
 enum class RollingShutter : uint32_t { kOff, kTop, kBottom, kLeft, kRight };
 
-/// A thin-lens camera. It looks along -z of its own space, +x right, +y up (UsdGeomCamera). Lengths
-/// are in scene units.
+/// A thin-lens camera. It looks along -z in camera space, with +x to the right and +y up, as
+/// UsdGeomCamera does. Lengths are in scene units.
 struct Camera {
   Affine to_world;
-  /// Places at equal distances over the shutter, with straight lines between; none: it stands still
-  /// at to_world. Two or more where it moves.
+  /// Camera transforms at equally spaced shutter times, interpolated linearly: two or more if the
+  /// camera moves. Empty if it stands still at `to_world`.
   std::vector<Affine> steps{};
   Projection projection = Projection::kPerspective;
-  /// What the picture shows: x from window[0] to window[1], y from window[2] to window[3]. On the
-  /// plane z = -1 of a perspective camera; across the axis of an orthographic one; of a latlong
-  /// camera longitude and latitude in radians, (0, 0) along -z.
+  /// Visible region: x from window[0] to window[1], y from window[2] to window[3]. A perspective
+  /// camera measures it on the plane z = -1, an orthographic camera perpendicular to its axis in
+  /// scene units, and a latlong camera as longitude and latitude in radians with (0, 0) along -z.
   float window[4] = {-0.5f, 0.5f, -0.5f, 0.5f};
-  Conform conform = Conform::kExpandAperture;  ///< not of latlong cameras, which fill the picture
-  float pixel_aspect = 1;                      ///< width of a pixel / its height
-  float lens_radius = 0;                       ///< 0: all is sharp, as of latlong cameras
-  float focus_distance = 1;                    ///< along -z, > 0 where lens_radius > 0
-  float near_clip = 0;                         ///< along -z; of latlong cameras a distance
+  /// Ignored by latlong cameras, which stretch the window to the image.
+  Conform conform = Conform::kExpandAperture;
+  float pixel_aspect = 1;    ///< width / height of a pixel
+  float lens_radius = 0;     ///< 0 gives a pinhole camera; ignored by latlong cameras
+  float focus_distance = 1;  ///< along -z; must be > 0 if lens_radius > 0
+  float near_clip = 0;       ///< along -z; radial distance for latlong cameras
   float far_clip = 1e30f;
-  /// Planes in the camera's space; of what it sees itself, points with a x + b y + c z + d < 0 are
-  /// cut off.
+  /// Clipping planes (a, b, c, d) in camera space. Camera rays ignore points with a x + b y + c z +
+  /// d < 0; all other rays see them.
   std::vector<std::array<float, 4>> clip_planes{};
-  float exposure = 1;           ///< what light is multiplied by in the picture
-  float aperture_blades = 0;    ///< corners of the aperture, 3 or more; 0: it is round
-  float aperture_rotation = 0;  ///< degrees, counter-clockwise as the camera sees it
-  float lens_squeeze = 1;       ///< the aperture's height / its width: anamorphic lenses
-  /// Brown's model of distortion (integrate/lens.h), on the plane at distance 1.
+  float exposure = 1;           ///< factor applied to the radiance of the image
+  float aperture_blades = 0;    ///< polygon corners of the aperture, 3 or more; 0 gives a disk
+  float aperture_rotation = 0;  ///< degrees, counter-clockwise as seen from behind the camera
+  float lens_squeeze = 1;       ///< height / width of the aperture, for anamorphic lenses
+  /// Coefficients of Brown's lens distortion model (integrate/lens.h), on the plane at distance 1.
   float lens_k1 = 0, lens_k2 = 0, lens_k3 = 0, lens_p1 = 0, lens_p2 = 0;
-  /// Distortion as a map, in place of these: n x n nodes over the picture, n even, row by row and
-  /// two in each four numbers: where the ray goes through the undistorted picture, of whose width
-  /// and height these are shares, from the upper left corner.
+  /// Lens distortion as a map, used instead of the coefficients above: n x n nodes over the image
+  /// with n even, row by row, two nodes in each array of four values. A node holds the position of
+  /// its ray in the undistorted image, from the upper left corner, in fractions of the image width
+  /// and height.
   std::vector<std::array<float, 4>> lens_map{};
   RollingShutter rolling_shutter = RollingShutter::kOff;
-  float rolling_duration = 0;  ///< share of the shutter's time that a row of pixels is exposed
+  /// Fraction of the shutter interval for which each pixel row is exposed.
+  float rolling_duration = 0;
 };
 
-/// A window fitted to a picture of width x height pixels, as the camera's `conform` says.
+/// Window of a camera after `conform` has fitted it to the aspect ratio of the image: centre and
+/// half extents.
 struct FittedWindow {
   float centre_x, centre_y, half_x, half_y;
 };
-/// Whether the lens distorts.
+/// Returns whether the lens distorts.
 bool distorts(const Camera& camera);
-/// Nodes along an edge of `lens_map`; 0 where these are not as many as they must be.
+/// Returns the number of nodes along one edge of `lens_map`, or 0 if the map does not have n x n
+/// nodes with n of 2 or more.
 uint32_t lens_map_nodes(const Camera& camera);
+/// Fits the camera's window to an image of width x height pixels by the policy `conform`.
 FittedWindow fitted_window(const Camera& camera, uint32_t width, uint32_t height);
 
 }  // namespace wavecomb

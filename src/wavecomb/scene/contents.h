@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Objects inside of absorbing glass.
+/// Search for objects inside absorbing glass.
 #pragma once
 
 #include <span>
@@ -11,13 +11,14 @@ namespace wavecomb {
 struct Light;
 struct Material;
 
-/// Whether an absorbing solid of glass holds an object, a part of one, or the centre of a light.
-/// Light then passes through the glass on segments that do not end at its surface, so that paths
-/// need to know what they are inside of (asks_for_interiors).
+/// Returns whether an absorbing glass solid contains an object, a part of one, or the centre of a
+/// light. If so, light travels through the glass on segments that do not end at its surface, so
+/// paths have to track a medium stack (asks_for_interiors).
 ///
-/// `groups`: meshes of group 0 are in world space. Uses the first shapes of meshes and positions in
-/// mid-shutter. Tests vertices of curves, and of each triangle a few points of the part that is
-/// within the bounds of the glass. Where that takes more than half a second the answer is true.
+/// Meshes of group 0 of `groups` are in world space. The test uses the first time step of mesh
+/// shapes and instance transforms at mid-shutter. It tests vertices of curves, and a few points on
+/// the part of each triangle that lies within the bounds of the glass. If it would take longer than
+/// about half a second, it stops and returns true.
 bool absorbing_glass_holds_objects(std::span<const Material> materials,
                                    std::span<const Mesh> meshes, std::span<const Group> groups,
                                    std::span<const Instance> instances,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tells one scene from another, part by part.
+/// Fingerprints that distinguish scenes, one hash for each part of the scene.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@
 
 namespace wavecomb {
 
-/// Hashes of what decides over the picture: "geometry", "materials", "textures", "lights",
-/// "camera", and of the "names" that show in AOVs. `arrays`: geometry and textures, too, of which
-/// every byte is read.
+/// Returns hashes of everything that affects the image, as (part, hash): "geometry", "materials",
+/// "textures", "lights", "camera", and "names", which appear in AOVs. `arrays` includes geometry
+/// and textures, of which every byte is read.
 std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene, bool arrays = true);
 
 }  // namespace wavecomb

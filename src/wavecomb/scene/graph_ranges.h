@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Between what the results of value graphs lie.
+/// Interval arithmetic that bounds the results of value graphs.
 #pragma once
 
 #include <array>
@@ -12,19 +12,20 @@
 
 namespace wavecomb {
 
-/// All that a value may be: low <= value <= high, or NaN.
+/// Interval of a value: low <= value <= high, or NaN if `nan` is set.
 struct ValueRange {
   float low = -std::numeric_limits<float>::infinity();
   float high = std::numeric_limits<float>::infinity();
   bool nan = true;
 };
 
-/// By component of GraphParameter: what a program may drive it to, in its own range and never NaN;
-/// nothing where it does not drive it.
+/// For each component of GraphParameter, the range of values that a graph can write, clamped to the
+/// range of the parameter and never NaN; empty if the graph does not drive that component.
 using DrivenRanges = std::array<std::optional<ValueRange>, kGraphOutputCount>;
 
-/// Ranges of what program `graph` (kNoGraph: none) gives, whatever the hit is. Sound, and not the
-/// least: operands are taken for independent, and what is no plain arithmetic may be anything.
+/// Computes the ranges of the outputs of graph program `graph` (kNoGraph for none) over all hits.
+/// The ranges are conservative: operands are assumed independent, and the result of any operation
+/// other than plain arithmetic is unbounded.
 DrivenRanges driven_ranges(const GraphSet& graphs, uint32_t graph,
                            std::span<const TexturePtr> textures);
 

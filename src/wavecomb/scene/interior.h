@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What fills meshes: media inside of glass and liquids, and fog that a mesh bounds.
+/// Media inside meshes: glass, liquids, and fog that a mesh bounds.
 #pragma once
 
 #include <cstdint>
@@ -14,46 +14,48 @@ namespace wavecomb {
 struct Material;
 struct GraphSet;
 
-/// What a surface is to who crosses it.
+/// Role of a surface as the boundary of a medium.
 enum class InteriorKind : uint32_t {
-  kNone,      ///< the bound of nothing
-  kRefracts,  ///< of glass or a liquid
-  kClear,     ///< of what has the index of the air, and does nothing itself: a bound of fog
+  kNone,      ///< bounds no medium
+  kRefracts,  ///< refractive boundary of glass or a liquid
+  kClear,  ///< boundary of fog: index of refraction 1, no scattering or absorption at the surface
 };
 
-/// What is inside of a surface, as kernels read it: by material.
+/// Packed medium behind a surface, one record for each material.
 template <typename F>
 struct InteriorMedium {
-  Color<F> absorption, scattering;  ///< coefficients, one over a unit of length
+  Color<F> absorption, scattering;  ///< coefficients, per unit of length
   F anisotropy;                     ///< mean cosine of the scattering angle
   F ior;
-  F priority;    ///< where several overlap the highest counts, of equal ones the last entered
+  /// In overlaps the medium of highest priority counts; among equal ones, the last entered.
+  F priority;
   UInt<F> kind;  ///< InteriorKind
   Vec3<F> pad, pad_too;
   WAVECOMB_FIELDS(absorption, scattering, anisotropy, ior, priority, kind, pad, pad_too)
 };
 static_assert(sizeof(InteriorMedium<float>) == 64);
 
-/// What kernels need of all interiors.
+/// Device view of the media of all materials.
 struct InteriorView {
-  /// By material; null: nobody asks what paths are inside of, and what is inside absorbs where a
-  /// path comes out (integrate/steps/interact.h).
+  /// Media by material. Null if no material needs a medium stack; absorption is then applied at the
+  /// hit where a path leaves the solid (integrate/steps/interact.h).
   const InteriorMedium<float>* media = nullptr;
-  uint32_t event_material = 0;  ///< shades collisions in clear bounds
+  uint32_t event_material = 0;  ///< material that shades collisions in media with clear boundaries
 
   bool is_bound(uint32_t material) const {
     return media && media[material].kind != static_cast<uint32_t>(InteriorKind::kNone);
   }
 };
 
-/// Whether a material is a solid that transmits light and absorbs it inside.
+/// Returns whether a material is a solid that transmits light and absorbs part of it inside.
 bool absorbs_inside(const Material& material);
-/// Whether a material needs paths to know what they are inside of: it scatters, has a priority, or
-/// bounds an absorbing medium that does not refract. With `absorbing` it does, too, where it
-/// absorbs: in a scene of volumes, where a path that a volume scatters inside of it has come part
-/// of its way before, and where objects are inside of absorbing glass (scene/contents.h).
+/// Returns whether a material needs paths to track a medium stack: it scatters inside, has a
+/// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, absorption
+/// alone is enough. Set it for scenes with volumes, in which a path scattered by a volume inside
+/// the solid has covered part of its length before the collision, and for scenes with objects
+/// inside absorbing glass (scene/contents.h).
 bool asks_for_interiors(const Material& material, bool absorbing);
-/// The media of all materials; none where no material asks for them.
+/// Makes the media of all materials; empty if no material needs a medium stack.
 std::vector<InteriorMedium<float>> make_interiors(std::span<const Material> materials,
                                                   const GraphSet& graphs, bool absorbing);
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where paths from lights are aimed, as data.
+/// Target spheres of light paths.
 #pragma once
 
 #include <cstdint>
 
 namespace wavecomb {
 
-/// Spheres that paths from lights are aimed at (docs/light-paths.md, "Aiming"): with the
-/// probability `even` a path starts as its light alone would have it, with share[k] evenly through
-/// sphere k. They add up to 1.
+/// Target spheres of light paths (docs/light-paths.md, "Aiming"). A path starts from the
+/// distribution of its light with probability `even`, and uniformly through sphere k with
+/// probability share[k]. These probabilities sum to 1.
 struct LightAim {
   static constexpr uint32_t kMost = 16;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Makes the records that kernels read out of lights and emissive triangles.
+/// Packs lights and emissive triangles into the records that kernels read.
 #pragma once
 
 #include <cstdint>
@@ -14,47 +14,49 @@
 
 namespace wavecomb {
 
-/// A mesh light in one of the places where its mesh is.
+/// An instance of a mesh light.
 struct PlacedMeshLight {
   const Light* light;
-  Affine to_world;  ///< of the mesh's group
-  double area;      ///< of all its triangles, one side, in world space
-  bool is_sampled;  ///< false: only paths that meet it find it
+  Affine to_world;  ///< transform of the mesh's group
+  double area;      ///< total one-sided area of the triangles in world space
+  bool is_sampled;  ///< False if only paths that hit the mesh sample its emission
 };
 
-/// A triangle of a mesh that emits, in world space.
+/// A triangle of an emissive mesh, in world space.
 struct EmissiveTriangle {
   float p0[3], p1[3], p2[3];
   float uv0[2] = {0, 0}, uv1[2] = {1, 0}, uv2[2] = {0, 1};
-  /// Material whose emission or opacity varies; kNoLight where both are constant.
+  /// Material whose emission or opacity varies; kNoLight if both are constant.
   uint32_t material = kNoLight;
-  uint32_t instance = 0, mesh = 0, prim = 0;  ///< where it is
-  /// Emitted radiance, W / (m^2 sr), to both sides; not read by kernels where `material` is set.
+  uint32_t instance = 0, mesh = 0, prim = 0;  ///< Identifies the triangle
+  /// Emitted radiance on both sides, W / (m^2 sr). Kernels ignore it if `material` is set.
   float radiance[3] = {0, 0, 0};
-  uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight
-  /// How much of the triangle is there, in [0, 1]: what is sampled shines by as much. Where it
-  /// varies, put what to expect of it; only the choice of lights depends on it then.
+  uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight, or kNoLight
+  /// Presence of the triangle in [0, 1], which scales its sampled emission. If the opacity varies,
+  /// pass its expected value, which affects only light selection probabilities.
   float opacity = 1;
   bool opacity_varies = false;
-  /// Luminance to expect of the emission is luminance(radiance) * mean_scale. With a texture, put
-  /// the texture's mean (times scale, plus bias) into `radiance` and leave this at 1. Only the
-  /// choice of lights depends on it.
+  /// The expected luminance of the emission is luminance(radiance) * mean_scale. For a texture,
+  /// pass the mean of the texture (times scale, plus bias) in `radiance` and leave this at 1. It
+  /// affects only light selection probabilities.
   float mean_scale = 1;
 };
 
-/// All lights of a scene, ready for kernels. Order: infinite lights, then those with a shape and
-/// points (`records`), then the triangles; each kind of group in the order of the input.
+/// All lights of a scene, packed for kernels. Light indices count infinite lights first, then
+/// lights with a shape and point lights (together `records`), then triangles, each group in input
+/// order.
 struct LightSet {
-  /// Those of mesh lights follow; they are no lights that can be chosen.
+  /// Records of mesh lights follow after `record_count`; they hold what the triangles of a mesh
+  /// light share, and cannot be selected themselves.
   std::vector<LightRecord> records;
-  uint32_t record_count = 0;  ///< without them
+  uint32_t record_count = 0;  ///< number of records without those of mesh lights
   std::vector<TriangleLight> triangles;
   std::vector<TriangleUvs> triangle_uvs;  ///< of triangles whose emission or opacity varies
   std::vector<uint32_t> mesh_lights;      ///< LightView::mesh_lights
-  std::vector<uint32_t> pick_bins;        ///< empty where the tree alone chooses
+  std::vector<uint32_t> pick_bins;        ///< empty if only the light tree is used for selection
   PickTable pick;                         ///< without its pointer
-  LightTree tree;                         ///< an outline where it is left for later
-  std::vector<double> powers;             ///< to build the tree by, where it is
+  LightTree tree;                         ///< an outline without nodes if the tree is built later
+  std::vector<double> powers;  ///< powers of all lights in W, kept if the tree is built later
   std::vector<Distribution2D> distributions;
   std::vector<LightRecord> portals;
   std::vector<PortalGroup> portal_groups;
@@ -66,53 +68,57 @@ struct LightSet {
   std::vector<IesRecord> ies;
   std::vector<float> ies_numbers;
   uint32_t infinite_count = 0;
-  std::vector<uint32_t> of_input;  ///< record of each input light
-  double total_power = 0;          ///< estimate that the choice of lights rests on, W
+  std::vector<uint32_t> of_input;  ///< record index of each input light
+  double total_power = 0;  ///< estimated power on which selection probabilities are based, W
 
   size_t size() const { return record_count + triangles.size(); }
-  /// Index of the first triangle among all lights.
+  /// Returns the index of the first triangle among all lights.
   uint32_t first_triangle() const { return record_count; }
-  /// Probability of choosing light `i`.
+  /// Returns the probability of selecting light `i` by power.
   float pick_pdf(size_t i) const {
     return i < record_count ? records[i].pick_pdf : triangles[i - record_count].pick_pdf;
   }
 
-  /// What kernels take. Contract: points into this set, which must stay where it is.
+  /// Returns the device view of these lights. Contract: it points into this set, which must not
+  /// move.
   LightView view(const MaterialView& materials) const;
 };
 
-/// Most lights that a choice by power can tell apart (its random number has 24 bits). Of more, the
-/// tree alone chooses.
+/// Maximum number of lights for selection by power, whose random number has 24 bits. With more
+/// lights, only the light tree is used.
 inline constexpr uint32_t kMaxPicked = (1u << 24) - 1;
-/// Most lights that can be numbered: triangles have rows of 16 words each.
+/// Maximum number of lights: kernels address triangle records of 16 32-bit words each with 32-bit
+/// indices.
 inline constexpr uint32_t kMaxLights = 1u << 28;
 
-/// Throws Error for more lights and emissive triangles than kMaxLights.
+/// Throws Error if there are more than kMaxLights lights and emissive triangles.
 void check_light_count(uint64_t count);
 
-/// When the tree of lights is built.
+/// Time at which the light tree is built.
 enum class TreeTime { kNow, kWhenChosen };
 
-/// Emissive triangle i. Called from many threads at once.
+/// Function that returns emissive triangle i. It is called from several threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
-/// Builds the records, those of the `triangle_count` triangles in parallel.
+/// Packs all lights; the `triangle_count` triangles in parallel.
 ///
-/// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the light's
-/// size:
-///   rect, disk, sphere, cylinder   the area in world space as transformed
-///   distant              pi sin^2(half angle) up to 90 degrees, pi (2 - sin^2) above, 1 for angle
-///   0 dome                 not at all
+/// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the size of
+/// the light:
+///   rect, disk, sphere, cylinder   world-space area after the transform
+///   distant                        pi sin^2(a) for a half angle a up to 90 degrees,
+///                                  pi (2 - sin^2(a)) above, 1 for angle 0
+///   dome                           not divided
 /// A distant light of angle 0 gives the irradiance `color` at normal incidence. A sphere of radius
-/// 0 is a point light: its radiant intensity is `color`, or with `normalize` color / 4, which is
-/// what a normalized sphere tends to as it shrinks. Rects and disks shine to the side that -z is
-/// mapped to, also where the transform mirrors. Negative colours count as 0.
+/// 0 is a point light of radiant intensity `color`, or color / 4 with `normalize`, the limit of a
+/// normalized sphere of shrinking radius. Rects and disks emit to the side to which their transform
+/// maps -z, even if the transform mirrors. Negative colours count as 0.
 ///
-/// `radius` is that of the scene's bounding sphere (0 or less: 1): infinite lights are weighed by
-/// the power that they send through it. `before`: lights with the same textures, whose densities of
-/// domes are taken over where they fit, or null. Throws Error for more than kMaxLights lights. Of
-/// more than `most_picked` there is no table to choose by power. The tree is as large as all else:
-/// at kWhenChosen it is built only where LightSelection::kAuto chooses by it.
+/// `radius` is the radius of the scene's bounding sphere (0 or less counts as 1); the power of an
+/// infinite light is the power that it sends through this sphere. `before`, or null, is a light set
+/// with the same textures, from which sampling densities of domes are reused where they match. For
+/// more than `most_picked` lights no table for selection by power is built. The light tree takes as
+/// much memory as everything else; with kWhenChosen it is built only if LightSelection::kAuto
+/// selects by tree. Throws Error for more than kMaxLights lights.
 ///
 /// Contract: each light has passed check_light, each mesh light check_mesh_light
 /// (scene/light_table.h).
@@ -124,23 +130,26 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       size_t most_picked = kMaxPicked, TreeTime tree_time = TreeTime::kNow,
                       std::span<const LightFilter> filters = {});
 
-/// The density that a latlong texture times `color` is sampled by: piecewise constant on a grid of
-/// at most 1024 x 512 cells, proportional to the mean over the cell of the bilinear luminance,
-/// times the sine of the polar angle. Row 0 is the top (the pole +y). Positive wherever the
+/// Builds the sampling density of a latlong texture times `color`: piecewise constant on a grid of
+/// at most 1024 x 512 cells, proportional to the mean bilinear luminance of the cell times the sine
+/// of the polar angle. Row 0 is the top (the pole +y). The density is positive wherever the
 /// bilinear texture is. An all-black texture gives width 0.
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color);
 
-/// The same for the picture of a rect: at most 1024 x 1024 cells, evenly over the square.
+/// Builds the sampling density of the texture of a rect light: at most 1024 x 1024 cells, with
+/// uniform measure over the square.
 Distribution2D build_rect_distribution(const TextureView& texture, const Vec3<float>& color);
 
-/// 1 / (integral of the squared density of a dome's image over directions): 4 pi of an even one.
+/// Returns 1 / (integral over directions of the squared density of a dome's image), in sr; a
+/// uniform image gives 4 pi.
 double image_solid_angle(const Distribution2D& d);
 
-/// The table that chooses among lights of the given weights (>= 0), of which those before
-/// `first_triangle` are one group, and how many of the 2^24 numbers choose each light. Lights of
-/// weight 0 are never chosen, all others have some floor of probability. All weights 0: numbers 0.
-/// At most kMaxPicked. The alias tables are Vose's, in integers: M. Vose, "A Linear Algorithm for
-/// Generating Random Numbers with a Given Distribution", 1991.
+/// Builds the table that selects a light with probability proportional to its weight (>= 0). Lights
+/// before `first_triangle` are one group, the triangles another. `numbers` receives how many of the
+/// 2^24 random numbers select each light: none for weight 0, and at least a small number for every
+/// other light. If all weights are 0, all entries are 0. There may be at most kMaxPicked lights.
+/// Alias tables in integers after M. Vose, "A Linear Algorithm for Generating Random Numbers with a
+/// Given Distribution", 1991.
 PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
                            std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);
 

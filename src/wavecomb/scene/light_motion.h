@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights that move while the shutter is open: turned and carried as stiff bodies from where they
-/// are in mid-shutter, which is where their records are.
+/// Lights that move while the shutter is open. They move as rigid bodies from their pose at
+/// mid-shutter, which their records describe.
 ///
-/// At a time, a light is its record turned by R about its origin and carried to its place there:
+/// At a given time, the record is rotated by R about its pivot `origin`, which moves to `place`:
 ///   x = R (x_rest - origin) + place
-/// R is the quaternion between those of the two steps around the time, of length 1. Distances,
-/// solid angles, and so all densities are those of the record, seen from where x_rest is.
+/// R is a unit quaternion, interpolated between the two steps around that time. The motion is
+/// rigid, so distances, solid angles and densities equal those of the record seen from x_rest.
 #pragma once
 
 #include <span>
@@ -17,12 +17,13 @@ namespace wavecomb {
 struct LightSet;
 struct LightCluster;
 
-/// Gives `set`, whose records there are, the motion of `lights`.
+/// Adds the motion of `lights` to `set`, which already contains their records.
 void add_motions(LightSet& set, std::span<const Light> lights);
 
-/// Where a light is at a time, in double precision: as LightPose (light/moving.h) has it.
+/// Pose of a light at a time, in double precision; LightPose (light/moving.h) is its counterpart
+/// for kernels.
 struct LightPlace {
-  double x[3], y[3], z[3];  ///< where its axes in mid-shutter point
+  double x[3], y[3], z[3];  ///< directions of its mid-shutter axes
   double place[3], origin[3];
 
   LightPlace(const LightMotion& motion, std::span<const LightStep> steps, double time);
@@ -31,13 +32,14 @@ struct LightPlace {
   void to_world(const double (&direction)[3], double (&out)[3]) const;
 };
 
-/// A ball around all places of a ball that moves with a light, in place of the one given.
+/// A ball.
 struct Ball {
   double centre[3];
   double radius;
 };
+/// Returns a ball that contains the ball `at_rest` in all poses of a light that moves.
 Ball along_way(const LightMotion& motion, std::span<const LightStep> steps, const Ball& at_rest);
-/// Bounds of a light's whole way, of those where it rests.
+/// Returns bounds of a light over its whole motion, from its bounds at mid-shutter.
 LightCluster along_way(const LightMotion& motion, std::span<const LightStep> steps,
                        const LightCluster& at_rest);
 

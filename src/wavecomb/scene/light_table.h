@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a light can be told, as a table: a row for each member of Light and of its Shaping, and for
-/// what kinds have to themselves. Checks, the fingerprint, keywords in Python, calls of the sandbox
-/// and the window's fields follow from it. A new parameter is a member, a row here, and its use; of
-/// one kind alone, a row of that kind (LightKindInfo::own) and its use.
+/// Table of light parameters: one row for each member of Light and Shaping, and for the parameters
+/// specific to one kind. Range checks, the scene fingerprint, Python keywords, sandbox calls and
+/// the fields of the window are derived from it. To add a parameter, add a member, a row here, and
+/// its use; for one kind only, add a row to that kind (LightKindInfo::own) and its use.
 #pragma once
 
 #include <cstddef>
@@ -17,51 +17,54 @@
 
 namespace wavecomb {
 
-/// A value of a light; of a choice its number, of an id that is none (kNoTexture, ...) monostate.
+/// Value of a light parameter. A choice is stored as its index, an unset id (kNoTexture, ...) as
+/// monostate.
 using LightValue =
     std::variant<std::monostate, bool, uint32_t, float, Vec3<float>, std::vector<Affine>>;
 
 enum class LightValueKind : uint8_t { kNumber, kColour, kFlag, kChoice, kId, kTransforms };
-/// What an id counts.
+/// Type of object to which an id refers.
 enum class LightRefers : uint8_t { kNothing, kTexture, kProfile, kSet, kGroup, kFilter };
-/// What a parameter is about.
+/// Group of parameters in a form.
 enum class LightGroup : uint8_t { kEmission, kShape, kShaping, kResponse };
 
-/// What kinds of lights have in common.
+/// Traits that kinds of lights share.
 namespace light_trait {
-inline constexpr uint32_t kPlaced = 1;     ///< it is a light by itself, not that of a mesh
-inline constexpr uint32_t kSized = 2;      ///< `normalize` says something
-inline constexpr uint32_t kShaped = 4;     ///< UsdLuxShapingAPI
-inline constexpr uint32_t kSeen = 8;       ///< rays may meet its shape
-inline constexpr uint32_t kPictured = 16;  ///< a texture
-inline constexpr uint32_t kInfinite = 32;  ///< it is all around the scene
-inline constexpr uint32_t kFiltered = 64;  ///< filters may stand before it
+/// A light with a transform, as opposed to the light of a mesh.
+inline constexpr uint32_t kPlaced = 1;
+inline constexpr uint32_t kSized = 2;      ///< `normalize` has an effect
+inline constexpr uint32_t kShaped = 4;     ///< supports UsdLuxShapingAPI
+inline constexpr uint32_t kSeen = 8;       ///< Rays can hit its shape
+inline constexpr uint32_t kPictured = 16;  ///< supports a texture
+inline constexpr uint32_t kInfinite = 32;  ///< surrounds the scene at infinite distance
+inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
 }  // namespace light_trait
 
-/// Contract: lives as long as the program.
+/// Description of a light parameter. Contract: lives as long as the program.
 struct LightParameter {
   const char* name = "";   ///< keyword of add_light
-  const char* label = "";  ///< in a form
-  const char* help = "";   ///< a sentence, with the unit
-  const char* input = "";  ///< UsdLux's, without "inputs:"; "" where it has none of that meaning
+  const char* label = "";  ///< label in a form
+  const char* help = "";   ///< one sentence, with the unit
+  const char* input = "";  ///< UsdLux name without "inputs:"; "" if UsdLux has no equivalent
   LightGroup group = LightGroup::kEmission;
   LightValueKind kind = LightValueKind::kNumber;
   LightRefers refers = LightRefers::kNothing;
-  /// Of numbers and of each component of colours; all are finite.
+  /// Bounds of a number or of each component of a colour; all values are finite.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  double usual = 1;  ///< upper end of a slider, where there is no `most`
+  double usual = 1;  ///< upper end of a slider if there is no `most`
   std::vector<const char*> choices;
-  uint32_t trait = 0;      ///< lights of this trait have it, beside those of kinds that name it
-  bool is_common = false;  ///< all lights have it
-  bool is_own = false;     ///< one kind's, which no other light can be told
-  uint32_t kinds = 0;      ///< bit k: lights of LightKind k have it
+  /// Lights with this trait have the parameter, in addition to the kinds that name it.
+  uint32_t trait = 0;
+  bool is_common = false;  ///< All lights have it
+  bool is_own = false;     ///< specific to one kind of light
+  uint32_t kinds = 0;      ///< Bit k: lights of LightKind k have it
 
   LightValue (*read)(const Light&) = nullptr;
   void (*write)(Light&, const LightValue&) = nullptr;
 
   bool is_of(LightKind light) const { return (kinds >> static_cast<uint32_t>(light) & 1) != 0; }
-  /// Whether a scene that is built can be told another value.
+  /// Returns whether the value can be edited in a scene that is built.
   bool can_change() const {
     return kind == LightValueKind::kNumber || kind == LightValueKind::kColour ||
            kind == LightValueKind::kFlag;
@@ -69,13 +72,14 @@ struct LightParameter {
   LightValue standard() const { return read(Light{}); }
 };
 
-/// All parameters but kind, name and to_world, in the order that fingerprints take them in; those
-/// that one kind has to itself come last.
+/// Returns all parameters except kind, name and to_world, in the order in which fingerprints hash
+/// them. Those specific to one kind come last.
 std::span<const LightParameter> light_table();
-/// Null where there is none.
+/// Returns the row of a parameter, or null for an unknown name.
 const LightParameter* find_light_parameter(std::string_view name);
 
-/// A row for a kind's LightKindInfo::own: number `kIndex` of its own, of kMaxOwnParameters.
+/// Returns value `kIndex` of the parameters specific to a kind, at most kMaxOwnParameters, for
+/// LightKindInfo::own.
 template <size_t kIndex>
 float own_value(const Light& light, float standard) {
   static_assert(kIndex < kMaxOwnParameters);
@@ -100,21 +104,22 @@ LightParameter own_parameter(const char* name, const char* label, const char* in
   return p;
 }
 
-/// "texture"; "" of kNothing.
+/// Returns the name of a type of object, such as "texture"; "" for kNothing.
 const char* light_refers_name(LightRefers refers);
 const char* light_kind_name(LightKind kind);
-/// Of a light with a place of its own; throws Error for other names.
+/// Returns the kind of that name, which must have a transform (not a mesh light). Throws Error for
+/// other names.
 LightKind light_kind(std::string_view name);
 
-/// How many things there are that lights refer to.
+/// Numbers of objects to which lights can refer.
 struct LightReferences {
   size_t textures = 0, profiles = 0, sets = 0, filters = 0;
 };
 
-/// Throws Error with one line that names the light where a value is not finite or out of range,
-/// where it refers to what was never added, or where `light` has no place of its own.
+/// Throws Error with one line that names the light if a value is not finite or out of range, if an
+/// id refers to an object that was never added, or if the kind has no transform.
 void check_light(const Light& light, const LightReferences& there);
-/// Likewise of a light of meshes.
+/// Applies the same checks to a mesh light.
 void check_mesh_light(const Light& light, const LightReferences& there);
 
 }  // namespace wavecomb
