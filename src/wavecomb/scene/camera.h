@@ -13,7 +13,7 @@ namespace wavecomb {
 enum class Projection : uint32_t {
   kPerspective,
   kOrthographic,
-  kLatlong,  ///< Equirectangular, all directions: longitude to the right, latitude up
+  kLatlong,  ///< equirectangular, all directions: longitude to the right, latitude up
 };
 
 /// Policy for windows whose aspect ratio differs from the image's: UsdRender's

@@ -19,7 +19,7 @@ struct PlacedMeshLight {
   const Light* light;
   Affine to_world;  ///< transform of the mesh's group
   double area;      ///< total one-sided area of the triangles in world space
-  bool is_sampled;  ///< False if only paths that hit the mesh sample its emission
+  bool is_sampled;  ///< false if only paths that hit the mesh sample its emission
 };
 
 /// A triangle of an emissive mesh, in world space.
@@ -28,7 +28,7 @@ struct EmissiveTriangle {
   float uv0[2] = {0, 0}, uv1[2] = {1, 0}, uv2[2] = {0, 1};
   /// Material whose emission or opacity varies; kNoLight if both are constant.
   uint32_t material = kNoLight;
-  uint32_t instance = 0, mesh = 0, prim = 0;  ///< Identifies the triangle
+  uint32_t instance = 0, mesh = 0, prim = 0;  ///< identifies the triangle
   /// Emitted radiance on both sides, W / (m^2 sr). Kernels ignore it if `material` is set.
   float radiance[3] = {0, 0, 0};
   uint32_t mesh_light = kNoLight;  ///< index of its PlacedMeshLight, or kNoLight

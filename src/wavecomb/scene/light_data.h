@@ -36,7 +36,7 @@ inline constexpr uint32_t kNoSet = 0xffffffffu;
 
 /// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the light is its -z.
 struct Shaping {
-  float focus = 0;  ///< Exponent of the cosine to the axis; 0 or less: no focus
+  float focus = 0;  ///< exponent of the cosine to the axis; 0 or less: no focus
   Vec3<float> focus_tint{0, 0, 0};
   float cone_angle = 180;      ///< degrees from the axis; 180 or more: no cone
   float cone_softness = 0;     ///< fraction of the cone over which emission falls to 0
@@ -75,7 +75,7 @@ struct LightFilter {
   /// far_start to 0 at far_end. A ramp whose end is not beyond its start is off.
   float near_start = 0, near_end = 0, far_start = 0, far_end = 0;
   float density = 1;  ///< strength of the filter: 0 leaves light unchanged, 1 applies it fully
-  uint32_t next = kNoFilter;  ///< Next filter of the chain, which was added before this one
+  uint32_t next = kNoFilter;  ///< next filter of the chain, which was added before this one
 
   bool fades() const { return near_end > near_start || far_end > far_start; }
 };
@@ -107,7 +107,7 @@ enum class MaterialSync : uint32_t {
 struct Light {
   std::string name;
   LightKind kind{};  ///< a rect by default
-  Affine to_world;   ///< Transform at mid-shutter
+  Affine to_world;   ///< transform at mid-shutter
   /// Transforms at equally spaced shutter times, two or more; empty if the light does not move. The
   /// light moves as a rigid body with the scale of `to_world`.
   std::vector<Affine> motion;
@@ -212,7 +212,7 @@ struct alignas(64) ShapingRecord {
   float to_light_x[3], to_light_y[3], to_light_z[3];
   float focus;  ///< 0: none
   float tint[3];
-  float cone, cone_start;  ///< Radians: where emission ends, and where it begins to fall off
+  float cone, cone_start;  ///< radians: where emission ends, and where it begins to fall off
   float ies_scale;
   float angle_scale;
   uint32_t ies;  ///< index into LightView::ies, or kNoIes
@@ -385,7 +385,7 @@ struct LightView {
   const float* pick_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< select lights by `tree` instead of `pick`
-  uint32_t count = 0;    ///< Number of records and triangles
+  uint32_t count = 0;    ///< number of records and triangles
   uint32_t first_triangle = 0;
   uint32_t infinite_count = 0;
   const Distribution2D* distributions = nullptr;
@@ -402,7 +402,7 @@ struct LightView {
   const ShadowLookRecord* shadows = nullptr;  ///< null if all shadows are plain
   /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  bool has_effects = false;      ///< Some record is sampled_only or has multipliers
+  bool has_effects = false;      ///< some record is sampled_only or has multipliers
   bool has_multipliers = false;  ///< some record's diffuse or specular is not 1
   LinkView links;
   /// Textures, and the materials of triangles whose emission or opacity varies.

@@ -34,7 +34,7 @@ namespace light_trait {
 inline constexpr uint32_t kPlaced = 1;
 inline constexpr uint32_t kSized = 2;      ///< `normalize` has an effect
 inline constexpr uint32_t kShaped = 4;     ///< supports UsdLuxShapingAPI
-inline constexpr uint32_t kSeen = 8;       ///< Rays can hit its shape
+inline constexpr uint32_t kSeen = 8;       ///< rays can hit its shape
 inline constexpr uint32_t kPictured = 16;  ///< supports a texture
 inline constexpr uint32_t kInfinite = 32;  ///< surrounds the scene at infinite distance
 inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
@@ -56,9 +56,9 @@ struct LightParameter {
   std::vector<const char*> choices;
   /// Lights with this trait have the parameter, in addition to the kinds that name it.
   uint32_t trait = 0;
-  bool is_common = false;  ///< All lights have it
+  bool is_common = false;  ///< all lights have it
   bool is_own = false;     ///< specific to one kind of light
-  uint32_t kinds = 0;      ///< Bit k: lights of LightKind k have it
+  uint32_t kinds = 0;      ///< bit k: lights of LightKind k have it
 
   LightValue (*read)(const Light&) = nullptr;
   void (*write)(Light&, const LightValue&) = nullptr;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Makes the tree by which a light is chosen for the point that it is to shine on.
+/// Builds the light tree, which selects a light for a given shading point.
 #pragma once
 
 #include <cstdint>
@@ -13,36 +13,38 @@ namespace wavecomb {
 
 struct LightSet;
 
-/// A tree over the finite lights that shine, and the share that infinite lights have beside it.
+/// Light tree over the finite lights that emit, and the selection probabilities of infinite lights.
 struct LightTree {
-  std::vector<LightTreeNode> nodes;  ///< depth first; one less than there are lights in the tree
-  std::vector<uint32_t> trails;      ///< LightTreeView::trails, of all lights
+  std::vector<LightTreeNode> nodes;  ///< depth first; one fewer than lights in the tree
+  std::vector<uint32_t> trails;      ///< LightTreeView::trails for all lights
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
-  uint32_t root = kNoLight;    ///< node 0, or the only light; kNoLight: none shines
+  uint32_t root = kNoLight;  ///< node 0, or the only light; kNoLight if no light of the tree emits
   float effective_lights = 0;  ///< LightTreeView::effective_lights
-  uint32_t numbers = 0;        ///< of the 2^24 that choose a light of the tree
+  uint32_t numbers = 0;        ///< how many of the 2^24 random numbers select a light of the tree
 
-  /// Contract: points into this tree.
+  /// Returns the device view. Contract: it points into this tree.
   LightTreeView view() const;
 };
 
-/// What is known of the tree of `set` before there is one: the share that infinite lights have
-/// beside it, and effective_lights. It has no nodes and no trails.
+/// Computes everything of the tree of `set` that does not need its nodes: the selection
+/// probabilities of infinite lights, and `effective_lights`. The result has no nodes and no trails.
 LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
 
-/// Whether kAuto chooses by a tree of so many effective lights.
+/// Returns whether LightSelection::kAuto uses a tree for this number of effective lights.
 bool pays_as_tree(float effective_lights);
 
-/// Builds the tree over the finite lights of `set` whose `powers` (of all lights, W) are above 0:
-/// A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
-/// Splitting", 2018, section 4: binned, by bound, orientation and power ("SAOH"), down to single
-/// lights. In parallel, and the same for any number of threads. Infinite lights are chosen by power
-/// as in build_pick_table, one number in a hundred by heads.
+/// Builds the tree over the finite lights of `set` with `powers` (of all lights, W) above 0: binned
+/// splits that minimize the cost by bounds, orientation and power ("SAOH"), down to single lights,
+/// after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
+/// Splitting", 2018, section 4. Runs in parallel; the result does not depend on the number of
+/// threads. Infinite lights are selected by power as in build_pick_table, with one random number in
+/// a hundred distributed evenly among all lights.
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
 
-/// Whether lights are chosen by tree. A scene without a finite light has none. kAuto: where the
-/// finite lights are many, and of like powers: few strong ones are told from the others by power.
+/// Returns whether lights are selected by tree. A scene without finite lights has no tree. kAuto
+/// uses the tree for many finite lights of similar power; selection by power suffices if a few
+/// strong lights dominate.
 bool chooses_by_tree(LightSelection selection, const LightView& lights);
 
 }  // namespace wavecomb

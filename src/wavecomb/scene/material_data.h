@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Materials as data: a program with parameters and textures.
+/// Material descriptions: a shading program with parameters and textures.
 #pragma once
 
 #include <array>
@@ -16,17 +16,19 @@
 
 namespace wavecomb {
 
-/// Parameters that a texture can drive. Each has a constant, used where no texture is connected.
+/// Material parameters that a texture can drive. Each has a constant that is used without a
+/// texture.
 enum class Input : uint8_t {
-  kBaseColor,      ///< rgb: albedo; metal: reflectance at normal incidence (F0); dielectric: tint
-  kSpecularColor,  ///< rgb: metal: tint at 82 degrees (F82); principled, specular workflow: F0
-  kEmission,       ///< rgb: radiance
-  kRoughness,      ///< perceptual; alpha = roughness^2
+  kBaseColor,  ///< RGB; albedo; reflectance at normal incidence (F0) of metal; tint of dielectrics
+  /// RGB; tint at 82 degrees (F82) of metal; F0 of principled with specular workflow.
+  kSpecularColor,
+  kEmission,   ///< RGB radiance
+  kRoughness,  ///< perceptual; alpha = roughness^2
   kMetallic,
   kClearcoat,
   kClearcoatRoughness,
   kOpacity,
-  kNormal,  ///< rgb: tangent-space normal, already scaled and biased to [-1, 1]
+  kNormal,  ///< tangent-space normal, already scaled and biased to [-1, 1]
 };
 inline constexpr uint32_t kInputCount = 9;
 inline constexpr const char* kInputNames[kInputCount] = {
@@ -36,17 +38,17 @@ inline constexpr uint32_t input_bit(Input s) {
   return 1u << static_cast<uint32_t>(s);
 }
 
-/// How an input reads a texture: value = texel * scale + bias at uv' = transform(uv).
+/// A texture connected to an input: value = texel * scale + bias at uv' = transform(uv).
 struct TextureUse {
   uint32_t texture = kNoTexture;
-  /// 0..3: that channel for all of r, g, b; 4: rgb.
+  /// 0 to 3 reads that channel for r, g and b; 4 reads RGB.
   uint32_t channel = 4;
   std::array<float, 4> scale{1, 1, 1, 1}, bias{0, 0, 0, 0};
   /// u' = m[0] u + m[1] v + m[2]; v' = m[3] u + m[4] v + m[5].
   std::array<float, 6> uv{1, 0, 0, 0, 1, 0};
 };
 
-/// One material. Defaults are those of UsdPreviewSurface.
+/// A material. The defaults are those of UsdPreviewSurface.
 struct Material {
   std::string name;
   ProgramId program = ProgramId::kPrincipled;
@@ -59,38 +61,40 @@ struct Material {
   float clearcoat_roughness = 0.01f;
   float opacity = 1;
   float ior = 1.5f;
-  float opacity_threshold = 0;  ///< > 0: opacity below it is 0, else 1
-  /// Conductor by measured index (metal only): used where any k > 0, in place of F0 and F82.
+  float opacity_threshold = 0;  ///< > 0: opacity below it counts as 0, other opacity as 1
+  /// Measured complex index of refraction of a conductor (metal only), used instead of F0 and F82
+  /// if any component of k is > 0.
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
-  bool specular_workflow = false;  ///< principled: F0 from specular_color rather than metallic
-  bool presence = false;  ///< principled: opacity is presence (cut-out) rather than transparency
+  bool specular_workflow = false;  ///< principled: F0 comes from specular_color instead of metallic
+  bool presence = false;  ///< principled: opacity is presence (cut-out) instead of transparency
   std::array<TextureUse, kInputCount> textures;
-  OpenPbr openpbr;  ///< read by the program of that name alone
-  /// Parameters that its program alone has (ProgramInfo::own), where they are given.
+  OpenPbr openpbr;  ///< used only by the program openpbr
+  /// Values of the parameters specific to the program (ProgramInfo::own), if given.
   std::array<std::optional<float>, kMaxProgramParameters> own;
-  /// What computes parameters at hits, in place of constants and textures: ids of
-  /// SceneBuilder::add_graph or kNoGraph. The parts that drive opacity and emission alone stand
-  /// beside the whole, for rays and lights that ask for nothing else.
+  /// Value graphs that compute parameters at hits, instead of constants and textures: ids of
+  /// SceneBuilder::add_graph, or kNoGraph. The graphs for opacity and emission repeat the relevant
+  /// parts of `graph`, so that shadow rays and light samples evaluate nothing else.
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
-  /// Number `i` of the parameters that its program alone has.
+  /// Returns parameter `i` of those specific to the program.
   float own_value(size_t i) const { return own[i].value_or(info_of(program).own[i].standard); }
   bool has_texture(Input s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
-  /// Whether it can shine: its program reads the emission input and finds something there.
+  /// Returns whether the material can emit: its program reads the emission input, which is not
+  /// zero.
   bool emits() const {
     return can_emit(program) && (emission.x > 0 || emission.y > 0 || emission.z > 0 ||
                                  has_texture(Input::kEmission) || emission_graph != kNoGraph);
   }
-  /// Whether rays must ask how much of the surface is there.
+  /// Returns whether ray traversal must evaluate the presence of the surface.
   bool needs_presence() const {
     return (presence || opacity_threshold > 0) &&
            (opacity < 1 || opacity < opacity_threshold || opacity_varies());
   }
-  /// Whether opacity is not the same all over what wears the material.
+  /// Returns whether opacity varies over surfaces with this material.
   bool opacity_varies() const { return has_texture(Input::kOpacity) || opacity_graph != kNoGraph; }
 };
 
-/// A material as lanes read it: 32 floats side by side, so that one record is two cache lines.
+/// Packed material: 32 floats in a row, so that a record fills two cache lines.
 struct alignas(64) MaterialRecord {
   float base_color[3], specular_color[3], emission[3];
   float roughness, metallic, clearcoat, clearcoat_roughness, opacity;
@@ -100,14 +104,14 @@ struct alignas(64) MaterialRecord {
   uint32_t textured_inputs;  ///< bit s: input s reads a texture
   uint32_t flags;            ///< MaterialFlags
   uint32_t program;
-  uint32_t openpbr;  ///< its OpenPbrRecord
+  uint32_t openpbr;  ///< index of its OpenPbrRecord
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 };
 static_assert(sizeof(MaterialRecord) == 128);
-/// A bit of MaterialRecord::textured_inputs beside those of inputs: the program needs a frame along
-/// the texture, though it may read none.
+/// Bit of MaterialRecord::textured_inputs beyond those of the inputs: the program needs a tangent
+/// frame along the texture's u, even if it reads no texture.
 inline constexpr uint32_t kNeedsTangent = 1u << 31;
-/// Likewise: a graph drives parameters; one drives the normal.
+/// Bits of MaterialRecord::textured_inputs: a graph drives parameters; a graph drives the normal.
 inline constexpr uint32_t kReadsGraph = 1u << 30, kGraphNormal = 1u << 29;
 enum MaterialFlags : uint32_t {
   kSpecularWorkflow = 1,
@@ -116,28 +120,28 @@ enum MaterialFlags : uint32_t {
   kEmits = 8,
   kHasGraph = 16,
 };
-/// A TextureUse as lanes read it: 16 words.
+/// Packed TextureUse: 16 32-bit words.
 struct alignas(64) TextureUseRecord {
   uint32_t texture, channel;
   float scale[4], bias[4], uv[6];
 };
 static_assert(sizeof(TextureUseRecord) == 64);
 
-/// What programs have to themselves, as lanes read it.
+/// Packed parameters specific to a program.
 struct alignas(16) ProgramParameterRecord {
   float value[kMaxProgramParameters];
 };
 static_assert(sizeof(ProgramParameterRecord) == 4 * kMaxProgramParameters);
 
-/// What kernels need of all materials. Uses are at `material * kInputCount + input`.
+/// Device view of all materials. Texture uses are indexed by `material * kInputCount + input`.
 struct MaterialView {
   const MaterialRecord* materials = nullptr;
   const TextureUseRecord* uses = nullptr;
   const TextureView* textures = nullptr;
   const OpenPbrRecord* openpbr = nullptr;
-  /// By material; null where no material runs a program that has parameters to itself.
+  /// By material; null if no material's program has specific parameters.
   const ProgramParameterRecord* own = nullptr;
-  const float* energy = nullptr;  ///< EnergyTables; set where a material needs them
+  const float* energy = nullptr;  ///< EnergyTables; set if a material needs them
   GraphView graphs{};
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Variants of programs: the same code without the parts that a material cannot show.
+/// Program variants: the same shading code compiled for a subset of features.
 #pragma once
 
 #include <cstdint>
@@ -10,23 +10,23 @@
 
 namespace wavecomb {
 
-/// What materials of programs principled and openpbr may do without.
+/// Features of the programs principled and openpbr that a variant can omit.
 enum Part : uint32_t {
   kVaries = 1,     ///< reads textures or a value graph
   kGlows = 2,      ///< emission
   kMetals = 4,     ///< metallic above 0, or F0 by specular_color
   kCoats = 8,      ///< a clearcoat
-  kPasses = 16,    ///< transmission, straight or refracted
-  kBacks = 32,     ///< openpbr: diffuse light through thin walls
-  kFuzzes = 64,    ///< openpbr: fuzz
+  kPasses = 16,    ///< clearcoat
+  kBacks = 32,     ///< straight or refracted transmission
+  kFuzzes = 64,    ///< openpbr: diffuse transmission of thin walls, and subsurface random walks
   kFilms = 128,    ///< openpbr: a thin film
   kBrushes = 256,  ///< openpbr: anisotropy and its rotation
 };
 inline constexpr uint32_t kAllParts = 511;
 
-/// The variants that are not the whole of a program, each the cheapest that has its parts:
-/// X(name, program, parts), in the order of what they cost. CMake reads this list, too: there is a
-/// compile unit for each.
+/// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
+/// variant that has all of its parts. CMake reads this list as well and makes a compile unit for
+/// each row.
 #define WAVECOMB_VARIANTS(X)                       \
   X(gloss, principled, 0)                          \
   X(tinted_gloss, principled, kMetals)             \
@@ -40,7 +40,7 @@ struct Variant {
   const char* program;
   uint32_t parts;
 };
-/// Each program with all of its parts comes first, in the order of ProgramId.
+/// All variants: first the complete programs, in the order of ProgramId.
 inline constexpr Variant kVariants[] = {
 #define WAVECOMB_PROGRAM(name, ...) {#name, #name, kAllParts},
     WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
@@ -51,24 +51,25 @@ inline constexpr Variant kVariants[] = {
 };
 inline constexpr uint32_t kVariantCount = sizeof(kVariants) / sizeof(Variant);
 
-/// The id of the program called `name`; no constant where there is none.
+/// Returns the id of the program called `name`. An unknown name is not a constant expression, so it
+/// fails to compile.
 constexpr ProgramId program_id(std::string_view name) {
   uint32_t i = 0;
   while (name != kProgramNames[i]) ++i;
   return static_cast<ProgramId>(i);
 }
-/// The program that a variant is of.
+/// Returns the program of a variant.
 constexpr ProgramId program_of(uint32_t variant) {
   return program_id(kVariants[variant].program);
 }
 
-/// Parts that a settled material (settled_material.h) may show: whatever its textures give, and its
-/// graphs within their ranges (graph_ranges.h), which may read `textures`. `may_walk`: light walks
-/// below the surfaces that ask for it.
+/// Returns the parts that a settled material (settled_material.h) may use, whatever values its
+/// textures have and whatever its graphs return within their ranges (graph_ranges.h). `textures`
+/// are those that the graphs may read. `may_walk` is set if the scene has subsurface random walks.
 uint32_t parts_of(const Material& material, const GraphSet& graphs,
                   std::span<const TexturePtr> textures, bool may_walk = false);
 
-/// The cheapest variant of a program that has all of these parts.
+/// Returns the least expensive variant of a program that has all of these parts.
 uint32_t least_variant(ProgramId program, uint32_t parts);
 
 }  // namespace wavecomb

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a material can be told beside its textures, its graphs and the inputs of OpenPBR
-/// (scene/openpbr_data.h), as a table: a row for each such member of Material, and for what
-/// programs have to themselves (scene/programs.h). Checks, the fingerprint, keywords and edits in
-/// Python, and calls of the sandbox follow from it. A new parameter of several programs is a member
-/// of Material and of MaterialRecord, a row here, a line where records are made
-/// (scene_materials.cpp), and its use; of one program alone, an entry of its row in
+/// Table of material parameters other than textures, graphs and the inputs of OpenPBR
+/// (scene/openpbr_data.h): one row for each such member of Material, and for the parameters
+/// specific to one program (scene/programs.h). Range checks, the scene fingerprint, Python keywords
+/// and edits, and sandbox calls are derived from it. To add a parameter of several programs, add a
+/// member to Material and to MaterialRecord, a row here, a line where records are made
+/// (scene_materials.cpp), and its use; for one program only, an entry to its row in
 /// scene/programs.h and its use.
 #pragma once
 
@@ -16,7 +16,7 @@
 
 namespace wavecomb {
 
-/// A parameter that one program has to itself: number `index` of ProgramInfo::own.
+/// A parameter specific to one program: number `index` of ProgramInfo::own.
 struct OwnParameter {
   ProgramId program;
   size_t index;
@@ -25,22 +25,22 @@ struct OwnParameter {
   const ProgramParameter& info() const { return info_of(program).own[index]; }
 };
 
-/// Contract: lives as long as the program.
+/// Description of a material parameter. Contract: lives as long as the program.
 struct MaterialParameter {
   const char* name;  ///< keyword of add_material
   std::variant<float Material::*, Vec3<float> Material::*, bool Material::*, OwnParameter> place;
 
-  /// Null of what materials of any program can be told.
+  /// Null if materials of any program have the parameter.
   const OwnParameter* own() const { return std::get_if<OwnParameter>(&place); }
 };
 
-/// All of them, in the order that fingerprints take them in: another member changes the fingerprint
-/// of every scene, and so checkpoints of before start anew. What programs have to themselves comes
-/// last, and fingerprints take it in where it is not the default.
+/// Returns all parameters in the order in which fingerprints hash them. A new member of Material
+/// changes the fingerprint of every scene, so older checkpoints cannot be continued. Parameters
+/// specific to a program come last, and are hashed only if they differ from the default.
 std::span<const MaterialParameter> material_table();
 
-/// Runs visit(row, value) for each parameter of a material (const or not) that is a `Value`: float,
-/// Vec3<float>, bool. What other programs have to themselves is left out.
+/// Calls visit(row, value) for each parameter of a material (const or not) of type `Value`: float,
+/// Vec3<float> or bool. Parameters specific to other programs are skipped.
 template <typename Value, typename Object, typename Visit>
 void for_each_parameter(Object& material, const Visit& visit) {
   for (const MaterialParameter& p : material_table()) {

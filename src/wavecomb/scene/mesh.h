@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Triangle meshes, curves, points and Gaussian splats as data.
+/// Triangle meshes, curves, points and Gaussian splats.
 #pragma once
 
 #include <cstdint>
@@ -12,25 +12,25 @@
 
 namespace wavecomb {
 
-/// Material id that means "what the instance says" (see Instance::material).
+/// Material id for meshes that use the material of their instance (see Instance::material).
 inline constexpr uint32_t kInheritMaterial = 0xffffffffu;
 
 enum class Attribute : uint8_t {
   kNone,
   kVertex,  ///< one value per vertex, addressed by the triangle's indices
-  kCorner,  ///< one value per corner, 3 per triangle in order; 2 per segment of a curve, its ends;
-            ///< 1 per point
+  /// One value per corner: 3 per triangle in order; 2 per curve segment, for its ends; 1 per point.
+  kCorner,
 };
 
-/// Values that vary over a mesh and that materials may read by their name's id.
+/// Values that vary over a mesh (a primvar), which materials read by the id of the name.
 struct MeshAttribute {
-  uint32_t id = kNoAttribute;  ///< SceneBuilder::attribute
+  uint32_t id = kNoAttribute;  ///< id of SceneBuilder::attribute
   AttributeRate rate = AttributeRate::kConstant;
-  uint32_t width = 1;             ///< components, 1 to 4
+  uint32_t width = 1;             ///< `width` floats for each value, finite
   std::span<const float> values;  ///< `width` for each value, finite
 };
 
-/// What a mesh is made of.
+/// Type of the primitives of a mesh.
 enum class Primitive : uint8_t {
   kTriangle,
   kLinearTube,
@@ -41,48 +41,54 @@ enum class Primitive : uint8_t {
   kSplat
 };
 
-/// A Gaussian splat, but for its middle and colour: curve/splat.h makes it.
+/// Shape and opacity of a Gaussian splat, made by curve/splat.h; centre and colour are stored
+/// separately.
 struct alignas(64) SplatRow {
   float whiten[9];  ///< rows of the map from offsets to standard deviations
-  float opacity;    ///< of a ray through the middle
-  float cut;        ///< square of the deviations within which it is met
-  float half[3];    ///< of the box around that, about the middle
+  float opacity;    ///< opacity along a ray through the centre
+  float cut;      ///< square of the cutoff in standard deviations, beyond which rays miss the splat
+  float half[3];  ///< half extents of the bounding box about the centre
   float unused[2] = {};
 };
 static_assert(sizeof(SplatRow) == 64);
 
-/// An indexed triangle mesh, or curves, or points (curve/segment.h), or splats (curve/splat.h),
-/// which a material of program emissive is worn by. Arrays belong to the caller
-/// and are not copied; `owner` keeps them alive for as long as a Scene uses them.
+/// An indexed triangle mesh, curves or points (curve/segment.h), or splats (curve/splat.h), which
+/// need a material of program emissive. The caller owns the arrays, which are not copied; `owner`
+/// keeps them alive for as long as a Scene uses them.
 struct Mesh {
   std::string name;
   Primitive primitive = Primitive::kTriangle;
-  std::span<const float> positions;  ///< 3 per vertex, Bezier control point or point; those of each
-                                     ///< step after another
-  std::span<const uint32_t> indices;  ///< 3 per triangle, counter-clockwise from outside; 1 per
-                                      ///< segment (kCurveFirstPoint); none for points
-  std::span<const float> radii;       ///< 1 per control point or point, or of the ball around a
-                                      ///< splat; none for triangles
-  std::span<const float> normals;     ///< 3 per vertex or corner, step by step; empty: flat. 3 per
-                                      ///< control point of ribbons, step by step
+  /// 3 floats per vertex, Bezier control point or point, step after step.
+  std::span<const float> positions;
+  /// 3 per triangle, counter-clockwise as seen from outside; 1 per curve segment
+  /// (kCurveFirstPoint); empty for points.
+  std::span<const uint32_t> indices;
+  /// 1 per control point or point, or the radius of the bounding sphere of each splat; empty for
+  /// triangles.
+  std::span<const float> radii;
+  /// 3 floats per vertex or corner, or per control point of ribbons, step after step; empty for
+  /// flat shading.
+  std::span<const float> normals;
   Attribute normals_at = Attribute::kNone;
-  std::span<const float> uvs;  ///< 2 per vertex or corner; empty: uv = barycentrics
+  std::span<const float> uvs;  ///< 2 floats per vertex or corner; empty: uv = barycentrics
   Attribute uvs_at = Attribute::kNone;
   std::span<const uint32_t> face_materials;  ///< one per primitive, or empty
-  uint32_t material = kInheritMaterial;      ///< where face_materials is empty
-  uint32_t light_group = 0;                  ///< of what it emits: SceneBuilder::light_group
+  uint32_t material = kInheritMaterial;      ///< used if face_materials is empty
+  uint32_t light_group = 0;                  ///< group of its emission: SceneBuilder::light_group
   uint32_t mesh_light = 0xffffffffu;         ///< SceneBuilder::add_mesh_light, or kNoLight
-  uint32_t asset_length = 0;  ///< so much of `name` names the asset it is part of; 0: none known
-  std::span<const SplatRow> splats;       ///< 1 per splat
-  std::span<const float> harmonics;       ///< 3 (harmonics_degree + 1)^2 per splat: its colour
-  uint32_t harmonics_degree = 0;          ///< 0 to 3
-  std::vector<MeshAttribute> attributes;  ///< those of a motion's first step, as uvs are
-  uint32_t steps = 1;  ///< of its shape, at equal distances over the shutter; 1: it keeps its shape
+  /// Length of the prefix of `name` that names the asset of the mesh; 0 if unknown.
+  uint32_t asset_length = 0;
+  std::span<const SplatRow> splats;  ///< 1 per splat
+  std::span<const float> harmonics;  ///< 3 (harmonics_degree + 1)^2 floats per splat: its colour
+  uint32_t harmonics_degree = 0;     ///< 0 to 3
+  std::vector<MeshAttribute> attributes;  ///< for the first step, as for uvs
+  /// Number of shapes at equally spaced shutter times; 1 if the mesh does not deform.
+  uint32_t steps = 1;
   std::shared_ptr<const void> owner;
 
   bool is_curved() const { return primitive != Primitive::kTriangle; }
   bool is_strands() const { return is_curved() && !is_dots(); }
-  /// Whether each point is a primitive.
+  /// Returns whether each point is a primitive.
   bool is_dots() const { return primitive == Primitive::kSphere || primitive == Primitive::kSplat; }
   bool is_ribbon() const {
     return primitive == Primitive::kLinearRibbon || primitive == Primitive::kCubicRibbon;
@@ -90,10 +96,10 @@ struct Mesh {
   bool is_cubic() const {
     return primitive == Primitive::kCubicTube || primitive == Primitive::kCubicRibbon;
   }
-  /// Control points of a segment.
+  /// Returns the number of control points of a segment.
   size_t segment_points() const { return is_cubic() ? 4 : 2; }
   size_t triangle_count() const { return is_curved() ? 0 : indices.size() / 3; }
-  /// Triangles, segments of curves, points or splats.
+  /// Returns the number of triangles, curve segments, points or splats.
   size_t primitive_count() const {
     if (is_dots()) return vertex_count();
     return is_curved() ? indices.size() : indices.size() / 3;
@@ -102,8 +108,8 @@ struct Mesh {
   bool deforms() const { return steps > 1; }
 };
 
-/// A mesh as lanes read it: addresses and flags, 16 words. Those of splats have their rows for
-/// normals, and harmonics for uvs.
+/// Packed mesh: addresses and flags, 16 32-bit words. For splats `normals` points to SplatRow and
+/// `uvs` to the harmonics.
 struct alignas(64) MeshRecord {
   uint64_t positions, indices, normals, uvs, face_materials;
   uint32_t material;
@@ -126,7 +132,7 @@ enum MeshFlags : uint32_t {
   kIsDots = kIsSphere | kIsSplat,
   kIsCurved = kIsTube | kIsRibbon | kIsDots,
 };
-/// In MeshRecord::flags, 2 bits: Mesh::harmonics_degree.
+/// Shift of Mesh::harmonics_degree in MeshRecord::flags, 2 bits.
 inline constexpr uint32_t kHarmonicsShift = 10;
 
 }  // namespace wavecomb

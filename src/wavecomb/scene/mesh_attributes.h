@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Attributes of meshes: checked, and as lanes read them.
+/// Checks and packed form of mesh attributes.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace wavecomb {
 
-/// Throws Error where attributes of a mesh do not fit it. `where` names the mesh, `names` are those
-/// of the attributes that there are.
+/// Throws Error if attributes of a mesh do not match its sizes or are not finite. `where` names the
+/// mesh in the message; `names` are the names of all attributes, by id.
 void check_attributes(const Mesh& mesh, const std::string& where,
                       const std::vector<std::string>& names);
 
-/// Fills attribute_records and mesh_attributes from the meshes; leaves them empty where no mesh has
-/// any.
+/// Fills `attribute_records` and `mesh_attributes` from the meshes; leaves both empty if no mesh
+/// has attributes.
 void make_attribute_records(SceneGeometry& geometry);
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Whether the arrays of a mesh hold together.
+/// Consistency checks for the arrays of a mesh.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// Throws Error that names the mesh. `attribute_names`: by id.
+/// Throws Error naming the mesh if its arrays are inconsistent. `attribute_names`: by id.
 void check_mesh(const Mesh& mesh, const std::vector<std::string>& attribute_names);
 
 }  // namespace wavecomb

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How things move while the shutter is open: values at equal steps of time, straight lines
-/// between.
+/// Motion while the shutter is open: values at equally spaced times, interpolated linearly.
 #pragma once
 
 #include <cmath>
@@ -13,24 +12,24 @@
 
 namespace wavecomb {
 
-/// Steps that anything may have: Embree's limit.
+/// Maximum number of motion steps, as in Embree.
 inline constexpr uint32_t kMostSteps = 129;
 
-/// Distances of the values of one step from those of the one before, of a mesh that changes its
-/// shape. MeshRecord::motion is an index into a list of these, whose first is of meshes that do
-/// not.
+/// Motion of a mesh that deforms: distances between the arrays of consecutive steps.
+/// MeshRecord::motion is an index into a list of these, whose first entry is for meshes that do not
+/// deform.
 struct MeshMotion {
   uint64_t positions = 0, normals = 0;  ///< bytes
-  uint32_t segments = 0;                ///< steps less one; 0: still
+  uint32_t segments = 0;                ///< number of steps less one; 0 if the mesh does not deform
   uint32_t pad = 0;
 };
 static_assert(sizeof(MeshMotion) == 24);
 
-/// Where a time in [0, 1] lies among equal steps, of which there is one more than `segments`.
+/// Position of a time in [0, 1] among equally spaced steps, one more than `segments`.
 template <typename F>
 struct BetweenSteps {
-  UInt<F> before;  ///< step, counted from the first
-  F part;          ///< share of the way to the next
+  UInt<F> before;  ///< index of the step at or before the time
+  F part;          ///< interpolation weight of the following step
 
   BetweenSteps(const F& time, const UInt<F>& segments) {
     const F at = time * F(Int<F>(segments));
@@ -40,13 +39,13 @@ struct BetweenSteps {
   }
 };
 
-/// Steps [first, first + segments] of a list of steps; 0 segments: it stands still.
+/// Range of a list of steps: [first, first + segments]. 0 segments means no motion.
 struct StepRange {
   uint32_t first = 0, segments = 0;
   bool moves() const { return segments > 0; }
 };
 
-/// A transform at one step, as lanes read it.
+/// Packed transform of one step.
 struct alignas(64) MatrixStep {
   float to_world[12] = {};  ///< rows of A, each followed by its translation
   float pad[4] = {};
@@ -62,14 +61,15 @@ struct alignas(64) MatrixStep {
 };
 static_assert(sizeof(MatrixStep) == 64);
 
-/// What kernels need of a scene's motion.
+/// Device view of a scene's motion.
 struct MotionView {
   const MeshMotion* meshes = nullptr;
   const StepRange* instances = nullptr;  ///< by instance; null where none moves
   const MatrixStep* steps = nullptr;
 };
 
-/// The transform a share `part` of the way from a to b, component by component, as Embree does.
+/// Interpolates between the transforms a and b with weight `part` of b, for each matrix entry, as
+/// Embree does.
 inline Affine between(const Affine& a, const Affine& b, float part) {
   const auto mix = [&](const Vec3<float>& p, const Vec3<float>& q) {
     return p * (1.f - part) + q * part;
@@ -78,7 +78,7 @@ inline Affine between(const Affine& a, const Affine& b, float part) {
           mix(a.t, b.t)};
 }
 
-/// What `steps` say at step k of n.
+/// Resamples `steps` at step k of n.
 inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
   const uint64_t place = uint64_t{k} * (steps.size() - 1);
   const size_t before = place / n;
@@ -87,7 +87,8 @@ inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
                  static_cast<float>(place % n) / static_cast<float>(n));
 }
 
-/// Segments for the product of two motions: enough for the steps of both, within reason.
+/// Returns the number of segments for the product of two motions: enough for the steps of both, up
+/// to a limit.
 uint32_t common_segments(uint32_t a, uint32_t b);
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Names of everything that is placed in a scene, made when they are asked for.
+/// Names of all objects of a scene, made on demand.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,20 @@ namespace wavecomb {
 
 class Scene;
 
-/// Index of "no name" and of "no placement".
+/// Index for a missing name or placement.
 inline constexpr uint32_t kNoName = 0xffffffffu;
 
-/// The name that a group's placement was given, and how much of it names the asset that it is part
-/// of (0: none known).
+/// Name of an instance of a group, and the length of the prefix that names its asset (0 if
+/// unknown).
 struct PlacementName {
   std::string_view text;
   uint32_t asset_length = 0;
 };
 
-/// Many short texts in one block.
+/// Many short strings in one memory block.
 class NameTable {
  public:
-  /// Index of the new entry.
+  /// Adds an entry and returns its index.
   uint32_t add(std::string_view text, uint32_t asset_length);
   PlacementName operator[](uint32_t i) const {
     const Entry& e = entries_[i];
@@ -41,32 +41,31 @@ class NameTable {
   std::vector<Entry> entries_;
 };
 
-/// One step on the way from the world to an instance.
+/// One level of nesting between the world and an instance.
 struct Placement {
-  uint32_t parent = kNoName;  ///< placement that this one is in; kNoName: the world
-  uint32_t group = 0;         ///< what is placed
-  uint32_t name = kNoName;    ///< in Scene's name table
-  uint32_t number = kNoName;  ///< among those that share the name
+  uint32_t parent = kNoName;  ///< enclosing placement; kNoName for the world
+  uint32_t group = 0;         ///< the instanced group
+  uint32_t name = kNoName;    ///< index into the name table of the scene
+  uint32_t number = kNoName;  ///< distinguishes placements of the same name
 };
 
-/// What is known by a name: meshes, each placement of one apart, then lights, then volumes.
+/// Names of all objects of a scene: mesh instances, then lights, then volumes.
 ///
-/// An object's name is its prim path as seen through its instances: "/World/Tree_7/Leaves", and
-/// "/World/Forest[12]/Leaves" for a point instance. Its asset is the nearest model of kind
-/// component that holds it; without one the outermost instance, or the prim below the stage's root
-/// prim.
+/// The name of an object is its prim path as seen through its instances: "/World/Tree_7/Leaves", or
+/// "/World/Forest[12]/Leaves" for a point instance. Its asset is the nearest enclosing model of
+/// kind component; without one, the outermost instance, or the prim below the stage's root prim.
 class ObjectNames {
  public:
   explicit ObjectNames(const Scene& scene);
 
-  /// Objects are numbered instance by instance, mesh by mesh of the group, the world first; light
-  /// records follow, then volumes.
+  /// Returns the number of objects. Objects are numbered by instance and by mesh of the instanced
+  /// group, the world first; light records follow, then volumes.
   uint32_t count() const { return first_volume() + volume_count_; }
-  /// First object of each instance of SceneView::instances.
+  /// Returns the first object of each instance of SceneView::instances.
   const std::vector<uint32_t>& first_object() const { return first_object_; }
-  /// Object of light record 0.
+  /// Returns the object of light record 0.
   uint32_t first_light() const { return first_light_; }
-  /// Object of volume 0.
+  /// Returns the object of volume 0.
   uint32_t first_volume() const { return first_light_ + light_count_; }
 
   std::string object(uint32_t index) const;
@@ -78,7 +77,7 @@ class ObjectNames {
   };
   Found find(uint32_t index) const;
   std::string placement_name(uint32_t placement) const;
-  /// Root of the group that a placement is in.
+  /// Returns the root path of the group that contains a placement.
   std::string_view parent_root(const Placement& p) const;
 
   const Scene& scene_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where meshes, instances and, by their names, objects are.
+/// Bounds of meshes, instances and named objects.
 #pragma once
 
 #include <span>
@@ -9,16 +9,18 @@
 
 namespace wavecomb {
 
-/// Bounds of a mesh in its own space, with the radii of curves and points, over all its steps.
+/// Returns the bounds of a mesh in its local space, over all motion steps and with the radii of
+/// curves and points.
 Bounds mesh_bounds(const Mesh& mesh);
 
-/// Adds the corners of a box that is in an instance, over the time that the shutter is open.
+/// Extends `out` by the corners of a box in an instance, over the whole shutter interval.
 void add_placed(Bounds& out, const Bounds& box, const Instance& instance,
                 std::span<const MatrixStep> steps);
 
-/// World bounds, over the time that the shutter is open, of all meshes that are a prim or are in it
-/// (ObjectNames): of "/World/Forest" the object "/World/Forest[12]/Leaves", too. Empty where there
-/// are none. Looks at every object: for who asks once.
+/// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim
+/// (named as by ObjectNames); "/World/Forest" includes the object "/World/Forest[12]/Leaves". The
+/// bounds are empty if there are no such meshes. Visits every object of the scene, so call it
+/// rarely.
 Bounds object_bounds(const Scene& scene, std::string_view prim);
 
 }  // namespace wavecomb

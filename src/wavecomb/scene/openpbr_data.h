@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Inputs of the program "openpbr" beyond the inputs that all programs share: one table, from which
-/// descriptions, checks, records, parameters at hits, outputs of graphs and Python's names follow.
+/// Inputs of the program "openpbr" beyond the inputs that all programs share, in one table from
+/// which descriptions, checks, records, parameters at hits, graph outputs and Python names are
+/// derived.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +10,18 @@
 #include "wavecomb/core/fields.h"
 #include "wavecomb/core/vec3.h"
 
-/// X(kind, name, default, least, most), in the order of records and of graph outputs. Defaults are
-/// those of OpenPBR Surface 1.1, but for the weights of its inputs. A Derived colour is what
-/// kernels and graphs have, while callers give what it follows from.
+/// X(kind, name, default, least, most), in the order of records and of graph outputs. The defaults
+/// are those of OpenPBR Surface 1.1, except for the weights of its inputs. Kernels and graphs use a
+/// Derived colour; callers set the parameters from which it is computed.
 ///
 ///   specular_weight        scales the reflectance at normal incidence
-///   anisotropy, rotation   of specular roughness; of the grain, in turns from the tangent towards
-///                          the bitangent
-///   transmission_tint      of each crossing
-///   extinction             of what is inside, one over a unit of length
-///   subsurface_...         light that walks below the surface (scene/walk_data.h), where a radius
-///                          is given; else diffuse. Of thin walls (1 + anisotropy) / 2 goes through
+///   anisotropy, rotation   of specular roughness; rotation in turns from the tangent towards the
+///                          bitangent
+///   transmission_tint      factor of each crossing of the surface
+///   extinction             coefficient inside, per unit of length
+///   subsurface_...         subsurface scattering: a random walk if a radius is given
+///                          (scene/walk_data.h), else diffuse; thin walls transmit a fraction of
+///                          (1 + anisotropy) / 2
 ///   film_thickness         nanometres
 #define WAVECOMB_OPENPBR_INPUTS(X)           \
   X(Number, diffuse_roughness, 0, 0, 1)      \
@@ -53,7 +55,7 @@ constexpr std::tuple<T&...> tie_rest(int /*first*/, T&... rest) {
 
 }  // namespace detail
 
-/// A member for each input.
+/// One member for each input.
 template <typename F>
 struct OpenPbrInputs {
   using Number = F;
@@ -73,20 +75,20 @@ struct OpenPbrInputs {
 #undef WAVECOMB_NAME
 };
 
-/// As callers describe it.
+/// OpenPBR inputs as callers set them.
 struct OpenPbr : OpenPbrInputs<float> {
-  /// Where transmission_depth is above 0, transmission_color is what a path of that length inside
-  /// leaves; else it tints each crossing.
+  /// If transmission_depth is above 0, transmission_color is the transmittance of a path of that
+  /// length inside; otherwise it tints each crossing.
   Vec3<float> transmission_color{1, 1, 1};
   float transmission_depth = 0;
-  /// What is scattered inside, times 1 / transmission_depth; and its mean cosine
+  /// Scattering inside, as a coefficient times transmission_depth, and the mean cosine of its angle
   /// (scene/interior.h).
   Vec3<float> transmission_scatter{0, 0, 0};
   float transmission_scatter_anisotropy = 0;
-  /// Where solids that transmit overlap, the one of highest priority is there.
+  /// Where transmissive solids overlap, the medium of the one with the highest priority counts.
   float nested_priority = 0;
-  /// Mean free paths below the surface, by channel, units of length. 0: light leaves where it came
-  /// in.
+  /// Mean free paths below the surface for each channel, in units of length. 0 means that light
+  /// leaves at the point where it entered.
   Vec3<float> subsurface_radius{0, 0, 0};
   bool thin_walled = false;
 
@@ -97,7 +99,7 @@ struct OpenPbr : OpenPbrInputs<float> {
   }
 };
 
-/// As lanes read it: 32 words.
+/// Packed OpenPBR inputs: 32 32-bit words.
 struct alignas(64) OpenPbrRecord : OpenPbrInputs<float> {
   float thin_walled;  ///< 0 or 1
   float walks;        ///< WalkKind

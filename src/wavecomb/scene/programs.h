@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The programs: shading code, of which each material runs one. Ids, names, kernels, what a
-/// material of a program can be told, and the compile units follow from this list.
+/// Shading programs, of which each material uses one. Ids, names, kernels, the parameters of
+/// materials, and compile units are derived from this list.
 #pragma once
 
 #include <array>
@@ -9,26 +9,27 @@
 
 namespace wavecomb {
 
-/// Most parameters that one program can have to itself.
+/// Maximum number of parameters specific to one program.
 inline constexpr size_t kMaxProgramParameters = 8;
 
-/// A number that materials of one program alone can be told. Its name is unlike those of all
-/// others.
+/// A numeric parameter that only materials of one program have. Its name must be unique among all
+/// parameters.
 struct ProgramParameter {
   const char* name = nullptr;
   float standard = 0;
   float least = 0, most = 0;
 };
 
-/// A row for each program:
+/// One row for each program:
 ///
-///   name, class of its BSDF without "Bsdf", whether its materials may emit, model cost of a record
-///   in ns (for reproducible renders), then its own parameters, as {"name", default, least, most}
+///   name, class of its BSDF without "Bsdf", whether its materials may emit, modelled cost of a
+///   record in ns (for reproducible renders), then its specific parameters as {"name", default,
+///   least, most}
 ///
-/// Its code is in material/programs/NAME.h, which material/program_table.h includes for tests. Rows
-/// are X, and P where the class may be had with some of its parts alone (scene/material_parts.h).
-/// CMake reads this list, too: two spaces and a row on each line. A new one comes last, since
-/// fingerprints have the ids.
+/// The code is in material/programs/NAME.h, which material/program_table.h includes for tests. A
+/// row starts with P if the class has variants with some parts only (scene/material_parts.h), and
+/// with X otherwise. CMake also reads this list, which requires two spaces and one row on each
+/// line. Add new programs at the end, since fingerprints contain the ids.
 #define WAVECOMB_PROGRAMS(X, P)                                                             \
   X(diffuse, Diffuse, false, 60)                                                            \
   X(metal, Metal, false, 75)                                                                \
@@ -41,8 +42,8 @@ struct ProgramParameter {
     {"scale_trt", 2, 0, 10}, {"cuticle_tilt", 0, -90, 90}, {"tint_r", 1, 0, 1},             \
     {"tint_tt", 1, 0, 1}, {"tint_trt", 1, 0, 1})
 
-/// Likewise the programs of what lies between surfaces (integrate/media.h). No mesh can wear them,
-/// and each stands in the room of what it is for.
+/// Programs for collisions in media (integrate/media.h), in the same format. No mesh can use them,
+/// and their code is in the folder of the medium.
 #define WAVECOMB_MEDIUM_PROGRAMS(M) M(volume, Volume, false, 150)
 
 enum class ProgramId : uint8_t {
@@ -53,8 +54,8 @@ enum class ProgramId : uint8_t {
 
 struct ProgramInfo {
   const char* name;
-  bool can_emit;   ///< it reads the emission input
-  float model_ns;  ///< for each record
+  bool can_emit;   ///< reads the emission input
+  float model_ns;  ///< estimated cost of each record
   std::array<ProgramParameter, kMaxProgramParameters> own;
 
   constexpr size_t own_count() const {
@@ -63,7 +64,7 @@ struct ProgramInfo {
     return count;
   }
 };
-/// By ProgramId.
+/// All programs, indexed by ProgramId.
 inline constexpr ProgramInfo kPrograms[] = {
 #define WAVECOMB_PROGRAM(name, Class, emits, ns, ...) {#name, emits, ns, {{__VA_ARGS__}}},
     WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
@@ -78,13 +79,13 @@ inline constexpr uint32_t kProgramCount = sizeof(kPrograms) / sizeof(ProgramInfo
 #define WAVECOMB_PROGRAM(...) +1
 inline constexpr uint32_t kMediumProgramCount = 0 WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM);
 #undef WAVECOMB_PROGRAM
-/// Programs of surfaces, which come first.
+/// Number of surface programs, which come first.
 inline constexpr uint32_t kSurfaceProgramCount = kProgramCount - kMediumProgramCount;
 
 constexpr const ProgramInfo& info_of(ProgramId program) {
   return kPrograms[static_cast<size_t>(program)];
 }
-/// Whether a program reads the emission input.
+/// Returns whether a program reads the emission input.
 constexpr bool can_emit(ProgramId program) {
   return info_of(program).can_emit;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// An immutable scene, and the builder that is the only way to make one.
+/// An immutable scene, and the builder that makes it.
 #pragma once
 
 #include <cstdint>
@@ -20,20 +20,20 @@
 
 namespace wavecomb {
 
-/// What kernels need of a scene: plain pointers, valid as long as the Scene.
+/// Device view of a scene: plain pointers, valid for as long as the Scene.
 struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
-  const TangentRecord* tangents = nullptr;  ///< by mesh; null where no mesh has any
-  const uint32_t* geometry_mesh = nullptr;  ///< mesh of (instance.geometry + geometry id)
-  /// First triangle light of (instance.emissive + geometry id).
+  const TangentRecord* tangents = nullptr;  ///< by mesh; null if no mesh has tangents
+  const uint32_t* geometry_mesh = nullptr;  ///< mesh at (instance.geometry + geometry id)
+  /// First triangle light at (instance.emissive + geometry id).
   const uint32_t* emissive_lights = nullptr;
-  /// Likewise the record of a mesh light, or kNoLight. Null where there are no mesh lights.
+  /// Record of the mesh light at the same index, or kNoLight. Null if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  /// Likewise RayVisibility. Null where all rays see everything.
+  /// RayVisibility at the same index. Null if all rays see everything.
   const uint32_t* visibility = nullptr;
   const uint32_t* material_program = nullptr;
-  const uint32_t* material_variant = nullptr;  ///< material_parts.h
+  const uint32_t* material_variant = nullptr;  ///< see material_parts.h
   MaterialView materials;
   LightView lights;
   MotionView motion;
@@ -43,21 +43,20 @@ struct SceneView {
   float scale = 1;  ///< radius of the bounding sphere
   bool has_presence = false;
   bool has_emissive_meshes = false;
-  bool has_curves = false;  ///< curves or points
+  bool has_curves = false;  ///< some mesh is curves, points or splats
   bool has_motion = false;  ///< some mesh, instance or light moves while the shutter is open
 };
 
-/// Memory of a scene's arrays, bytes.
+/// Memory used by the arrays of a scene, in bytes.
 struct SceneBytes {
-  /// Points, indices, radii, normals, tangents, texture coordinates, attributes, materials of
-  /// faces.
+  /// Points, indices, radii, normals, tangents, texture coordinates, attributes and face materials.
   uint64_t meshes = 0;
-  uint64_t textures = 0;  ///< all mip levels, or what of them a store has in memory
+  uint64_t textures = 0;  ///< all mip levels, or the tiles that a store holds in memory
   uint64_t records = 0;   ///< instances, materials, lights
   uint64_t volumes = 0;   ///< grids
 };
 
-/// What is to be other in a scene: values that take the place of those there.
+/// New values for parts of a scene.
 struct SceneEdit {
   std::optional<Camera> camera{};
   std::map<uint32_t, Material> materials{};  ///< by id
@@ -75,52 +74,58 @@ class Scene {
 
   SceneView view() const { return view_; }
   const std::vector<Mesh>& meshes() const { return geometry_->meshes; }
-  /// Group 0 is the world: its meshes are in world space and not instanced.
+  /// Returns the groups of meshes. Group 0 is the world, whose meshes are in world space and not
+  /// instanced.
   const std::vector<Group>& groups() const { return geometry_->groups; }
-  /// Flattened: every entry places a group of meshes (never group 0) in the world.
+  /// Returns the flattened instances: each entry is an instance of a group of meshes (never group
+  /// 0) in world space.
   const std::vector<Instance>& instances() const { return geometry_->instances; }
   const std::vector<Material>& materials() const { return materials_->materials; }
   const std::vector<TexturePtr>& textures() const { return geometry_->textures; }
-  /// What keeps the textures within a limit: of the first that has a store; null: none has.
+  /// Returns the tile store of the first texture that has one, or null. It limits the memory of
+  /// textures.
   const TileStore* texture_store() const;
   const std::vector<Light>& lights() const { return lights_->lights; }
   const std::vector<Volume>& volumes() const { return geometry_->volumes; }
-  /// Names of light groups; the first is kOtherLights.
+  /// Returns the names of light groups; the first is kOtherLights.
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
-  /// Index into light_groups() of every light that kernels know, triangles last.
+  /// Returns, for every light of the light set, its index into light_groups(); triangles come last.
   std::vector<uint32_t> groups_of_lights() const;
-  /// Of the same lights: 1 where one is the glow of an object's material, and no light of the
-  /// stage.
+  /// Returns, for the same lights, 1 if the light is the emission of an object's material and not a
+  /// light of the stage.
   std::vector<uint8_t> lights_of_objects() const;
-  /// The ways from the world to the instances, and the names on them.
+  /// Returns the nesting of groups from the world to the instances, and its names.
   const std::vector<Placement>& placements() const { return geometry_->placements; }
   const NameTable& names() const { return geometry_->names; }
   const LightSet& light_set() const { return lights_->set; }
-  /// The tree of lights with its nodes, which light_set() may have but an outline of; built on so
-  /// many threads (0: all) where it is not yet. Any thread may ask.
+  /// Returns the light tree with its nodes, of which light_set() may have only an outline. If
+  /// necessary, it is built with `threads` threads (0: all). Thread-safe.
   const LightTree& light_tree(uint32_t threads) const { return lights_->tree(threads); }
   const Camera& camera() const { return camera_; }
   const Bounds& bounds() const { return geometry_->bounds; }
-  /// Triangles of all meshes, each counted once, and with every instance counted.
+  /// Returns the number of triangles of all meshes, counting each mesh once, or counting each
+  /// instance.
   uint64_t unique_triangles() const;
   uint64_t instanced_triangles() const;
-  /// Segments of curves and points, each counted once.
+  /// Returns the number of curve segments, points or splats, counting each mesh once.
   uint64_t curve_segments() const;
   uint64_t points() const;
   uint64_t splats() const;
   SceneBytes bytes() const;
-  /// One line each: what was mended or left out while building (zero-area faces, NaN points ...).
+  /// Returns one line for each defect that was fixed or left out while building, such as faces
+  /// without area or NaN points.
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }
 
-  /// A scene with other values, which shares with this one what did not change; equal to one built
-  /// anew with them. `threads`: 0: all.
+  /// Returns a scene with other values that shares all unchanged data with this one, and equals a
+  /// scene built from scratch with these values. `threads`: 0 uses all.
   ///
-  /// Costs microseconds for a camera, copies of the materials for a material, the light set where
-  /// lights or emission change, and tangents of meshes whose material asks for them anew. Throws
-  /// Error naming the object for bad values, as SceneBuilder does, and for ids that are not there.
+  /// A camera edit takes microseconds. A material edit copies the materials, an edit of lights or
+  /// emission rebuilds the light set, and tangents are made for meshes whose new material needs
+  /// them. Throws Error naming the object for invalid values, as SceneBuilder does, and for unknown
+  /// ids.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
-  /// The parts, to be compared with those of scenes that were made from one another.
+  /// Returns the parts of the scene, to be compared with those of scenes derived by edits.
   const std::shared_ptr<const SceneGeometry>& geometry() const { return geometry_; }
   const std::shared_ptr<const SceneMaterials>& material_part() const { return materials_; }
   const std::shared_ptr<const SceneLights>& light_part() const { return lights_; }
@@ -131,10 +136,10 @@ class Scene {
         std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
         std::shared_ptr<const SceneTangents> tangents, std::shared_ptr<const SceneLinks> links,
         const Camera& camera);
-  /// Works out which objects are in which sets, and which rays see them.
+  /// Computes the sets that each object belongs to, and the rays that see it.
   void link();
-  /// A value for every light that kernels know: of_input(light) of the stage's, of_run(triangles)
-  /// of those of meshes.
+  /// Returns a value for every light of the light set: of_input(light) for lights of the stage,
+  /// of_run(triangles) for the triangle lights of meshes.
   template <typename T, typename OfInput, typename OfRun>
   std::vector<T> for_all_lights(const OfInput& of_input, const OfRun& of_run) const;
 
@@ -142,84 +147,88 @@ class Scene {
   std::shared_ptr<const SceneMaterials> materials_;
   std::shared_ptr<const SceneLights> lights_;
   std::shared_ptr<const SceneTangents> tangents_;
-  std::shared_ptr<const SceneLinks> links_;  ///< null where there are no sets
-  /// SceneView::visibility; null where all rays see everything.
+  std::shared_ptr<const SceneLinks> links_;  ///< null if there are no sets
+  /// SceneView::visibility; null if all rays see everything.
   std::shared_ptr<const std::vector<uint32_t>> visibility_;
   Camera camera_;
   SceneView view_;
 };
 
-/// Collects a scene. Ids are handed out from 0 in order of addition.
+/// Collects the contents of a scene. Ids count from 0 in order of addition.
 ///
-/// Contract: one thread at a time. Arrays of meshes stay the caller's and must live as long as the
-/// Scene (Mesh::owner sees to it). Every function throws Error with one line that names the object.
+/// Contract: used by one thread at a time. The caller keeps ownership of mesh arrays, which must
+/// live as long as the Scene (see Mesh::owner). Every function throws Error with one line that
+/// names the object.
 class SceneBuilder {
  public:
-  /// `threads`: for textures and for build(); 0: all. `store`: keeps the textures that are added
-  /// here, with those of other scenes; null: they are in memory.
+  /// Makes an empty builder. `threads` are used for textures and for build() (0: all). `store`
+  /// holds the textures added here, together with those of other scenes; null keeps them in memory.
   explicit SceneBuilder(uint32_t threads = 0, std::shared_ptr<TileStore> store = nullptr);
   SceneBuilder(SceneBuilder&&) = default;
   SceneBuilder& operator=(SceneBuilder&&) = default;
 
   uint32_t add_texture(const TextureDesc& desc);
-  /// A texture of another scene, which may end before this one.
+  /// Adds a texture of another scene, which may be destroyed before this one.
   uint32_t add_texture(TexturePtr texture);
-  /// A UDIM texture of textures that were added, by tile number from 1001 to 1100; `missing`:
-  /// linear r, g, b, alpha where there is no tile.
+  /// Makes a UDIM texture from textures already added, by tile number from 1001 to 1100. `missing`
+  /// is the linear r, g, b, alpha of missing tiles.
   uint32_t add_tiles(const std::string& name,
                      const std::vector<std::pair<uint32_t, uint32_t>>& tiles,
                      const std::array<float, 4>& missing);
-  /// A texture that was added; valid until the builder is gone or build() is called.
+  /// Returns a texture that was added; valid until the builder is destroyed or build() is called.
   const Texture& texture(uint32_t id) const;
-  /// A program for Material::graph and its parts; outputs are numbered as in graph/parameters.h.
-  /// Texture ids in it must exist.
+  /// Adds a value graph for Material::graph and its parts. Outputs are numbered as in
+  /// graph/parameters.h; texture ids in it must exist.
   uint32_t add_graph(const Graph& graph);
-  /// Texture and graph ids in the material must exist.
+  /// Adds a material. Its texture and graph ids must exist.
   uint32_t add_material(Material material);
-  /// The id of an attribute of that name, for MeshAttribute and for graphs.
+  /// Returns the id of the attribute of that name, for MeshAttribute and for graphs.
   uint32_t attribute(const std::string& name);
-  /// Checks sizes, indices and radii. Faces with points that are not finite are refused by name;
-  /// faces without area stay (they are never hit).
+  /// Adds a mesh after checking sizes, indices and radii. Throws Error for faces with non-finite
+  /// points; faces without area are kept (no ray hits them).
   uint32_t add_mesh(Mesh mesh);
-  /// Gives a mesh other arrays, checked as those of add_mesh; its name, its light group and its
-  /// place in groups stay.
+  /// Replaces the arrays of a mesh, with the checks of add_mesh. Its name, its light group and its
+  /// groups stay.
   void replace_mesh(uint32_t id, Mesh mesh);
-  /// A new empty group, to hold meshes and instances of other groups. Group 0, the world, is there.
-  /// `root` is the prim path that names of its meshes and of placements in it begin with, which
-  /// each of its own placements' names takes the place of (ObjectNames).
+  /// Adds an empty group, to hold meshes and instances of other groups. Group 0, the world, always
+  /// exists. `root` is the prim path prefix of the names in the group; in the names of objects, the
+  /// name of the placement replaces it (ObjectNames).
   uint32_t add_group(std::string name, std::string root = {});
   void add_to_group(uint32_t group, uint32_t mesh);
-  /// Places `child` inside `parent`; nested to any depth without copies of geometry. `material` (or
-  /// kInheritMaterial) goes to the meshes in it that have none of their own.
-  /// `name` is of add_placement_name, `number` tells those of one name apart. `steps`: transforms
-  /// at equal distances over the shutter, two or more where it moves; `transform` does not count
-  /// then.
+  /// Instances the group `child` in the group `parent`, nested to any depth without copying
+  /// geometry. `material` (or kInheritMaterial) applies to meshes of the child without a material.
+  /// `name` is an id of add_placement_name; `number` distinguishes placements of the same name.
+  /// `steps` are transforms at equally spaced shutter times, two or more for a moving instance, and
+  /// replace `transform`.
   void add_instance(uint32_t parent, uint32_t child, const Affine& transform,
                     uint32_t material = kInheritMaterial, uint32_t name = kNoName,
                     uint32_t number = kNoName, std::span<const Affine> steps = {});
-  /// A name for instances; the first `asset_length` characters name the asset that they are part
-  /// of, 0 where that is not known.
+  /// Adds a name for instances. Its first `asset_length` characters name the asset, 0 if that is
+  /// unknown.
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
-  /// A set for Light::light_link and shadow_link.
+  /// Adds a set for Light::light_link and shadow_link.
   uint32_t add_geometry_set(GeometrySet set);
-  /// Says which rays see a prim and what is below it. Of two rules for one path the later counts.
+  /// Sets which rays see a prim and its descendants. Of two rules for the same path, the later
+  /// wins.
   void add_visibility(VisibilityRule rule);
-  /// A profile for Shaping::ies.
+  /// Adds a profile for Shaping::ies.
   uint32_t add_ies(IesProfile profile);
-  /// A filter for Light::filter.
+  /// Adds a filter for Light::filter.
   uint32_t add_light_filter(LightFilter filter);
   uint32_t add_light(Light light);
-  /// A light for Mesh::mesh_light, of kind kMeshLight. If not `visible` it shines at any opacity.
+  /// Adds a light for Mesh::mesh_light, of kind kMeshLight. If it is not `visible`, the opacity of
+  /// the mesh does not affect its emission.
   uint32_t add_mesh_light(Light light);
-  /// The number of a light group, for Light::group and Mesh::light_group; "" is kOtherLights.
+  /// Returns the number of a light group for Light::group and Mesh::light_group; "" is
+  /// kOtherLights.
   uint32_t light_group(const std::string& name);
-  /// A volume, which fills space in the world, whatever surfaces there are. Volumes may overlap.
+  /// Adds a volume in world space, independent of surfaces. Volumes may overlap.
   uint32_t add_volume(Volume volume);
   void set_camera(const Camera& camera);
 
-  /// Checks everything that spans objects (cycles of groups, singular transforms, materials) and
-  /// makes the scene. The builder is empty afterwards. Meshes without any material get a grey
-  /// diffuse one.
+  /// Checks everything that involves several objects (cycles of groups, singular transforms,
+  /// materials) and makes the scene. The builder is empty afterwards. Meshes without any material
+  /// get a grey diffuse one.
   std::shared_ptr<const Scene> build();
 
  private:
@@ -228,16 +237,18 @@ class SceneBuilder {
     Affine transform;
     uint32_t material;
     uint32_t name, number;
-    StepRange motion;  ///< of node_steps_
+    StepRange motion;  ///< range of node_steps_
   };
-  /// Instances of groups with meshes that one placement of `group` makes; finds cycles.
+  /// Counts the instances of groups with meshes in one placement of `group`; throws Error for
+  /// cycles.
   uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
-  /// Places `group` and all that is in it. `steps`: of `here`, where it moves.
+  /// Appends the instances of `group` and everything nested in it. `steps`: motion of `here`, if
+  /// any.
   void flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
                const std::vector<uint64_t>& counts, std::vector<Instance>& out,
                SceneGeometry& geometry) const;
-  /// Transforms of a node within a group that moves as `outer` says or stands still at `still`;
-  /// none where neither moves.
+  /// Returns the transforms of a node in a group that moves by `outer` or stands still at `still`;
+  /// empty if neither the group nor the node moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
   void make_records(SceneGeometry& geometry, uint32_t grey) const;

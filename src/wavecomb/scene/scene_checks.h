@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What values of a scene may be: for SceneBuilder and for edits. All throw Error with one line
-/// that names the object. Of lights: scene/light_table.h.
+/// Checks of scene values, for SceneBuilder and for edits. All throw Error with one line that names
+/// the object. For lights see scene/light_table.h.
 #pragma once
 
 #include <cmath>
@@ -18,13 +18,13 @@ inline bool finite(const Affine& m) {
   return finite(m.row[0]) && finite(m.row[1]) && finite(m.row[2]) && finite(m.t);
 }
 
-/// "mesh '/World/Box'", or "mesh" where it has no name.
+/// Returns "mesh '/World/Box'", or "mesh" for an empty name.
 std::string quoted(const std::string& kind, const std::string& name);
 
-/// `texture_count`, `graph_count`: textures and graphs that there are.
+/// Checks a material. `texture_count`, `graph_count`: number of textures and graphs in the scene.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);
 void check_profile(const IesProfile& profile);
-/// `textures`, `filters`: how many were added.
+/// Checks a light filter. `textures`, `filters`: number of those added so far.
 void check_filter(const LightFilter& filter, size_t textures, size_t filters);
 
 }  // namespace wavecomb

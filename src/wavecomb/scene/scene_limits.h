@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How many of each thing the 32-bit numbers of kernels reach.
+/// Limits that 32-bit indices of kernels impose on the number of objects.
 #pragma once
 
 #include <cstdint>
@@ -7,32 +7,33 @@
 
 namespace wavecomb {
 
-/// Words of a table that lanes gather from: the indices of a gather are signed.
+/// Maximum size in 32-bit words of a table read by gather instructions, whose indices are signed.
 inline constexpr uint64_t kGatherWords = uint64_t{1} << 31;
-/// Words of a table whose rows lanes load: theirs are not.
+/// Maximum size in 32-bit words of a table whose rows are loaded whole, with unsigned indices.
 inline constexpr uint64_t kMostRowWords = uint64_t{1} << 32;
 
-/// Instances that kernels can number, of 16 words each; the first is the world.
+/// Maximum number of instances, of 16 32-bit words each; the first is the world.
 inline constexpr uint64_t kMaxInstances = kGatherWords / 16 - 1;
 
-/// What a scene has of what kernels index.
+/// Numbers of all objects that kernels index.
 struct SceneCounts {
   uint64_t meshes = 0, materials = 0, instances = 0;
-  uint64_t grouped = 0;         ///< meshes of all groups
-  uint64_t placed = 0;          ///< meshes of all instances, the world's among them
-  uint64_t placements = 0;      ///< of groups, those among them that hold groups alone
-  uint64_t steps = 0;           ///< transforms of instances that move
-  uint64_t lights = 0;          ///< with placed mesh lights and portals
+  uint64_t grouped = 0;         ///< sum over all groups of their meshes
+  uint64_t placed = 0;          ///< sum over all instances, including the world, of their meshes
+  uint64_t placements = 0;      ///< nested instances, including those that contain only groups
+  uint64_t steps = 0;           ///< transforms of moving instances
+  uint64_t lights = 0;          ///< including instances of mesh lights and portals
   uint64_t profile_values = 0;  ///< angles and candela of IES profiles
+  /// geometry sets for light linking (one bit each) times classes, in 32-bit words
   uint64_t link_words =
       0;  ///< sets of geometry that lights are linked to, a bit each, times classes
 };
 
-/// Throws Error for the first of them that is more than can be numbered: what, how many and what to
-/// do, in one line.
+/// Throws Error for the first count that exceeds its limit. The message says in one line which it
+/// is, how many there are, and what to do.
 void check_counts(const SceneCounts& counts);
 
-/// 16777216 as "16,777,216".
+/// Formats 16777216 as "16,777,216".
 std::string with_commas(uint64_t n);
 
 }  // namespace wavecomb

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The parts of a scene. Each is immutable and shared by all scenes that edits made of one another
-/// without changing it.
+/// Parts of a scene. Each is immutable, and is shared by all scenes that were derived from one
+/// another by edits without changing it.
 #pragma once
 
 #include <algorithm>
@@ -27,13 +27,13 @@
 
 namespace wavecomb {
 
-/// An instance as lanes read it: one cache line. Instance 0 is the world itself (identity).
+/// Packed instance, one cache line. Instance 0 is the world itself (identity).
 struct alignas(64) InstanceRecord {
   float to_world[12];  ///< rows of A, each followed by its translation
-  uint32_t geometry;   ///< first of its group's entries in SceneView::geometry_mesh
-  uint32_t material;   ///< for meshes whose material is kInheritMaterial
-  uint32_t emissive;   ///< first of its entries in SceneView::emissive_lights, if there are any
-  float side;          ///< sign of det A: -1 where the transform mirrors
+  uint32_t geometry;   ///< index of its group's first entry in SceneView::geometry_mesh
+  uint32_t material;   ///< used by meshes whose material is kInheritMaterial
+  uint32_t emissive;   ///< index of its first entry in SceneView::emissive_lights, if there are any
+  float side;          ///< sign of det A: -1 for a transform that mirrors
 };
 static_assert(sizeof(InstanceRecord) == 64);
 
@@ -51,31 +51,31 @@ struct Bounds {
   }
 };
 
-/// A group of meshes that is committed once and instanced any number of times.
+/// A group of meshes, built once for traversal and instanced any number of times.
 struct Group {
   std::string name;
   std::vector<uint32_t> meshes;
-  std::string root;  ///< prim path that its meshes' names begin with
+  std::string root;  ///< prim path prefix of the names of its meshes
 };
 
-/// One placement of a group.
+/// An instance of a group in world space.
 struct Instance {
   uint32_t group = 0;
   Affine to_world;
   uint32_t material = kInheritMaterial;
   uint32_t placement = kNoName;  ///< index into Scene::placements
-  StepRange motion;              ///< of SceneGeometry::steps
+  StepRange motion;              ///< range of SceneGeometry::steps
 };
 
-/// Light groups that a stage may have, with that of lights without one.
+/// Maximum number of light groups of a stage, including kOtherLights.
 inline constexpr uint32_t kMaxLightGroups = 64;
-/// The group of lights without one, group 0.
+/// Name of group 0, for lights without a group.
 inline constexpr const char* kOtherLights = "other";
 
-/// What no edit changes: shapes and where they are, textures, names.
+/// Everything that edits cannot change: shapes and transforms, textures, names.
 struct SceneGeometry {
   std::vector<Mesh> meshes;
-  /// By mesh with materials of faces: which ones, each once. Empty for other meshes.
+  /// Distinct face materials of each mesh; empty for meshes without face materials.
   std::vector<std::vector<uint32_t>> face_materials;
   std::vector<Group> groups;
   std::vector<Instance> instances;
@@ -84,13 +84,13 @@ struct SceneGeometry {
   std::vector<LightFilter> filters;
   std::vector<GeometrySet> sets;
   std::vector<VisibilityRule> visibility;
-  std::vector<Light> mesh_lights;  ///< Mesh::mesh_light
+  std::vector<Light> mesh_lights;  ///< indexed by Mesh::mesh_light
   std::vector<Volume> volumes;
   std::vector<std::string> light_groups;
   std::vector<Placement> placements;
   NameTable names;
   Bounds bounds;
-  float radius = 1;  ///< of the bounding sphere
+  float radius = 1;  ///< radius of the bounding sphere
   std::vector<std::string> warnings;
 
   std::vector<MeshRecord> mesh_records;
@@ -99,16 +99,18 @@ struct SceneGeometry {
   std::vector<TextureView> texture_views;
   std::vector<std::string> attribute_names;        ///< by id
   std::vector<AttributeRecord> attribute_records;  ///< AttributeView::records
-  std::vector<uint32_t> mesh_attributes;           ///< AttributeView::of_mesh; empty: none has any
+  /// AttributeView::of_mesh; empty if no mesh has attributes.
+  std::vector<uint32_t> mesh_attributes;
   std::vector<MeshMotion> mesh_motions;
-  std::vector<MatrixStep> steps;  ///< of all instances that move
+  std::vector<MatrixStep> steps;  ///< transforms of all moving instances
   std::vector<VolumeRecord> volume_records;
   uint32_t first_volume_material = 0;  ///< VolumeView::first_material
-  /// WalkView::exit_material; kInheritMaterial: no material had a radius, and nobody can walk.
+  /// WalkView::exit_material; kInheritMaterial if no material has a subsurface radius, so that the
+  /// scene has no subsurface random walks.
   uint32_t exit_material = kInheritMaterial;
-  /// InteriorView::event_material; kInheritMaterial: no material asked what paths are inside of.
+  /// InteriorView::event_material; kInheritMaterial if no material needs a medium stack.
   uint32_t inside_material = kInheritMaterial;
-  std::vector<StepRange> instance_motions;  ///< by instance record; empty where none moves
+  std::vector<StepRange> instance_motions;  ///< by instance record; empty if no instance moves
   bool moves() const {
     return mesh_motions.size() > 1 || !steps.empty() ||
            std::ranges::any_of(volumes, &Volume::moves);
@@ -118,8 +120,8 @@ struct SceneGeometry {
     return {attribute_records.data(), mesh_attributes.data()};
   }
 
-  /// Runs test(material) for what faces of `mesh` wear where the instance's own is `inherited`,
-  /// until it says yes.
+  /// Calls test(material) for the materials of all faces of `mesh` until one returns true, and
+  /// returns whether one did. `inherited` is the material of the instance.
   template <typename Test>
   bool any_material(uint32_t mesh, uint32_t inherited, const Test& test) const {
     const auto worn = [&](uint32_t m) { return test(m == kInheritMaterial ? inherited : m); };
@@ -130,51 +132,54 @@ struct SceneGeometry {
   }
 };
 
-/// Materials, and as lanes read them.
+/// Materials and their packed form.
 struct SceneMaterials {
-  /// `textures`: those of the scene, which materials and graphs read. `exit_material`,
-  /// `inside_material`: of SceneGeometry.
+  /// Packs materials. `textures` are those of the scene, which materials and graphs read.
+  /// `exit_material` and `inside_material` are those of SceneGeometry.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material,
                  uint32_t inside_material);
 
-  std::vector<Material> materials;  ///< as they were told
-  std::vector<Material> shaded;     ///< the same, settled (settled_material.h)
+  std::vector<Material> materials;  ///< as the caller described them
+  std::vector<Material> shaded;     ///< after simplification by settled() (settled_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
   std::vector<uint32_t> programs;  ///< by material
-  std::vector<uint32_t> variants;  ///< by material: of its program, the least one
-  /// By material: whether tangents that vary smoothly show on it (mesh_tangents.h).
+  std::vector<uint32_t> variants;  ///< least expensive variant of the program of each material
+  /// By material: whether smooth tangents affect its shading (mesh_tangents.h).
   std::vector<uint8_t> wants_tangents;
-  std::vector<OpenPbrRecord> openpbr;  ///< of the materials of that program
-  /// By material; empty where no program has parameters to itself.
+  std::vector<OpenPbrRecord> openpbr;  ///< for materials of the program openpbr
+  /// By material; empty if no program has specific parameters.
   std::vector<ProgramParameterRecord> own;
-  std::vector<WalkMedium<float>> walks;          ///< by material; empty where nobody walks
-  std::vector<InteriorMedium<float>> interiors;  ///< by material; empty where nobody asks
+  /// By material; empty if there are no subsurface random walks.
+  std::vector<WalkMedium<float>> walks;
+  /// By material; empty if paths need no medium stack.
+  std::vector<InteriorMedium<float>> interiors;
   bool has_presence = false, has_emission = false;
 };
 
 /// Lights of the stage and emissive triangles.
 struct SceneLights {
-  /// Triangles of all meshes whose materials emit become lights. `before`: of a scene with the same
-  /// geometry, to take over what is the same; or null.
+  /// Packs the lights, and makes lights of the triangles of all meshes whose materials emit.
+  /// `before`, or null, belongs to a scene with the same geometry; unchanged data is reused from
+  /// it.
   SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
               const SceneMaterials& materials, const SceneLights* before);
 
-  /// The tree of lights, built by the first who asks where the set has but its outline. Any thread.
+  /// Returns the light tree. If `set` has only its outline, the first call builds it. Thread-safe.
   const LightTree& tree(uint32_t threads) const;
-  /// Bytes of nodes and trails, wherever they are.
+  /// Returns the size in bytes of the nodes and trails of the tree.
   uint64_t tree_bytes() const;
 
   std::vector<Light> lights;
   LightSet set;
-  std::vector<uint32_t> emissive;     ///< SceneView::emissive_lights; empty where nothing emits
-  std::vector<uint32_t> mesh_lights;  ///< SceneView::mesh_lights; empty where there are none
-  /// Of the triangle lights from `first` on, up to those of the next entry.
+  std::vector<uint32_t> emissive;     ///< SceneView::emissive_lights; empty if nothing emits
+  std::vector<uint32_t> mesh_lights;  ///< SceneView::mesh_lights; empty if there are none
+  /// Group of the triangle lights from `first` up to the `first` of the next entry.
   struct TriangleGroup {
     uint32_t first, group;
-    bool is_light;  ///< of a mesh light, and not of a material that glows
+    bool is_light;  ///< triangles of a mesh light, not of a material's emission
   };
   std::vector<TriangleGroup> triangle_groups;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Materials without the textures and graphs that say nothing.
+/// Simplification of materials whose textures and graphs are constant.
 #pragma once
 
 #include <span>
@@ -9,19 +9,20 @@
 
 namespace wavecomb {
 
-/// Between what the components of an input lie.
+/// Range of each component of an input.
 struct InputRange {
   Vec3<float> low, high;
 };
 
-/// Of what input `input` may read by `use`, brought to where kernels bring it; normals, which are
-/// made unit, as they are read.
+/// Returns the range of values that input `input` may read by `use`, clamped as kernels clamp it.
+/// The range of a normal is not clamped, since kernels normalize it instead.
 InputRange input_range(Input input, const TextureUse& use, const Texture& texture);
 
-/// `material`, where inputs whose textures give the same value everywhere are that constant, and
-/// likewise opacity and emission by graphs that can give one value only: it is shaded to the same
-/// numbers, and reads fewer textures. A mesh whose material reads none is seen in another frame, so
-/// that samples fall elsewhere.
+/// Returns `material` with every texture that has the same value everywhere replaced by a constant,
+/// and with opacity and emission graphs that can give only one value replaced by it. Shading
+/// results are identical, with fewer texture lookups. If no texture is left, shading uses a
+/// different tangent frame, so that individual samples differ while their expectation stays the
+/// same.
 Material settled(Material material, const GraphSet& graphs, std::span<const TexturePtr> textures);
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Counts of the faces of a mesh on lines along one direction.
+/// Crossing counts for mesh faces on parallel lines, for inside tests.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,16 @@
 
 namespace wavecomb {
 
-/// The triangles of a mesh in a grid across one direction, which is oblique to the axes so that
-/// lines through the middle of a regular mesh do not meet its edges.
+/// Triangles of a mesh in a 2D grid perpendicular to one direction. The direction is oblique to the
+/// axes, so that lines through the middle of a regular mesh do not hit its edges.
 class TriangleColumns {
  public:
-  /// `mesh` must live as long.
+  /// Builds the grid. `mesh` must outlive it.
   explicit TriangleColumns(const Mesh& mesh);
 
-  /// Faces that a line from `p` leaves less those that it enters: of a closed mesh that faces
-  /// outwards 1 for a point inside, and else 0. Adds the triangles that it tests to `tests`.
+  /// Returns the number of faces through which the line from `p` leaves the mesh less the number
+  /// through which it enters: 1 inside a closed mesh that faces outwards, 0 outside. Adds the
+  /// number of tested triangles to `tests`.
   int faces_left(const Vec3<float>& p, size_t& tests) const;
 
  private:
@@ -27,10 +28,11 @@ class TriangleColumns {
 
   std::span<const float> positions_;
   std::span<const uint32_t> indices_;
-  uint32_t side_ = 1;  ///< cells along x and along y
+  uint32_t side_ = 1;  ///< number of cells along x and along y
   float low_[2] = {}, high_[2] = {}, per_unit_[2] = {};
-  std::vector<uint32_t> first_;      ///< by cell, of `triangles_`; and their number
-  std::vector<uint32_t> triangles_;  ///< cell by cell
+  /// Range of `triangles_` for each cell, and the total number at the end.
+  std::vector<uint32_t> first_;
+  std::vector<uint32_t> triangles_;  ///< triangle indices, cell by cell
 };
 
 }  // namespace wavecomb

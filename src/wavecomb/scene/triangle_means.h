@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What the emission and the opacity of a triangle are on the whole, for the choice among lights.
+/// Mean emission and opacity of a triangle, which determine its selection probability as a light.
 #pragma once
 
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
 
-/// Whether rays may be aimed at what a material emits: where its graph reads nothing that only a
-/// path knows that has met the surface. What is not aimed at is seen by paths that meet it.
+/// Returns whether light sampling can aim at the emission of a material: it can unless the graph
+/// reads inputs that are known only when a path hits the surface. Other emission is found only by
+/// paths that hit the surface.
 bool can_aim_at(const Material& material, const GraphSet& graphs);
 
-/// Sets the radiance of a triangle, whose corners are set, to what `material` emits on it: as it
-/// is where it is constant, else about its mean (by the mean of the whole texture, and that of a
-/// few points where a graph drives it). 0 for what rays may not be aimed at.
+/// Sets the radiance of a triangle with known corners to the emission of `material`: exact if it is
+/// constant, otherwise an estimate of its mean (from the mean of the whole texture, or from a few
+/// points of a graph). 0 if light sampling cannot aim at the material.
 void set_mean_emission(const SceneGeometry& geometry, const SceneMaterials& materials,
                        const Material& material, EmissiveTriangle& triangle);
 
-/// Sets the opacity of a triangle likewise: 1 where it is not presence, never 0 where it varies.
+/// Sets the opacity of a triangle to that of `material`, exact or an estimated mean as above: 1 if
+/// opacity is not presence, and never 0 if it varies.
 void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& materials,
                       const Material& material, EmissiveTriangle& triangle);
 

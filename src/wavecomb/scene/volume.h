@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Volumes: what fills space between surfaces, as grids of voxels or evenly.
+/// Participating media in space: voxel grids, or homogeneous boxes.
 #pragma once
 
 #include <array>
@@ -13,49 +13,52 @@
 
 namespace wavecomb {
 
-/// Voxels of a brick along an edge. Bricks are kept with one more row of voxels at their upper
-/// faces, so that a trilinear lookup reads one brick.
+/// Edge length of a brick in voxels. A brick stores one more layer of voxels at its upper faces, so
+/// that a trilinear lookup reads a single brick.
 inline constexpr uint32_t kBrickEdge = 8, kBrickRow = kBrickEdge + 1,
                           kBrickVoxels = kBrickRow * kBrickRow * kBrickRow;
-/// In a grid's table: no brick is there.
+/// Table entry of a cell without a brick.
 inline constexpr uint32_t kNoBrick = 0xffffffffu;
 
-/// A grid as kernels read it. Its space is measured in bricks: the table covers [0, size).
+/// Device view of a grid. Coordinates are measured in bricks; the table covers [0, size).
 struct GridView {
-  const uint32_t* table = nullptr;  ///< by cell, x quickest: number of its brick or kNoBrick
-  const float* most = nullptr;      ///< by cell: greatest value of any component that it can give
-  const void* voxels = nullptr;     ///< brick by brick: floats, or halves in pairs
-  uint32_t size[3] = {0, 0, 0};     ///< cells
-  uint32_t components = 1;          ///< 1 or 3, side by side
+  const uint32_t* table = nullptr;  ///< brick number of each cell, x fastest, or kNoBrick
+  /// Maximum over all components that a lookup in each cell can return.
+  const float* most = nullptr;
+  const void* voxels = nullptr;  ///< bricks of floats, or of halves in pairs
+  uint32_t size[3] = {0, 0, 0};  ///< cells
+  uint32_t components = 1;       ///< 1 or 3, interleaved
   bool is_half = false;
-  float background = 0;  ///< where there is no brick
+  float background = 0;  ///< value outside all bricks
 };
 
-/// What a grid is made of: the voxels of bricks of 8^3, as files have them.
+/// Input of a grid: voxels in bricks of 8^3, as files store them.
 struct GridBricks {
-  std::string name;                  ///< for messages
-  std::span<const int32_t> origins;  ///< x, y, z of each brick's first voxel, multiples of 8
-  std::span<const float> floats;     ///< voxels, x slowest, z quickest, components side by side; or
-  std::span<const uint16_t> halves;  ///< the same as halves
+  std::string name;                  ///< used in messages
+  std::span<const int32_t> origins;  ///< x, y, z of the first voxel of each brick, multiples of 8
+  /// Voxels as 32-bit floats, or as 16-bit floats in `halves`: x slowest, z fastest, components
+  /// interleaved. The other span is empty.
+  std::span<const float> floats;
+  std::span<const uint16_t> halves;
   uint32_t components = 1;
   float background = 0;
-  bool is_signed = false;  ///< values may be below 0: velocities
+  bool is_signed = false;  ///< values may be negative, as for velocities
 };
 
-/// Voxels in bricks, with a table of where they are. Immutable.
+/// An immutable sparse voxel grid: bricks of voxels, and a table of their positions.
 class VolumeGrid {
  public:
-  /// Throws Error with one line for numbers that are negative (unless all have signs) or not
-  /// finite, bricks that are doubled or not at multiples of 8, and grids that are too large to be
-  /// numbered.
+  /// Makes a grid. Throws Error with one line for values that are not finite or, unless the grid is
+  /// signed, negative; for duplicate bricks or origins that are not multiples of 8; and for grids
+  /// beyond the limit of 32-bit indices.
   explicit VolumeGrid(const GridBricks& bricks);
 
   GridView view() const;
-  /// Index of the voxel that the table begins with.
+  /// Returns the index of the voxel at which the table begins.
   const std::array<int32_t, 3>& first_voxel() const { return first_; }
   size_t brick_count() const { return voxel_words_.size() / words_per_brick(); }
   size_t bytes() const;
-  /// Greatest value; of what has signs, regardless of them.
+  /// Returns the maximum value, or the maximum magnitude of a signed grid.
   float most() const { return greatest_; }
   bool is_signed() const { return is_signed_; }
   const std::vector<uint32_t>& table() const { return table_; }
@@ -76,29 +79,31 @@ class VolumeGrid {
   std::vector<uint32_t> voxel_words_;
 };
 
-/// A grid, and the map from its voxels' indices to the volume's own space.
+/// A grid, and the map from voxel indices to the volume's local space.
 struct VolumeField {
-  std::shared_ptr<const VolumeGrid> grid;  ///< null: there is none
+  std::shared_ptr<const VolumeGrid> grid;  ///< null if the field is not given
   Affine index_to_object;
 };
 
 class VolumeMotion;
 
-/// One volume. At a point, with the values of its fields there,
+/// A volume. At a point, with the values of its fields there,
 ///   extinction sigma_t = extinction * density     per unit of world length, per channel
-///   albedo             = albedo * color           share of it that is scattered
+///   albedo             = albedo * color           fraction of extinction that is scattered
 ///   emitted radiance   = emission * (emission field, or density)   per unit of world length
-/// Scattering follows Henyey and Greenstein. With a velocity field v what is at p at the time t is
-/// what the fields have at p - v(p) t.
+/// Scattering uses the Henyey-Greenstein phase function. With a velocity field v, the values at p
+/// at time t are those that the fields have at p - v(p) t.
 struct Volume {
   std::string name;
-  VolumeField density;  ///< one component; none: 1 everywhere in the box
-  VolumeField color;    ///< none: 1
-  VolumeField glow;     ///< none: as density
-  /// Three components with signs, in the volume's own space over a second; none: it stands still.
+  VolumeField density;  ///< one component; if not given, 1 everywhere in the box
+  VolumeField color;    ///< if not given, 1
+  VolumeField glow;     ///< emission field; if not given, the density
+  /// Three signed components in the volume's local space per second; if not given, the volume does
+  /// not move.
   VolumeField velocity;
-  std::array<float, 2> seconds{0, 0};          ///< t where the shutter opens and closes
+  std::array<float, 2> seconds{0, 0};          ///< t at shutter open and close
   std::shared_ptr<const VolumeMotion> motion;  ///< made by SceneBuilder::add_volume
+  /// Corners in local space, used if there is no density field.
   std::array<Vec3<float>, 2> box{Vec3<float>(0.f),
                                  Vec3<float>(0.f)};  ///< own space; where there is no density field
   Affine to_world;
@@ -109,54 +114,56 @@ struct Volume {
   bool moves() const { return velocity.grid && (seconds[0] != 0 || seconds[1] != 0); }
 };
 
-/// A field as kernels read it: x_bricks = A x_world + t, rows of A each followed by t's component.
+/// Packed reference to a grid: x_bricks = A x_world + t, rows of A each followed by its component
+/// of t.
 struct PlacedGrid {
   GridView grid;
   float to_bricks[12] = {};
 };
 
-/// How a field that moves is looked up: from one space, of cells or the world.
+/// Maps for looking up a moving field, from the space of cells or of the world.
 struct FieldDrift {
   float to_velocity[12];  ///< to bricks of the velocity grid
   float to_bricks[12];    ///< to bricks of the field
-  float per_second[12];   ///< from velocities to bricks of the field; translation 0
+  float per_second[12];   ///< from velocities to bricks of the field, without translation
 };
 
-/// A volume as kernels read it. All lanes of a packet look at one volume at a time, so records are
-/// read as they stand.
+/// Packed volume. All lanes of a packet look up the same volume at a time, so records are read
+/// without gathers.
 struct VolumeRecord {
-  PlacedGrid density;  ///< table null: 1 in its one cell
-  PlacedGrid color;    ///< table null: 1 everywhere
-  PlacedGrid glow;     ///< that of density, where there is none
+  PlacedGrid density;  ///< a null table means 1 in its single cell
+  PlacedGrid color;    ///< a null table means 1 everywhere
+  PlacedGrid glow;     ///< emission field; equals density if there is none
   float extinction[3], albedo[3], emission[3];
-  float most_extinction;  ///< of the channels
+  float most_extinction;  ///< maximum over the channels
   float anisotropy;
   bool is_grey;  ///< extinction is the same in all channels
   bool emits;
-  bool moves;  ///< if so, it is flown through by cells of their own, which bound what comes by
+  /// Tracked through separate cells, whose bounds include all values that move through them.
+  bool moves;
 
   PlacedGrid density_cells, glow_cells;  ///< without a table
   GridView velocity;
   FieldDrift density_drift, glow_drift;  ///< from the spaces of these cells
-  FieldDrift color_drift;                ///< from the world
+  FieldDrift color_drift;                ///< from world space
   float seconds_open, seconds_span;
 };
 
-/// Volumes that a scene may have: kernels look at one after the other.
+/// Maximum number of volumes of a scene; kernels visit them one after the other.
 inline constexpr size_t kMostVolumes = 65536;
 
-/// What kernels need of all volumes.
+/// Device view of all volumes.
 struct VolumeView {
   const VolumeRecord* volumes = nullptr;
   uint32_t count = 0;
   uint32_t first_material = 0;  ///< volume i has material first_material + i
-  bool emits = false;           ///< some do
+  bool emits = false;           ///< some volume emits
 };
 
-/// Throws Error with one line that names the volume.
+/// Throws Error with one line that names the volume if a value is invalid.
 void check_volume(const Volume& volume);
 VolumeRecord make_volume_record(const Volume& volume);
-/// Corners of the cells that a volume fills, in the world.
+/// Returns the world-space corners of the box of cells that a volume fills.
 std::array<Vec3<float>, 8> volume_corners(const Volume& volume);
 
 }  // namespace wavecomb

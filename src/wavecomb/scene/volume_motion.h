@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What bounds the fields of a volume whose velocities move them while the shutter is open.
+/// Bounds of the fields of a volume that a velocity field moves while the shutter is open.
 #pragma once
 
 #include <array>
@@ -11,25 +11,26 @@
 
 namespace wavecomb {
 
-/// Cells of a field that moves: cubes of the space that it may come to, by its own bricks.
+/// Bounding cells of a moving field: cubes of the space that it can reach, in units of its bricks.
 struct MovedCells {
-  std::array<double, 3> first{};   ///< where they begin, in bricks of the field
-  double edge = 1;                 ///< of a cell, in bricks of the field
-  std::array<uint32_t, 3> size{};  ///< cells
-  std::vector<float> most;         ///< by cell: greatest value that a lookup in it can give
+  std::array<double, 3> first{};   ///< lower corner, in bricks of the field
+  double edge = 1;                 ///< edge length of a cell, in bricks of the field
+  std::array<uint32_t, 3> size{};  ///< number of cells
+  std::vector<float> most;         ///< maximum value that a lookup in each cell can return
 
-  /// From cells to bricks of the field.
+  /// Maps cells to bricks of the field.
   WideMap to_bricks() const { return {{first[0], first[1], first[2]}, edge}; }
 };
 
-/// Bounds of a volume's fields over the shutter; the same wherever it is placed. Immutable.
+/// Bounds of the fields of a volume over the shutter interval, the same for all transforms of the
+/// volume. Immutable.
 class VolumeMotion {
  public:
-  /// Of a volume that moves (Volume::moves) and has a density grid.
+  /// Computes the bounds of a volume that moves (Volume::moves) and has a density grid.
   explicit VolumeMotion(const Volume& volume);
 
   const MovedCells& density() const { return density_; }
-  /// Those of density, where there is no such field.
+  /// Returns the bounds of the emission field, or of density if there is no emission field.
   const MovedCells& glow() const { return glow_.most.empty() ? density_ : glow_; }
   size_t bytes() const { return 4 * (density_.most.size() + glow_.most.size()); }
 
@@ -37,10 +38,10 @@ class VolumeMotion {
   MovedCells density_, glow_;
 };
 
-/// Whether the motion of `a` is that of `b`, too.
+/// Returns whether the motion bounds of `a` are valid for `b` as well.
 bool moves_alike(const Volume& a, const Volume& b);
 
-/// Bricks of a field to voxel indices and to the volume's own space.
+/// Maps bricks of a field to the volume's local space.
 WideMap bricks_to_object(const VolumeField& field);
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Affine maps in double precision, for placing grids.
+/// Affine maps in double precision, for volume grids.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Rows of A, each followed by the translation.
+/// An affine map: the rows of A, each followed by its component of the translation.
 struct WideMap {
   double m[3][4];
 
@@ -19,14 +19,14 @@ struct WideMap {
       std::copy(row, row + 4, m[i]);
     }
   }
-  /// x -> origin + scale x.
+  /// Makes the map x -> origin + scale x.
   WideMap(const double (&origin)[3], double scale) : WideMap(Affine{}) {
     for (int i = 0; i < 3; ++i) {
       m[i][i] = scale;
       m[i][3] = origin[i];
     }
   }
-  /// The map that first applies `b`.
+  /// Returns the map that applies `b` first, then this one.
   WideMap after(const WideMap& b) const {
     WideMap r = *this;
     for (int i = 0; i < 3; ++i)
@@ -51,14 +51,14 @@ struct WideMap {
     }
     return r;
   }
-  /// The image of a point.
+  /// Maps a point.
   Vec3<float> point(const Vec3<float>& p) const {
     const auto row = [&](const double (&r)[4]) {
       return static_cast<float>(r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3]);
     };
     return {row(m[0]), row(m[1]), row(m[2])};
   }
-  /// As kernels read it.
+  /// Writes the map as single-precision rows for kernels.
   void put(float (&to)[12]) const {
     for (int i = 0; i < 12; ++i) to[i] = static_cast<float>(m[i / 4][i % 4]);
   }
