@@ -47,21 +47,21 @@ CameraParameter row(const char* name, const char* help) {
   p.kind = static_cast<CameraValueKind>(p.read(Camera{}).index());
   return p;
 }
-/// A number of `least` or more.
+/// Makes the row of a number of at least `least`.
 template <auto kMember>
 CameraParameter number_from(const char* name, double least, const char* help) {
   CameraParameter p = row<kMember>(name, help);
   p.least = least;
   return p;
 }
-/// A number above `least`.
+/// Makes the row of a number above `least`.
 template <auto kMember>
 CameraParameter number_above(const char* name, double least, const char* help) {
   CameraParameter p = number_from<kMember>(name, least, help);
   p.is_above = true;
   return p;
 }
-/// A number that may be infinite.
+/// Makes the row of a number that may be infinite.
 template <auto kMember>
 CameraParameter distance(const char* name, const char* help) {
   CameraParameter p = row<kMember>(name, help);
@@ -140,7 +140,7 @@ bool is_place(const Affine& m) {
   return finite(m) && std::abs(m.determinant()) >= 1e-30f;
 }
 
-constexpr float kHalfTurn = 1.5708f;  ///< pi / 2, with room for rounding
+constexpr float kHalfTurn = 1.5708f;  ///< pi / 2, with tolerance for rounding
 
 }  // namespace
 
@@ -176,7 +176,7 @@ void check_camera(const Camera& camera) {
   for (const Affine& step : camera.steps)
     if (!is_place(step)) throw Error("the camera's motion is singular or not finite; mend it");
   for (const CameraParameter& p : camera_table()) p.check(camera);
-  // What spans several of them.
+  // Checks that involve several parameters.
   const float* w = camera.window;
   if (!(w[0] < w[1]) || !(w[2] < w[3]))
     throw Error("the camera's window is empty; check its aperture and focal length");

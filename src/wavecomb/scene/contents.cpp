@@ -21,10 +21,10 @@ namespace {
 
 using Point = Vec3<float>;
 
-/// Bounds of glass count as smaller by this fraction of their size, so that a table is outside of
-/// the glass that stands on it.
+/// Bounds of glass are shrunk by this fraction of their size, so that a table does not count as
+/// inside the glass that stands on it.
 constexpr float kMargin = 1e-3f;
-/// Tests of bounds and triangles before the search gives up: half a second.
+/// Number of bounds and triangle tests after which the search gives up, about half a second.
 constexpr size_t kMostTests = size_t{1} << 28;
 
 bool overlap(const Bounds& a, const Bounds& b) {
@@ -41,7 +41,7 @@ Point vertex(const Mesh& mesh, size_t i) {
   return {p[0], p[1], p[2]};
 }
 
-/// Whether the faces of a mesh look inwards: the wall of a hollow in glass.
+/// Returns whether the faces of a mesh are oriented inwards, as on the wall of a cavity in glass.
 bool is_hollow(const Mesh& mesh) {
   double volume = 0;
   for (size_t t = 0; t + 2 < mesh.indices.size(); t += 3)
@@ -50,7 +50,8 @@ bool is_hollow(const Mesh& mesh) {
   return volume < 0;
 }
 
-/// The part of a triangle that is within bounds: a convex polygon (Sutherland and Hodgman 1974).
+/// Intersection of a triangle with a box: a convex polygon, clipped after Sutherland and Hodgman
+/// (1974).
 class Clipped {
  public:
   Clipped(const std::array<Point, 3>& triangle, const Bounds& bounds) {
@@ -61,8 +62,8 @@ class Clipped {
       cut([&](const Point& p) { return along(bounds.hi, axis) - along(p, axis); });
     }
   }
-  /// Whether `test` holds of some of its points: the centre, the corners, and where it is large
-  /// beside `bounds`, points between them.
+  /// Returns whether `test` is true for at least one sample point of the polygon: the centre, the
+  /// corners and, if the polygon is large relative to `bounds`, points between them.
   template <typename Test>
   bool any(const Bounds& bounds, const Test& test) const {
     if (count_ == 0) return false;
@@ -76,7 +77,7 @@ class Clipped {
     const Point size = own.hi - own.lo, whole = bounds.hi - bounds.lo;
     const bool large = std::max({size.x / whole.x, size.y / whole.y, size.z / whole.z}) > 0.1f;
     if (test(centre)) return true;
-    // The rays from the centre to the corners, and what is between each and the next one.
+    // Sample the triangle fan around the centre, including the rays to the corners.
     const int steps = large ? 6 : 1;
     const float step = 1.f / static_cast<float>(steps);
     for (size_t i = 0; i < count_; ++i) {
@@ -89,7 +90,7 @@ class Clipped {
   }
 
  private:
-  /// Keeps the side of a plane on which `distance` is not negative.
+  /// Keeps the part of the polygon where `distance` is not negative.
   template <typename Distance>
   void cut(const Distance& distance) {
     std::array<Point, 9> kept;
@@ -108,22 +109,23 @@ class Clipped {
   size_t count_ = 0;
 };
 
-/// An absorbing solid where an instance places it.
+/// An instance of an absorbing solid.
 struct Glass {
   Bounds bounds;  ///< in world space
   uint32_t mesh;
   const Instance* instance;
-  WideMap to_mesh;  ///< from world space
+  WideMap to_mesh;  ///< maps from world space
 };
 
-/// A binary tree of bounds, split at the median of their centres.
+/// Binary tree of bounding boxes, split at the median of their centres.
 class GlassTree {
  public:
   explicit GlassTree(std::vector<Glass> all) : all_(std::move(all)) {
     nodes_.reserve(2 * all_.size() / kLeaf + 2);
     if (!all_.empty()) build(0, all_.size());
   }
-  /// Visits the glass whose bounds overlap `bounds`, until `visit` says yes. Adds to `tests`.
+  /// Calls `visit` for each glass solid whose bounds overlap `bounds` until it returns true, and
+  /// returns whether it did. Adds the number of tests to `tests`.
   template <typename Visit>
   bool any(const Bounds& bounds, size_t& tests, const Visit& visit) const {
     return !all_.empty() && any_below(0, bounds, tests, visit);
@@ -133,8 +135,8 @@ class GlassTree {
   static constexpr size_t kLeaf = 4;
   struct Node {
     Bounds bounds;
-    size_t first, last;  ///< of a leaf: of all_
-    size_t second = 0;   ///< child beside the next node; 0: a leaf
+    size_t first, last;  ///< range of all_, for a leaf
+    size_t second = 0;   ///< second child, the first being the next node; 0 for a leaf
   };
 
   size_t build(size_t first, size_t last) {
@@ -212,7 +214,8 @@ class Search {
     std::optional<TriangleColumns> columns;
   };
 
-  /// Until `visit` says yes, for all meshes of all instances.
+  /// Calls `visit` for all meshes of all instances until it returns true, and returns whether it
+  /// did.
   template <typename Visit>
   bool each_placed(const Visit& visit) {
     for (const uint32_t mesh : groups_[0].meshes)
@@ -248,8 +251,8 @@ class Search {
     if (!hollow) hollow = is_hollow(meshes_[mesh]);
     return *hollow;
   }
-  /// Whether more faces of glass are left than entered on a line from a point to infinity. Those of
-  /// the placed mesh that the point is on do not count.
+  /// Returns whether a point is inside glass: on a line from the point to infinity, more faces of
+  /// glass are left than entered. Faces of the mesh instance that contains the point are ignored.
   bool is_in_glass(const Point& p, uint32_t mesh, const Instance* instance) {
     int left = 0;
     glass_->any(grown({p, p}), tests_, [&](const Glass& g) {
@@ -264,7 +267,7 @@ class Search {
     });
     return left > 0;
   }
-  /// Whether some of a placed mesh is in other glass.
+  /// Returns whether part of a mesh instance is inside other glass.
   bool is_inside(uint32_t mesh, const Instance& instance) {
     const auto is_other = [&](const Glass& g) { return g.mesh != mesh || g.instance != &instance; };
     const Bounds bounds = grown(placed_bounds(mesh, instance));
@@ -290,7 +293,7 @@ class Search {
     }
     return false;
   }
-  /// A flat triangle overlaps nothing.
+  /// Grows bounds slightly, because flat bounds would not overlap anything.
   static Bounds grown(Bounds b) {
     const auto by = [](float x, float y) { return 1e-6f * std::max(std::abs(x), std::abs(y)); };
     const Point d{by(b.lo.x, b.hi.x), by(b.lo.y, b.hi.y), by(b.lo.z, b.hi.z)};

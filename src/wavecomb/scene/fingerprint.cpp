@@ -15,8 +15,8 @@
 namespace wavecomb {
 namespace {
 
-/// FNV-1a over words of eight bytes, finished by MurmurHash3's 64-bit mix. No defence against
-/// somebody who wants two scenes to look alike.
+/// FNV-1a over 64-bit words, finished by the 64-bit mixer of MurmurHash3. Not safe against
+/// deliberate collisions.
 class Hash {
  public:
   void add_bytes(const void* data, size_t size) {
@@ -60,7 +60,7 @@ class Hash {
   void add_one(const Affine& m) { add(m.row[0], m.row[1], m.row[2], m.t); }
   void add_word(uint64_t word) {
     state_ = (state_ ^ word) * 0x100000001b3ull;
-    state_ ^= state_ >> 32;  // so that high bits come down to low ones
+    state_ ^= state_ >> 32;  // feeds high bits back into low bits
   }
 
   uint64_t state_ = 0xcbf29ce484222325ull;
@@ -137,7 +137,8 @@ uint64_t hash_materials(const Scene& scene) {
       WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)
 #undef WAVECOMB_ADD
       h.add(o.transmission_color, o.transmission_depth, o.subsurface_radius, o.thin_walled);
-      // Of what came later, where it says something, so that scenes without it stay themselves.
+      // Hash inputs that were added later only if they are set, so that older scenes keep their
+      // fingerprints.
       if (o.nested_priority != 0) add_named(h, "nested_priority", o.nested_priority);
       const Vec3<float>& scatter = o.transmission_scatter;
       if (scatter.x != 0 || scatter.y != 0 || scatter.z != 0)
@@ -171,7 +172,7 @@ uint64_t hash_textures(const Scene& scene) {
     h.add(v.format, v.channels, v.srgb, v.has_alpha, v.wrap_s, v.wrap_t, v.level_count);
     for (uint32_t l = 0; l < v.level_count; ++l) h.add(v.levels[l].width, v.levels[l].height);
     h.add_bytes(v.texels, texture->bytes());
-    // Tiles are textures of the scene too, so their places say which they are.
+    // Tiles are textures of the scene too, so their indices identify them.
     for (const auto& [number, tile] : texture->tiles())
       for (uint32_t at = 0; at < scene.textures().size(); ++at)
         if (scene.textures()[at] == tile) h.add(number, at);
@@ -194,8 +195,8 @@ void add_value(Hash& h, const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// The values of the table; what a light of its kind has not counts too, but for what another kind
-/// has to itself.
+/// Hashes the rows of the table for a light, including those that its kind does not use, but not
+/// parameters specific to another kind.
 void add_light(Hash& h, const Light& l) {
   h.add(l.kind, l.to_world);
   for (const LightParameter& p : light_table())
@@ -233,7 +234,8 @@ uint64_t hash_lights(const Scene& scene) {
   return h.value();
 }
 
-/// What AOVs call things: meshes, the ways to their instances, materials, lights, light groups.
+/// Hashes the names that AOVs use: meshes, placements of instances, materials, lights, light
+/// groups.
 uint64_t hash_names(const Scene& scene) {
   Hash h;
   const auto add = [&](std::string_view text) { h.add_bytes(text.data(), text.size()); };
@@ -255,8 +257,8 @@ uint64_t hash_names(const Scene& scene) {
   return h.value();
 }
 
-/// Parameters beyond the first ones count where they are not the default, so that cameras keep
-/// their fingerprint where another comes.
+/// Hashes later parameters only if they are not the default, so that cameras keep their
+/// fingerprints when parameters are added.
 uint64_t hash_camera(const Scene& scene) {
   Hash h;
   const Camera& c = scene.camera();

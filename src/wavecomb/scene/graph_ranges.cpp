@@ -19,8 +19,9 @@ bool bounded(const ValueRange& r) {
   return std::isfinite(r.low) && std::isfinite(r.high);
 }
 
-/// Of a function that is monotonic in each of its operands, whatever the others are, as sums and
-/// products are: rounding keeps the order, so that the ends are at ends of the operands.
+/// Returns the range of a function that is monotonic in each operand for all values of the others,
+/// like a sum or product. Rounding preserves order, so the extremes lie at the ends of the
+/// operands' ranges.
 template <typename Function>
 ValueRange at_ends(const Function& f, const ValueRange& a, const ValueRange& b,
                    const ValueRange& c = exactly(0)) {
@@ -29,12 +30,12 @@ ValueRange at_ends(const Function& f, const ValueRange& a, const ValueRange& b,
   for (const float x : {a.low, a.high})
     for (const float y : {b.low, b.high})
       for (const float z : {c.low, c.high}) r = hull(r, exactly(f(x, y, z)));
-  if (!bounded(r)) return {};  // what overflows may be NaN in the end
+  if (!bounded(r)) return {};  // an overflow may lead to NaN later
   r.nan = a.nan || b.nan || c.nan;
   return r;
 }
 
-// Of core/lanes.h: `b` where either is NaN.
+// min and max as in core/lanes.h, which return `b` if either operand is NaN.
 ValueRange min_of(const ValueRange& a, const ValueRange& b) {
   const ValueRange r{std::min(a.low, b.low), std::min(a.high, b.high), b.nan};
   return a.nan ? hull(r, b) : r;
@@ -50,20 +51,20 @@ ValueRange abs_of(const ValueRange& a) {
   return {crosses ? 0.f : std::min(std::abs(a.low), std::abs(a.high)), most, a.nan};
 }
 
-/// `b` where `a` is not 0, else `c`.
+/// Range of "`b` if `a` is not 0, else `c`".
 ValueRange select_of(const ValueRange& a, const ValueRange& b, const ValueRange& c) {
   if (!a.nan && a.low == 0 && a.high == 0) return c;
   return a.low > 0 || a.high < 0 ? b : hull(b, c);
 }
 
-/// 1 where `a` is below `b`, else 0.
+/// Range of "1 if `a` is below `b`, else 0".
 ValueRange less_of(const ValueRange& a, const ValueRange& b) {
   if (!a.nan && !b.nan && a.high < b.low) return exactly(1);
   return {0, a.low >= b.high ? 0.f : 1.f, false};
 }
 
 ValueRange divide_of(const ValueRange& a, const ValueRange& b) {
-  // Of one sign, so that the quotient has its ends at theirs.
+  // A divisor of one sign makes the quotient monotonic.
   if (b.low <= 0 && b.high >= 0) return {};
   return at_ends([](float x, float y, float) { return x / y; }, a, b);
 }

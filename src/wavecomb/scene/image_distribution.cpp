@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The densities that lights with pictures are sampled by.
+/// Sampling densities of lights with textures.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -13,10 +13,10 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kMaxWidth = 1024, kMaxDomeHeight = 512, kMaxRectHeight = 1024;
-/// Rows of texels that are read at once.
+/// Number of texel rows that are read in parallel.
 constexpr uint32_t kRows = 256;
-/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps; parts of one cell
-/// sum to 1.
+/// Calls `add(cell, part)` for each of `cells` cells that texel i of n overlaps. The parts of one
+/// cell sum to 1.
 template <typename Add>
 void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
   const uint64_t begin = i * cells, end = begin + cells;  // in units of 1 / (n cells)
@@ -26,7 +26,8 @@ void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
   }
 }
 
-/// The neighbour of texel i that a bilinear tap reads, -1 or +1 away; size where it is black.
+/// Returns the neighbour of texel i that a bilinear lookup reads, with `step` -1 or +1; `size` if
+/// that neighbour is black.
 uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
   const bool off = step < 0 ? i == 0 : i + 1 == size;
   if (!off) return step < 0 ? i - 1 : i + 1;
@@ -34,8 +35,8 @@ uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
   return wrap == Wrap::kBlack ? size : i;
 }
 
-/// Luminance of rows of an image, each averaged over columns of cells. A function that is linear
-/// between texel centres has the mean (a + 6 b + c) / 8 over the texel b between a and c.
+/// Luminance of rows of an image, averaged over columns of cells. A function that is linear between
+/// texel centres has the mean (a + 6 b + c) / 8 over texel b between a and c.
 class RowMeans {
  public:
   RowMeans(const TextureView& texture, const Vec3<float>& color, uint32_t cells)
@@ -71,9 +72,10 @@ class RowMeans {
   uint32_t cells_;
 };
 
-/// Cumulative counts of the given weights: each lit entry, and the last one, has one count, and the
-/// others go by weight. So no lit entry is missed, no dark one is chosen but the last, and the
-/// count 65536 never stands before an entry. Returns the sum of the weights.
+/// Writes cumulative counts of the given weights. Each entry of positive weight, and the last
+/// entry, gets one count; the remaining counts are distributed by weight. So every such entry can
+/// be selected, no other entry can be except the last, and no cumulative count reaches 65536.
+/// Returns the sum of the weights.
 double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   const size_t n = weights.size();
   double sum = 0;
@@ -94,8 +96,7 @@ double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   return sum;
 }
 
-/// Means of the bilinear luminance over the cells of a grid, row 0 at the top. `wrap`: what is
-/// above the top and below the bottom.
+/// Mean bilinear luminance over each cell of a grid, row 0 at the top.
 struct Cells {
   uint32_t width, height;
   std::vector<double> mean;
@@ -105,13 +106,14 @@ struct Cells {
   }
 };
 
+/// Computes the cells; `wrap` determines the rows above the top and below the bottom.
 Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t most_height,
                  Wrap wrap) {
   const uint32_t width = texture.levels[0].width, height = texture.levels[0].height;
   Cells cells{std::min(width, kMaxWidth), std::min(height, most_height), {}};
   cells.mean.assign(size_t{cells.width} * cells.height, 0.0);
   const RowMeans means(texture, color, cells.width);
-  std::vector<std::vector<double>> some(std::min(height, kRows));  // means of the next rows
+  std::vector<std::vector<double>> some(std::min(height, kRows));  // RowMeans of the next rows
   const auto mean_of = [&](uint32_t y) {
     if (y % kRows == 0)
       parallel_for(std::min(kRows, height - y),
@@ -123,7 +125,7 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
     if (y == height) return std::vector<double>(cells.width, 0.0);
     return wrap == Wrap::kRepeat ? means(y) : edge;
   };
-  // Rows above and below bleed in as in RowMeans.
+  // Bilinear lookups blend adjacent rows, as in RowMeans.
   std::vector<double> row = mean_of(0), above = beside(-1, row), below;
   for (uint32_t y = 0; y < height; ++y) {
     below = y + 1 < height ? mean_of(y + 1) : beside(1, row);
@@ -138,7 +140,8 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
   return cells;
 }
 
-/// The density of cells times `part(y)`, the measure of a row. Width 0: all is black.
+/// Makes the density of cells times `part(y)`, the measure of a row. The width is 0 if all cells
+/// are black.
 template <typename Part>
 Distribution2D make_distribution(const Cells& cells, const Part& part) {
   using Line = Distribution2D::Line;
@@ -175,7 +178,7 @@ Distribution2D make_distribution(const Cells& cells, const Part& part) {
   return d;
 }
 
-/// Sum over cells of probability^2 / `size(y)`, the measure of a cell of the row.
+/// Returns the sum over cells of probability^2 / `size(y)`, the measure of a cell in row y.
 template <typename Size>
 double squares(const Distribution2D& d, const Size& size) {
   const auto value = [&](size_t row, uint32_t i) {
@@ -200,8 +203,9 @@ double squares(const Distribution2D& d, const Size& size) {
 }  // namespace
 
 Distribution2D build_dome_distribution(const TextureView& texture, const Vec3<float>& color) {
-  const Cells cells = cell_means(texture, color, kMaxDomeHeight, Wrap::kClamp);  // of the poles
-  // The mean of the sine over the row, times its height: cos(top) - cos(bottom).
+  // Clamped at the poles.
+  const Cells cells = cell_means(texture, color, kMaxDomeHeight, Wrap::kClamp);
+  // The integral of the sine over the row: cos(top) - cos(bottom).
   return make_distribution(cells, [&](uint32_t y) {
     return std::cos(std::numbers::pi * y / cells.height) -
            std::cos(std::numbers::pi * (y + 1) / cells.height);

@@ -12,7 +12,7 @@ namespace wavecomb {
 
 namespace {
 
-/// Colours of transmission count as no darker than this.
+/// Lower limit of transmission colours, which keeps their logarithm finite.
 constexpr float kDarkestTransmission = 1e-6f;
 constexpr float kMostInteriorCosine = 0.99f;
 
@@ -24,8 +24,9 @@ bool is_solid(const Material& m) {
   return m.program == ProgramId::kOpenPbr && !m.openpbr.thin_walled;
 }
 
-/// Of a channel, per OpenPBR 1.1, "Translucent base": extinction is -ln(colour) / depth, scattering
-/// its share of 1 / depth; what is left absorbs, and may be negative still.
+/// Returns the coefficients of one channel after OpenPBR 1.1, "Translucent base": extinction is
+/// -ln(colour) / depth, scattering is scatter / depth, and absorption is the difference, which may
+/// still be negative.
 Coefficients raw_coefficients(float color, float scatter, float depth) {
   const float extinction = -std::log(std::clamp(color, kDarkestTransmission, 1.f)) / depth;
   const float scattering = std::max(scatter, 0.f) / depth;
@@ -38,7 +39,7 @@ void set_medium(const OpenPbr& o, InteriorMedium<float>& out) {
   Coefficients k[3] = {raw_coefficients(c.x, s.x, o.transmission_depth),
                        raw_coefficients(c.y, s.y, o.transmission_depth),
                        raw_coefficients(c.z, s.z, o.transmission_depth)};
-  // Where one would be negative, grey is added to all.
+  // A negative absorption is raised to 0 by adding the same amount to all channels.
   const float least = std::min({k[0].absorption, k[1].absorption, k[2].absorption, 0.f});
   out.absorption = {k[0].absorption - least, k[1].absorption - least, k[2].absorption - least};
   out.scattering = {k[0].scattering, k[1].scattering, k[2].scattering};
@@ -50,7 +51,7 @@ bool is_any(const Vec3<float>& v) {
   return v.x > 0 || v.y > 0 || v.z > 0;
 }
 
-/// Whether the surface itself does nothing with light.
+/// Returns whether the surface neither reflects, refracts, tints nor emits light.
 bool is_clear(const Material& m) {
   const OpenPbr& o = m.openpbr;
   const Vec3<float>& c = o.transmission_color;

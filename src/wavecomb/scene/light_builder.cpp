@@ -15,7 +15,7 @@ namespace wavecomb {
 
 namespace {
 
-/// A power that can be compared with others.
+/// Makes a power finite and not negative, so that it can be compared with others.
 double sane_power(double power) {
   const bool sane = std::isfinite(power) && power > 0;
   return sane ? power : (power > 0 ? 1e300 : 0);
@@ -38,7 +38,7 @@ void put_profiles(LightSet& set, std::span<const IesProfile> profiles) {
   }
 }
 
-/// The triangles of `set`, whose powers go to `powers`.
+/// Makes the triangles of `set` and writes their powers to `powers`.
 void make_triangles(LightSet& set, size_t count, const TriangleSource& source, double* powers) {
   constexpr size_t kChunk = 4096;
   const size_t chunks = (count + kChunk - 1) / kChunk;

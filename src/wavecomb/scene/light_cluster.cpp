@@ -21,12 +21,12 @@ LightCluster empty_at(const float (&p)[3]) {
   return c;
 }
 
-/// Words of a unit vector's components: 65536 steps from -1 to 1.
+/// Quantizes a component of a unit vector: 65536 steps from -1 to 1.
 uint32_t steps(double x) {
   return static_cast<uint32_t>(std::nearbyint(std::clamp(x * 0.5 + 0.5, 0.0, 1.0) * 65535));
 }
 
-/// sin(angle / 2) in steps, upwards.
+/// Quantizes sin(angle / 2), rounding up.
 uint32_t half_sine(double angle, uint32_t most) {
   const double s = std::sin(std::clamp(angle, 0.0, std::numbers::pi) / 2) * most;
   return std::min(most, static_cast<uint32_t>(std::ceil(s)));
@@ -87,7 +87,8 @@ DirectionCone unite(const DirectionCone& a, const DirectionCone& b) {
   }
   const double all = wide.two_sided ? std::numbers::pi / 2 : std::numbers::pi;
   if (!(angle < all) || !(length2 > 1e-10)) {
-    // Of opposite axes there is no way that is shorter. Equal ones leave the wider as it is.
+    // For opposite axes every rotation is equally long, so use all directions. Nearly equal axes
+    // keep the axis of the wider cone.
     wide.angle =
         cosine < 0 || angle >= all ? std::numbers::pi : std::max(wide.angle, other.angle + between);
     return wide;
@@ -120,7 +121,7 @@ LightCluster bound_light(const LightRecord& light, double power) {
 
 LightCluster bound_light(const TriangleLight& light, double power) {
   LightCluster c = bound_corners(light.p, light.u, light.v, false);
-  c.intensity = power / (2 * std::numbers::pi);  // to either side
+  c.intensity = power / (2 * std::numbers::pi);  // emitted on each side
   c.emission = std::numbers::pi / 2;
   c.normals.two_sided = true;
   const double m[3] = {double{light.m[0]}, double{light.m[1]}, double{light.m[2]}};

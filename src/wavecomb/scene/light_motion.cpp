@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// Looks at a way between two steps that bounds are made of.
+/// Number of poses between two steps at which bounds are computed.
 constexpr int kLooks = 8;
 
 using Matrix = double[3][3];
@@ -24,7 +24,7 @@ void set_linear(Matrix& m, const Affine& a) {
   }
 }
 
-/// The inverse of m, transposed; false where there is none.
+/// Computes the transposed inverse of m; returns false if m is singular.
 bool invert_transposed(const Matrix& m, Matrix& out) {
   for (int i = 0; i < 3; ++i) {
     const int a = (i + 1) % 3, b = (i + 2) % 3;
@@ -40,8 +40,9 @@ bool invert_transposed(const Matrix& m, Matrix& out) {
   return true;
 }
 
-/// The turn nearest to `to` after the inverse of `from`: N. Higham, "Computing the Polar
-/// Decomposition", 1986, by Newton's steps X <- (X + X^-T) / 2. None where there is no such.
+/// Computes the rotation closest to `to` times the inverse of `from`, by polar decomposition with
+/// Newton steps X <- (X + X^-T) / 2 (N. Higham, "Computing the Polar Decomposition", 1986). Returns
+/// false if there is none.
 bool turn_between(const Affine& from, const Affine& to, Matrix& x) {
   Matrix a, b, inverse;
   set_linear(a, from);
@@ -58,10 +59,10 @@ bool turn_between(const Affine& from, const Affine& to, Matrix& x) {
   const double det = x[0][0] * (x[1][1] * x[2][2] - x[1][2] * x[2][1]) -
                      x[0][1] * (x[1][0] * x[2][2] - x[1][2] * x[2][0]) +
                      x[0][2] * (x[1][0] * x[2][1] - x[1][1] * x[2][0]);
-  return det > 0.5;  // what mirrors on its way has no turn
+  return det > 0.5;  // A reflection is not a rotation
 }
 
-/// The unit quaternion of a turn, on the side of `before`.
+/// Writes the unit quaternion of a rotation, with the sign that is closer to `before`.
 void put_turn(const Matrix& m, const float (&before)[4], float (&to)[4]) {
   double q[4];
   const double trace = m[0][0] + m[1][1] + m[2][2];
@@ -99,7 +100,7 @@ double dot3(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Runs one(place) at times all along a way.
+/// Calls one(place) for poses at equal times over the whole motion.
 template <typename Function>
 void look_along(const LightMotion& motion, std::span<const LightStep> steps, const Function& one) {
   const uint32_t looks = motion.segments * kLooks;
@@ -197,7 +198,7 @@ Ball along_way(const LightMotion& motion, std::span<const LightStep> steps, cons
     all.centre[i] = 0.5 * (lo[i] + hi[i]);
     reach += (hi[i] - all.centre[i]) * (hi[i] - all.centre[i]);
   }
-  // Between two looks it bends away by less than they are apart.
+  // Between two poses, the path deviates by less than their distance.
   all.radius = (at_rest.radius + std::sqrt(reach) + apart) * (1 + 1e-5);
   return all;
 }

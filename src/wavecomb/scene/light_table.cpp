@@ -18,7 +18,7 @@ namespace {
 constexpr uint32_t kNone = 0xffffffffu;
 static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone && kNoFilter == kNone);
 
-/// A member of a light, or a member of a member.
+/// Returns a member of a light, or a member of such a member.
 template <auto kFirst, auto... kRest, typename Object>
 auto& member(Object& object) {
   if constexpr (sizeof...(kRest) == 0)
@@ -61,7 +61,7 @@ constexpr LightValueKind kValueKind = std::is_same_v<T, float>         ? LightVa
                                       : std::is_enum_v<T> ? LightValueKind::kChoice
                                                           : LightValueKind::kTransforms;
 
-/// A row without limits.
+/// Makes a row without limits.
 template <auto... kPath>
 LightParameter row(const char* name, const char* label, const char* input, const char* help) {
   LightParameter p;
@@ -75,7 +75,7 @@ LightParameter row(const char* name, const char* label, const char* input, const
   return p;
 }
 
-/// Of 0 or more.
+/// Makes the minimum of a row 0.
 LightParameter positive(LightParameter p, double usual) {
   p.least = 0;
   p.usual = usual;
@@ -93,7 +93,8 @@ LightParameter in(LightGroup group, LightParameter p) {
   p.group = group;
   return p;
 }
-/// Of all lights, of those of a trait, or (`in`) of kinds that name it.
+/// Marks a row as a parameter of all lights, of lights with a trait, or (`in`) of kinds that name
+/// it.
 LightParameter all(LightGroup group, LightParameter p) {
   p.is_common = true;
   return in(group, std::move(p));

@@ -20,12 +20,12 @@ namespace {
 
 constexpr uint32_t kNumbers = 1u << 24;
 constexpr size_t kBins = 12;
-/// Effective lights from which on the tree pays (docs/light-selection.md).
+/// Number of effective lights from which a tree reduces noise (docs/light-selection.md).
 constexpr float kLeastForTree = 2;
-/// Ranges that are built apart from one another, and the least lights that are worth it.
+/// Maximum number of ranges built in parallel, and minimum number of lights of a range.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
-/// Three axes side by side; what is in the fourth place does not count.
+/// Vectors of three components; the fourth is unused.
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = int32_t __attribute__((vector_size(16)));
 
@@ -36,13 +36,13 @@ Float4 most_of(const Float4& a, const Float4& b) {
   return a < b ? b : a;
 }
 
-/// A light of the tree, as splitting sees it.
+/// A light of the tree as the split heuristic sees it.
 struct alignas(16) Item {
   float lo[3];
   uint32_t light;
   float hi[3];
   float intensity;
-  float axis[4];  ///< of its normals, times (1 + cos of their cone) / 2; then 0
+  float axis[4];  ///< axis of its normals times (1 + cos of their cone) / 2; then 0
 
   float centre(size_t k) const { return 0.5f * lo[k] + 0.5f * hi[k]; }
   Float4 low() const {
@@ -63,7 +63,7 @@ struct alignas(16) Item {
 };
 static_assert(sizeof(Item) == 48);
 
-/// Sums over items from which a split is judged.
+/// Sums over items from which a split is evaluated.
 struct Bin {
   Float4 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = {-INFINITY, -INFINITY, -INFINITY, 0};
   Float4 axis = {0, 0, 0, 0};
@@ -71,7 +71,7 @@ struct Bin {
   size_t count = 0;
 
   void add(const Item& item) {
-    // Normals of triangles have no sign: both sides shine.
+    // The normals of triangles have no sign, since both sides emit.
     const Float4 other = item.normals(), product = axis * other;
     const int32_t flip = product[0] + product[1] + product[2] < 0 ? INT32_MIN : 0;
     merge(item.low(), item.high(),
@@ -93,8 +93,8 @@ struct Bin {
   }
 };
 
-/// Solid angle, weighed by cosine, that lights with normals in a cone of that angle shine into,
-/// which are pi / 2 off their normals at most (Conty Estevez and Kulla 2018, eq. 1).
+/// Returns the cosine-weighted solid angle that lights emit into, for normals in a cone of the
+/// given angle and emission up to pi / 2 from each normal (Conty Estevez and Kulla 2018, eq. 1).
 double emission_measure(double angle) {
   const double reach = std::min(angle + std::numbers::pi / 2, std::numbers::pi);
   return 2 * std::numbers::pi * (1 - std::cos(angle)) +
@@ -103,7 +103,7 @@ double emission_measure(double angle) {
               2 * angle * std::sin(angle) + std::cos(angle));
 }
 
-/// The measure by the cosine of the angle, from -1 to 1.
+/// Table of emission_measure by the cosine of the angle, from -1 to 1.
 class MeasureTable {
  public:
   MeasureTable() {
@@ -120,9 +120,9 @@ class MeasureTable {
   std::array<double, kSteps + 1> values_;
 };
 
-/// The share of a cost that is alike for all splits of a node: intensity x bound x orientation. The
-/// bound is a sphere, of which half the square of the diagonal is a measure. The mean of vectors
-/// spread over a cone has the length (1 + cos) / 2.
+/// Returns the part of a split's cost that depends on one side: intensity x bound x orientation.
+/// The bound is a sphere, whose area is proportional to the square of the diagonal. The mean of
+/// vectors spread over a cone has the length (1 + cos) / 2.
 double cost(const Bin& bin, const MeasureTable& measure) {
   double diagonal2 = 0, sum2 = 0;
   for (size_t k = 0; k < 3; ++k) {
@@ -134,10 +134,10 @@ double cost(const Bin& bin, const MeasureTable& measure) {
   return bin.intensity * diagonal2 * measure(cosine);
 }
 
-/// Where a range is cut, and the way to it from the root.
+/// A range of items and its node, with the path to it from the root.
 struct Range {
   size_t begin, end;
-  uint32_t place;  ///< node
+  uint32_t place;  ///< node index
   uint32_t depth, trail;
   size_t size() const { return end - begin; }
 };
@@ -147,12 +147,12 @@ class Builder {
   Builder(const LightSet& set, std::vector<Item> items, double total, LightTree& tree)
       : set_(set), items_(std::move(items)), scale_(1 / total), tree_(tree) {}
 
-  /// Splits from the root until there is a task for each thread, builds those, joins them up.
+  /// Splits from the root until there are enough tasks, builds these in parallel, and joins them.
   void run(std::span<const double> powers) {
     powers_ = powers;
     struct Top {
       Range range;
-      size_t below = 0;  ///< first of its two children; 0: a task
+      size_t below = 0;  ///< index of the first of its two children; 0 for a task
       LightCluster cluster;
     };
     std::vector<Top> tops{{{0, items_.size(), 0, 0, 0}, 0, {}}};
@@ -182,7 +182,8 @@ class Builder {
   }
 
  private:
-  /// Halves of a range. Nodes are depth first, a range of n items has n - 1.
+  /// Returns the halves of a range. Nodes are stored depth first, and a range of n items has n - 1
+  /// nodes.
   static std::pair<Range, Range> children(const Range& r, size_t cut) {
     const auto left_nodes = static_cast<uint32_t>(cut - r.begin - 1);
     return {{r.begin, cut, r.place + 1, r.depth + 1, r.trail},
@@ -212,7 +213,7 @@ class Builder {
     return c;
   }
 
-  /// Puts the items of the left half first and returns where the right one begins.
+  /// Moves the items of the left half to the front and returns the start of the right half.
   size_t split(const Range& r) {
     const std::span<Item> items(items_.data() + r.begin, r.size());
     if (items.size() == 2) return r.begin + 1;
@@ -228,12 +229,12 @@ class Builder {
     const auto bins_of = [&](const Item& item) {
       const Float4 at = (item.middle() - lo) / extents * static_cast<float>(bins);
       const Float4 zero = {0, 0, 0, 0}, last = zero + static_cast<float>(bins - 1);
-      const Float4 up = at > zero ? at : zero;  // not of NaN
+      const Float4 up = at > zero ? at : zero;  // also maps NaN to 0
       return __builtin_convertvector(least_of(last, up), Int4);
     };
     const bool has_room = r.depth + std::bit_width(items.size() - 1) < kMaxTreeDepth;
     if (!has_room || !std::isfinite(longest)) return halve(r, items, lo, hi);
-    // All axes in one pass: their sums wait for one another less, and items are read once.
+    // Fill the bins of all axes in one pass, which reads each item once.
     std::array<std::array<Bin, kBins>, 3> table;
     for (std::array<Bin, kBins>& of : table) std::fill_n(of.begin(), bins, Bin{});
     for (const Item& item : items) {
@@ -256,7 +257,7 @@ class Builder {
       for (size_t i = bins - 1; i > 0; --i) {
         sum.add(of[i]);
         if (sum.count == 0 || sum.count == items.size()) continue;
-        // Thin bounds are of no use: the regularity factor of the paper.
+        // The regularity factor of the paper penalizes thin bounds.
         const double all = (left[i - 1] + cost(sum, measure_)) * double{longest / extent};
         if (!(all < least)) continue;
         least = all;
@@ -271,7 +272,8 @@ class Builder {
     return r.begin + static_cast<size_t>(middle - items.begin());
   }
 
-  /// In the middle of the longest axis: for lights at one place, or where the tree gets deep.
+  /// Splits at the median of the longest axis, for lights at the same position or a tree of large
+  /// depth.
   static size_t halve(const Range& r, std::span<Item> items, const Float4& lo, const Float4& hi) {
     size_t axis = 0;
     for (size_t k = 1; k < 3; ++k)
@@ -296,7 +298,7 @@ class Builder {
  private:
   const LightSet& set_;
   std::vector<Item> items_;
-  double scale_;  ///< of intensities
+  double scale_;  ///< factor of intensities
   LightTree& tree_;
   std::span<const double> powers_;
   MeasureTable measure_;
@@ -313,7 +315,7 @@ Item make_item(const LightCluster& c, uint32_t light, double scale) {
   return item;
 }
 
-/// Divides the 2^24 numbers among the tree and the infinite lights that shine.
+/// Distributes the 2^24 random numbers among the tree and the infinite lights that emit.
 void share_numbers(const LightSet& set, std::span<const double> powers, size_t lit_in_tree,
                    LightTree& tree) {
   const size_t infinite = set.infinite_count;
@@ -331,12 +333,13 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t l
     if (!(powers[i] > 0)) continue;
     const double share =
         (1 - floor_share) * (powers[i] / largest / total) + floor_share / static_cast<double>(lit);
-    // The tree keeps one number in a thousand, so that lamps in the open are found at all.
+    // The tree keeps at least one number in a thousand, so that finite lights are sampled even
+    // under a bright dome.
     const uint32_t most = left - (lit_in_tree > 0 ? kNumbers / 1000 : 0);
     numbers[i] = std::min(most, 1 + static_cast<uint32_t>(share * (kNumbers - 1)));
     left -= numbers[i];
   }
-  if (lit_in_tree == 0 && left < kNumbers)  // what rounding has left
+  if (lit_in_tree == 0 && left < kNumbers)  // Remainder of rounding
     *std::find_if(numbers.rbegin(), numbers.rend(), [](uint32_t n) { return n > 0; }) += left;
   tree.numbers = lit_in_tree > 0 ? left : 0;
   uint32_t end = tree.numbers;
@@ -346,7 +349,7 @@ void share_numbers(const LightSet& set, std::span<const double> powers, size_t l
   }
 }
 
-/// Sum of powers relative to the largest, and that.
+/// Returns the sum of powers relative to the largest, and the largest power.
 std::pair<double, double> total_power(std::span<const double> powers) {
   double total = 0, largest = 0;
   for (const double power : powers) largest = std::max(largest, power);

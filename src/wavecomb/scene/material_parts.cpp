@@ -11,7 +11,7 @@ namespace wavecomb {
 uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const TexturePtr> textures,
                   bool may_walk) {
   const DrivenRanges driven = driven_ranges(graphs, m.graph, textures);
-  // What a graph drives takes the place of a texture, and that the place of a constant.
+  // Graphs override textures, and textures override constants.
   const auto may_pass = [&](const char* parameter, float limit, bool otherwise) {
     const auto& range = driven[graph_parameter(parameter)];
     return range ? range->low < limit || range->high > limit : otherwise;
@@ -31,7 +31,7 @@ uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const Tex
   add(kMetals, m.specular_workflow || above_0("metallic", shown(Input::kMetallic, m.metallic)));
   add(kCoats, above_0("clearcoat", shown(Input::kClearcoat, m.clearcoat)));
   if (m.program == ProgramId::kPrincipled) {
-    // What is presence is none of the BSDF's.
+    // Opacity as presence is handled by ray traversal, not by the BSDF.
     const bool is_presence = m.opacity_threshold > 0 || (m.presence && m.needs_presence());
     add(kPasses, !is_presence && may_pass("opacity", 1, m.opacity != 1 || m.opacity_varies()));
   }

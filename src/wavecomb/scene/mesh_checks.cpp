@@ -13,7 +13,7 @@
 namespace wavecomb {
 namespace {
 
-/// Attribute arrays must have 'arity' floats per vertex or per corner.
+/// Throws Error unless an attribute array has `arity` floats per vertex or per corner.
 void check_attribute(const Mesh& mesh, std::span<const float> values, Attribute at, size_t arity,
                      const char* what) {
   if (at == Attribute::kNone) return;

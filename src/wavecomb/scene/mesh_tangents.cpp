@@ -13,9 +13,10 @@ namespace wavecomb {
 namespace {
 
 using V = Vec3<float>;
-/// Triangles whose tangents are worked out before they are added up: bounds the scratch memory.
+/// Number of triangles whose tangents are computed before they are summed, which bounds the scratch
+/// memory, and number of triangles of a task.
 constexpr size_t kBatch = 65536, kPiece = 1024;
-/// A mean shorter than this share of its weights says nothing.
+/// A mean shorter than this fraction of its weights has no reliable direction.
 constexpr float kLeastMean = 1e-2f;
 
 V unit(const V& v) {
@@ -23,7 +24,7 @@ V unit(const V& v) {
   return len2 > 0 && std::isfinite(len2) ? v * (1 / std::sqrt(len2)) : V(0.f);
 }
 
-/// A mesh's arrays by corner.
+/// Corner-wise access to the arrays of a mesh.
 class Corners {
  public:
   explicit Corners(const Mesh& mesh) : mesh_(mesh) {}
@@ -39,12 +40,12 @@ class Corners {
   V normal(size_t corner, uint32_t step) const {
     return row(mesh_.normals, place(mesh_.normals_at, corner), step);
   }
-  /// Twice the area of a triangle in the texture, below 0 where it is mirrored.
+  /// Returns twice the signed area of a triangle in texture space, negative if it is mirrored.
   float uv_area(size_t triangle) const {
     const auto a = uv(3 * triangle), b = uv(3 * triangle + 1), c = uv(3 * triangle + 2);
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
   }
-  /// dp/du of a triangle, unit, or zero.
+  /// Returns the unit dp/du of a triangle, or zero.
   V tangent(size_t triangle, uint32_t step) const {
     const auto a = uv(3 * triangle), b = uv(3 * triangle + 1), c = uv(3 * triangle + 2);
     const V p = position(3 * triangle, step);
@@ -67,7 +68,7 @@ class Corners {
   const Mesh& mesh_;
 };
 
-/// What three corners of a triangle add to their means.
+/// Returns the contributions of a triangle to the mean tangents of its corners.
 std::array<V, 3> contributions(const Corners& at, size_t triangle, uint32_t step) {
   std::array<V, 3> out;
   const V t = at.tangent(triangle, step);
@@ -84,14 +85,14 @@ std::array<V, 3> contributions(const Corners& at, size_t triangle, uint32_t step
   return out;
 }
 
-/// Corners that share a tangent.
+/// Group of corners that share a tangent.
 struct Share {
-  uint32_t corner;  ///< the first of them
-  uint32_t next;    ///< another one of the same vertex, or kNone
+  uint32_t corner;  ///< the first corner of the group
+  uint32_t next;    ///< another group at the same vertex, or kNone
 };
 constexpr uint32_t kNone = 0xffffffffu;
 
-/// Which corners share tangents: gives the number of each corner's in `of_corner`.
+/// Groups the corners that share tangents, and writes the group of each corner to `of_corner`.
 std::vector<Share> share_corners(const Mesh& mesh, const Corners& at,
                                  std::vector<uint32_t>& of_corner) {
   std::vector<Share> shares;
@@ -99,7 +100,7 @@ std::vector<Share> share_corners(const Mesh& mesh, const Corners& at,
   const auto same = [&](size_t a, size_t b) {
     const V n = at.normal(a, 0), m = at.normal(b, 0);
     if (at.uv(a) != at.uv(b) || n.x != m.x || n.y != m.y || n.z != m.z) return false;
-    // What has no area in the texture is on neither side.
+    // A triangle without area in the texture has no orientation and matches both.
     const float s = at.uv_area(a / 3), t = at.uv_area(b / 3);
     return s == 0 || t == 0 || (s < 0) == (t < 0);
   };
@@ -123,7 +124,7 @@ struct Sum {
   float weight = 0;
 };
 
-/// Means of one step, by share.
+/// Returns the mean tangent of each group at one step.
 std::vector<Sum> add_up(const Mesh& mesh, const Corners& at, uint32_t step,
                         const std::vector<uint32_t>& of_corner, size_t share_count) {
   std::vector<Sum> sums(share_count);
@@ -145,7 +146,7 @@ std::vector<Sum> add_up(const Mesh& mesh, const Corners& at, uint32_t step,
   return sums;
 }
 
-/// Whether a material on mesh `m` asks for tangents.
+/// Returns for each mesh whether one of its materials needs tangents.
 std::vector<uint8_t> meshes_that_ask(const SceneGeometry& geometry,
                                      const SceneMaterials& materials) {
   const std::vector<Mesh>& meshes = geometry.meshes;
@@ -157,7 +158,7 @@ std::vector<uint8_t> meshes_that_ask(const SceneGeometry& geometry,
         asks[m] = geometry.any_material(
             m, inherited, [&](uint32_t worn) { return materials.wants_tangents[worn] != 0; });
   };
-  // Groups whose instances are alike are looked at once.
+  // Consecutive instances of the same group and material are visited once.
   look(0, geometry.instance_records[0].material);
   uint32_t group = kNone, material = kNone;
   for (const Instance& i : geometry.instances) {

@@ -9,7 +9,7 @@
 namespace wavecomb {
 namespace {
 
-/// What follows the group's root in a path that begins with it.
+/// Returns the rest of a path that begins with the root of a group.
 std::string_view below(std::string_view path, std::string_view root) {
   const size_t n = root.size();
   if (n > 0 && path.starts_with(root) && (path.size() == n || path[n] == '/'))
@@ -17,13 +17,13 @@ std::string_view below(std::string_view path, std::string_view root) {
   return path;
 }
 
-/// `path` as seen through a placement called `outer` of a group with root `root`.
+/// Returns `path` as seen through a placement called `outer` of a group with root `root`.
 std::string seen_through(std::string outer, std::string_view root, std::string_view path) {
   outer += below(path, root);
   return outer;
 }
 
-/// `name` with "[number]".
+/// Returns `name` followed by "[number]".
 std::string numbered(std::string name, uint32_t number) {
   name += '[';
   name += std::to_string(number);
@@ -31,7 +31,7 @@ std::string numbered(std::string name, uint32_t number) {
   return name;
 }
 
-/// The prim below the stage's root prim: "/World/Box" of "/World/Box/Lid".
+/// Returns the prim below the stage's root prim: "/World/Box" for "/World/Box/Lid".
 std::string second_level(const std::string& path) {
   const size_t first = path.find('/', 1);
   if (first == std::string::npos) return path;
@@ -67,7 +67,7 @@ ObjectNames::ObjectNames(const Scene& scene) : scene_(scene) {
 }
 
 ObjectNames::Found ObjectNames::find(uint32_t index) const {
-  // Instances without meshes share their first object with the next one: the last is meant.
+  // Instances without meshes have the same first object as the next one, so take the last.
   const auto next = std::upper_bound(first_object_.begin(), first_object_.end(), index);
   const auto instance = static_cast<uint32_t>(next - first_object_.begin() - 1);
   const uint32_t group = instance == 0 ? 0 : scene_.instances()[instance - 1].group;
@@ -116,7 +116,7 @@ std::string ObjectNames::asset(uint32_t index) const {
     if (placement.name == kNoName) continue;
     const PlacementName name = scene_.names()[placement.name];
     if (name.asset_length == 0) continue;
-    // The whole name of one of several: the asset is that one.
+    // If the name of one of several instances names the asset, the asset is that instance.
     if (name.asset_length == name.text.size()) return placement_name(p);
     return seen_through(placement_name(placement.parent), parent_root(placement),
                         name.text.substr(0, name.asset_length));

@@ -8,7 +8,7 @@
 namespace wavecomb {
 namespace {
 
-/// Whether an object is a prim, or in it.
+/// Returns whether an object is at or below a prim.
 bool is_in(std::string_view object, std::string_view prim) {
   if (!object.starts_with(prim)) return false;
   return object.size() == prim.size() || object[prim.size()] == '/' || object[prim.size()] == '[';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The table that a light is chosen by power with.
+/// Alias tables for light selection by power.
 #include <algorithm>
 #include <cmath>
 
@@ -12,15 +12,16 @@ namespace {
 
 constexpr size_t kBand = size_t{1} << 16;
 
-/// Fills the bins of one group: light i has numbers[i] of the bins' 2^shift each, which they sum
-/// to. From the last bin on, each that is not full gets what it lacks from the last one that has
-/// more; if that then lacks something itself, it is the next to get it.
+/// Fills the alias bins of one group: light i gets numbers[i] of the 2^shift random numbers of each
+/// bin, all of which they use up. Processes bins from the last to the first. A bin that is not full
+/// takes the rest from the last bin with a surplus; if that bin then has a deficit, it is processed
+/// next.
 void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
   const uint32_t size = 1u << shift;
   const auto given = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
-  for (uint32_t b = 0; b < bins.size(); ++b) bins[b] = b << shift;  // full
+  for (uint32_t b = 0; b < bins.size(); ++b) bins[b] = b << shift;  // all full
   size_t next = bins.size(), rich = bins.size();
-  uint32_t left = size;  // of bin `rich`
+  uint32_t left = size;  // surplus of bin `rich`
   for (;;) {
     while (next > 0 && given(next - 1) >= size) --next;
     if (next == 0) return;
@@ -51,15 +52,15 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
   };
   const size_t lit = count_lit(weights), lit_of[2] = {count_lit(groups[0]), count_lit(groups[1])};
   PickTable table;
-  if (lit == 0) {  // number 0 for all; some table
+  if (lit == 0) {  // no random number selects a light; any table will do
     table.split = first_triangle > 0 ? kNumbers : 0;
     table.shift[0] = table.shift[1] = 24;
     bins.assign(1, 0);
     return table;
   }
 
-  // One number in a hundred goes by heads, so that weak lights near by are found. (Every lit light
-  // has one of the 2^24 besides.)
+  // One random number in a hundred is distributed evenly, so that weak nearby lights are sampled.
+  // In addition, every light that emits gets one of the 2^24 numbers.
   constexpr double floor_share = 0.01;
   const double largest = *std::max_element(weights.begin(), weights.end());
   std::vector<double> shares(n);
@@ -79,8 +80,8 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
                                  : 0;
   });
 
-  // The numbers of a group are a multiple of those of its bins, and there are bins for all its
-  // lights. Few and large bins stay in the cache; 1024 for all numbers divide them well enough.
+  // Each group gets a multiple of the numbers of its bins, and at least one bin per light. Few
+  // large bins stay in the cache; 1024 bins for all numbers give enough resolution.
   const auto least = [&](size_t g, uint32_t shift) {
     const uint64_t units = (groups[g].size() + (size_t{1} << shift) - 1) >> shift;
     return lit_of[g] > 0 ? units << shift : 0;
@@ -104,7 +105,8 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     double running = 0;
     for (double& share : shares_of[g]) share = running += share;
     const double all = running;
-    // One number each, and the others by share: rounding the running sum makes the sum exact.
+    // Each light gets one number, and the rest by probability. Rounding the running sum makes the
+    // total exact.
     const auto free = static_cast<double>(numbers_of[g] - lit_of[g]);
     const auto up_to = [&](double part) {
       return static_cast<uint32_t>(std::nearbyint(std::min(1.0, part / all) * free));

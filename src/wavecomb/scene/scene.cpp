@@ -29,7 +29,7 @@ bool same_texture(const Material& a, const Material& b, Input input) {
   return same(a.textures[s], b.textures[s]);
 }
 
-/// Whether as much of a surface is there with either of two materials.
+/// Returns whether two materials give a surface the same presence.
 bool same_presence(const Material& a, const Material& b) {
   if (!a.needs_presence() && !b.needs_presence()) return true;
   return a.needs_presence() == b.needs_presence() && a.opacity == b.opacity &&
@@ -37,8 +37,9 @@ bool same_presence(const Material& a, const Material& b) {
          same_texture(a, b, Input::kOpacity);
 }
 
-/// Whether a surface shines alike with either of two materials. What does not emit may be a mesh
-/// light (`any_mesh_lights`), which shines where the surface is.
+/// Returns whether two materials give a surface the same emission. A surface with a material that
+/// does not emit may be part of a mesh light (`any_mesh_lights`), whose emission depends on
+/// presence.
 bool same_emission(const Material& a, const Material& b, bool any_mesh_lights) {
   if (a.emits() != b.emits()) return false;
   if (!a.emits()) return !any_mesh_lights || same_presence(a, b);
@@ -112,7 +113,8 @@ void Scene::link() {
   }
   std::vector<uint32_t> visibility = object_visibility(*this, names);
   if (visibility.empty()) return;
-  // Light that is aimed at is found by bounces, too: their weights count on each other.
+  // Bounce rays must be able to hit emitters that are sampled as lights, since their MIS weights
+  // assume that they can.
   for (size_t i = 0; i < lights_->emissive.size(); ++i)
     if (lights_->emissive[i] != kNoLight) visibility[i] |= kSeenByBounces;
   visibility_ = std::make_shared<const std::vector<uint32_t>>(std::move(visibility));

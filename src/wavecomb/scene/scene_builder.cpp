@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneBuilder: what is added to a scene.
+/// SceneBuilder: functions that add to a scene.
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -20,7 +20,7 @@ namespace wavecomb {
 
 namespace {
 
-/// A grid that a store of textures leaves room for, as long as anybody has it.
+/// A grid that counts towards the memory limit of a texture store for as long as it is in use.
 struct CountedGrid {
   std::shared_ptr<const VolumeGrid> grid;
   std::shared_ptr<TileStore> store;

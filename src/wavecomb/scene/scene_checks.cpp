@@ -16,8 +16,8 @@ std::string quoted(const std::string& kind, const std::string& name) {
 
 namespace {
 
-/// Throws Error where a number of a program's own is out of its range; one that is not finite is
-/// said elsewhere.
+/// Throws Error if a program-specific number is out of range; check_material reports numbers that
+/// are not finite.
 void check_own(const std::string& of, const ProgramParameter& p, float value) {
   if (value < p.least || value > p.most)
     throw Error(of + ": " + p.name + " is " + text(double{value}) + "; it must be from " +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneBuilder: groups in groups become a list of instances, and the whole becomes a scene.
+/// SceneBuilder: flattens nested groups to a list of instances and assembles the scene.
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,10 +19,10 @@ namespace wavecomb {
 namespace {
 
 constexpr uint64_t kUncounted = ~uint64_t{0};
-/// What an instance takes at least, Embree's geometry for it before all.
+/// Minimum memory of an instance, most of it for Embree's geometry.
 constexpr uint64_t kInstanceBytes = 400;
 
-/// Instances that can be numbered and that the memory of this machine holds.
+/// Returns the maximum number of instances, by 32-bit indices and by the memory of this machine.
 uint64_t max_instances() {
   const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGE_SIZE);
   if (pages <= 0 || page_bytes <= 0) return kMaxInstances;
@@ -83,7 +83,7 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
     if (!steps.empty()) {
       out.back().motion = {static_cast<uint32_t>(geometry.steps.size()),
                            static_cast<uint32_t>(steps.size() - 1)};
-      // What knows one place only takes the middle of the shutter.
+      // Uses of a single transform take that of mid-shutter.
       out.back().to_world = at_step(steps, 1, 2);
       for (const Affine& m : steps) geometry.steps.emplace_back(m);
     }
@@ -105,7 +105,7 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
 
 std::shared_ptr<const Scene> SceneBuilder::build() {
   auto geometry = std::make_shared<SceneGeometry>();
-  // Counted first: shared groups can be placed in 2^n ways, and most of them may hold nothing.
+  // Count first, because nested groups can have 2^n placements, most of which may contain nothing.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));
@@ -136,7 +136,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   for (const Instance& i : geometry->instances) counts.placed += groups_[i.group].meshes.size();
   check_counts(counts);
 
-  // A grey for meshes that nothing was bound to.
+  // A grey material for meshes without a material binding.
   const auto material_count = static_cast<uint32_t>(materials_.size());
   const uint32_t grey = material_count;
   Material fallback;
@@ -144,7 +144,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   fallback.program = ProgramId::kDiffuse;
   fallback.base_color = {0.5f, 0.5f, 0.5f};
   materials_.push_back(fallback);
-  // And what paths meet in volumes, one each.
+  // One material for the collisions in each volume.
   geometry->first_volume_material = grey + 1;
   for (const Volume& volume : volumes_) {
     Material inside;
@@ -152,7 +152,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     inside.program = ProgramId::kVolume;
     materials_.push_back(inside);
   }
-  // And where walks below surfaces end.
+  // A material for the exit points of subsurface random walks.
   if (std::ranges::any_of(materials_, [](const Material& m) {
         const Vec3<float>& r = m.openpbr.subsurface_radius;
         return m.program == ProgramId::kOpenPbr && std::max({r.x, r.y, r.z}) > 0;
@@ -163,7 +163,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     white.base_color = {1, 1, 1};
     materials_.push_back(white);
   }
-  // And collisions in what fills meshes.
+  // A material for collisions in media inside meshes.
   const bool absorbing = !volumes_.empty() || absorbing_glass_holds_objects(
                                                   materials_, meshes_, groups_, geometry->instances,
                                                   geometry->steps, lights_);
@@ -186,7 +186,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
     if (i.material > grey) throw Error("an instance uses a material that was never added");
   }
 
-  // What has been placed is not asked for again.
+  // The nesting is no longer needed.
   children_ = {};
   node_steps_ = {};
   geometry->meshes = std::move(meshes_);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneLights: the lights of a scene, emissive meshes among them.
+/// SceneLights: the lights of a scene, including emissive meshes.
 #include <algorithm>
 #include <cmath>
 
@@ -15,9 +15,9 @@ uint32_t material_of(const Mesh& mesh, const InstanceRecord& instance, size_t fa
   return m == kInheritMaterial ? instance.material : m;
 }
 
-/// A mesh of an instance with faces that emit.
+/// An instance of a mesh with faces that emit.
 struct EmissiveMesh {
-  size_t first;  ///< light of its first triangle, counted over all emissive meshes
+  size_t first;  ///< light index of its first triangle, counted over all emissive meshes
   const Mesh* mesh;
   uint32_t mesh_id, instance_id;
   const InstanceRecord* instance;
@@ -29,7 +29,7 @@ uint64_t bytes_of(const LightTree& tree) {
   return tree.nodes.size() * sizeof(tree.nodes[0]) + tree.trails.size() * sizeof(tree.trails[0]);
 }
 
-/// Area of a mesh in the middle of the shutter, one side, as `to_world` places it.
+/// Returns the one-sided area of a mesh at mid-shutter after `to_world`.
 double world_area(const Mesh& mesh, const Affine& to_world) {
   const std::span<const float> positions = mesh.positions.subspan(
       mesh.steps / 2 * (mesh.positions.size() / mesh.steps), mesh.positions.size() / mesh.steps);
@@ -55,8 +55,8 @@ double world_area(const Mesh& mesh, const Affine& to_world) {
   return sum;
 }
 
-/// Face `face` of an emissive mesh as a light; radiance 0 where it does not emit, opacity 0 where
-/// it is not there.
+/// Makes a light of face `face` of an emissive mesh: radiance 0 if the face does not emit, opacity
+/// 0 if it is absent.
 EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMaterials& materials,
                                    const EmissiveMesh& source, size_t face) {
   const Mesh& mesh = *source.mesh;
@@ -83,7 +83,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
     uvs[k][1] = uv[1];
   }
   set_mean_emission(geometry, materials, m, t);
-  // A hidden light shines though no ray meets its mesh.
+  // A light that is not visible emits although no ray can hit its mesh.
   if (mesh.mesh_light == kNoLight || geometry.mesh_lights[mesh.mesh_light].visible)
     set_mean_opacity(geometry, materials, m, t);
   if (m.has_texture(Input::kEmission) || m.emission_graph != kNoGraph || t.opacity_varies)
@@ -96,7 +96,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
 SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                          const SceneMaterials& materials, const SceneLights* before)
     : lights(std::move(all)) {
-  // Triangles of meshes whose material emits become lights of their own.
+  // Each triangle of a mesh whose material emits becomes a light.
   std::vector<EmissiveMesh> sources;
   size_t triangle_count = 0;
   const auto emits = [&](uint32_t material) {
@@ -110,8 +110,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
     const Group& group = geometry.groups[i == 0 ? 0 : geometry.instances[i - 1].group];
     for (uint32_t mesh_id : group.meshes) {
       const Mesh& mesh = geometry.meshes[mesh_id];
-      // What moves is no light to aim at: its triangles are where they are at a path's own time.
-      // Paths that meet it see it shine.
+      // Light sampling cannot aim at moving meshes, whose triangles depend on the time of the path.
+      // Paths that hit them find their emission.
       const bool moves = mesh.deforms() || (i > 0 && geometry.instances[i - 1].motion.moves());
       const Light* const light =
           mesh.mesh_light == kNoLight ? nullptr : &geometry.mesh_lights[mesh.mesh_light];
@@ -143,7 +143,7 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
   set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
                      before ? &before->set : nullptr, geometry.profiles, placed, kMaxPicked,
                      TreeTime::kWhenChosen, geometry.filters);
-  // Table entries now count from the first triangle and the first mesh light; make them ids.
+  // So far entries count from the first triangle and the first mesh light; make them light ids.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)
       if (entry != kNoLight) entry += set.first_triangle();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneMaterials: materials as lanes read them.
+/// SceneMaterials: packs materials.
 #include <algorithm>
 #include <cmath>
 
@@ -111,7 +111,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
                                std::span<const TexturePtr> textures, uint32_t exit_material,
                                uint32_t inside_material)
     : materials(std::move(all)), graphs(std::move(programs_)) {
-  const DenormalsOff denormals_off;  // as kernels have it
+  const DenormalsOff denormals_off;  // same floating-point mode as in kernels
   for (const Material& m : materials) shaded.push_back(settled(m, *graphs, textures));
   const bool has_own = std::ranges::any_of(
       materials, [](const Material& m) { return info_of(m.program).own_count() > 0; });
@@ -138,7 +138,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     has_emission = has_emission || m.emits();
   }
   if (inside_material == kInheritMaterial) return;
-  // The scene has found that paths need to know what they are inside of.
+  // The scene has determined that paths need a medium stack.
   interiors = make_interiors(shaded, *graphs, true);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneBuilder: meshes and instances, packed for kernels.
+/// SceneBuilder: packs meshes and instances.
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +16,7 @@ uint64_t address(const void* p) {
   return reinterpret_cast<uint64_t>(p);
 }
 
-/// sqrt(uv area / area) of the whole mesh, 0 where it has no uvs.
+/// Returns sqrt(uv area / area) of the whole mesh, or 0 if it has no uvs.
 float uv_density(const Mesh& mesh) {
   if (mesh.uvs_at == Attribute::kNone || mesh.is_curved()) return 0;
   double area = 0, uv_area = 0;
@@ -64,7 +64,7 @@ MeshRecord make_mesh_record(const Mesh& mesh) {
   return r;
 }
 
-/// The values of `all`, each once, ascending.
+/// Returns the distinct values of `all` in ascending order.
 std::vector<uint32_t> distinct(std::span<const uint32_t> all) {
   std::vector<uint32_t> values;
   for (uint32_t value : all)

@@ -45,8 +45,8 @@ bool is_color(Input input) {
   return input == Input::kBaseColor || input == Input::kSpecularColor || input == Input::kEmission;
 }
 
-/// The value of an input of `count` components, the first of which is `first` of GraphParameter,
-/// where a graph drives all of them to one value whatever the hit is.
+/// Returns the value of an input of `count` components, starting at component `first` of
+/// GraphParameter, if a graph gives all of them a single value for all hits.
 std::optional<Vec3<float>> only_value(const DrivenRanges& ranges, uint32_t first, uint32_t count) {
   float value[3] = {0, 0, 0};
   for (uint32_t c = 0; c < count; ++c) {
@@ -65,7 +65,7 @@ InputRange input_range(Input input, const TextureUse& use, const Texture& textur
   float low[3], high[3];
   for (uint32_t c = 0; c < 3; ++c) {
     const uint32_t from = use.channel < 4 ? use.channel : c;
-    // As kernels do: rounding keeps the order.
+    // The same operation as in kernels, which preserves order under rounding.
     const auto at = [&](float texel) { return fma(texel, use.scale[from], use.bias[from]); };
     const auto [least, most] = std::minmax({at(texels.low[from]), at(texels.high[from])});
     const uint32_t component = first + (is_color(input) || input == Input::kNormal ? c : 0);
@@ -87,13 +87,14 @@ Material settled(Material m, const GraphSet& graphs, std::span<const TexturePtr>
   for (uint32_t s = 0; s < kInputCount; ++s) {
     const auto input = static_cast<Input>(s);
     const TextureUse& use = m.textures[s];
-    // The map of normals stays: its place in the frame is not that of a constant.
+    // A constant normal map stays, since shading uses a different tangent frame without it.
     if (use.texture >= textures.size() || input == Input::kNormal) continue;
     const auto [low, high] = input_range(input, use, *textures[use.texture]);
     const bool same = low.x == high.x && (!is_color(input) || (low.y == high.y && low.z == high.z));
     if (same) fix(input, low);
   }
-  // What rays and lights ask of a graph; shading runs the whole of it all the same.
+  // Replaces a graph that only traversal and light sampling evaluate. Shading still runs the
+  // complete graph.
   const auto settle = [&](uint32_t& graph, Input input, uint32_t first, uint32_t count) {
     const auto value = only_value(driven_ranges(graphs, graph, textures), first, count);
     if (!value) return;

@@ -9,11 +9,11 @@
 namespace wavecomb {
 namespace {
 
-/// Expected opacity of what varies and may be there, though its mean says that it is not: so much
-/// of the light of a triangle is looked for at least.
+/// Lower limit of the expected opacity where opacity varies, so that light sampling does not ignore
+/// triangles whose estimated mean is 0.
 constexpr float kLeastOpacity = 1.f / 16;
 
-/// The mean of a texture as an input reads it.
+/// Returns the mean of a texture as an input reads it.
 Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
   const float* mean = geometry.textures[use.texture]->mean();
   const auto value = [&](uint32_t c) {
@@ -23,7 +23,8 @@ Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
   return {value(0), value(1), value(2)};
 }
 
-/// Mean over a few points of a triangle of f(what `graph` gives from component `output` on).
+/// Returns the mean over a few points of a triangle of f(outputs of `graph` from component `output`
+/// on).
 template <typename Function>
 Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& materials,
                        uint32_t graph, uint32_t output, const Vec3<float>& plain,
@@ -37,7 +38,7 @@ Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& mate
     const float* p = &mesh.positions[size_t{3} * mesh.indices[size_t{3} * t.prim + k]];
     return Vec3<float>(p[0], p[1], p[2]);
   };
-  // Centres of four triangles of equal area; textures are read about as coarse as these are.
+  // Centres of four triangles of equal area, with texture footprints of about their size.
   constexpr float kPoints[4][2] = {
       {1.f / 3, 1.f / 3}, {1.f / 6, 1.f / 6}, {2.f / 3, 1.f / 6}, {1.f / 6, 2.f / 3}};
   const float width =
@@ -101,7 +102,8 @@ void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& mater
   };
   const auto unit = [](float x) { return std::clamp(x, 0.f, 1.f); };
   float opacity = unit(material.opacity);
-  // Of a texture with a threshold, as much is there as its mean says: it is 0 or 1 nearly all over.
+  // With a threshold, opacity is 0 or 1 nearly everywhere, so the mean of the texture estimates the
+  // presence.
   if (material.has_texture(Input::kOpacity))
     opacity =
         unit(mean_texture(geometry, material.textures[static_cast<size_t>(Input::kOpacity)]).x);

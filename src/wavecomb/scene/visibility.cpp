@@ -14,14 +14,14 @@ namespace {
 
 using Rules = std::map<std::string, VisibilityRule, std::less<>>;
 
-/// The path of the prim above; empty at the top.
+/// Returns the path of the parent prim; empty at the top.
 std::string_view above(std::string_view path) {
   const size_t slash = path.rfind('/');
   return slash == std::string_view::npos ? std::string_view() : path.substr(0, slash);
 }
 
-/// What is said of the object that is seen as `placed`, whose mesh is called `own` in a group of
-/// root `root`: of it and the prims above it the nearest counts.
+/// Returns the visibility of the object that is seen as `placed`, a mesh called `own` in a group of
+/// root `root`. For each bit, the rule of the nearest prim among the object and its ancestors wins.
 uint32_t visibility_of(const Rules& rules, std::string_view placed, std::string_view own,
                        std::string_view root) {
   uint32_t said = 0, bits = 0;

@@ -12,7 +12,7 @@
 namespace wavecomb {
 namespace {
 
-/// Bricks of a grid, or the unit cube of the box, to the world.
+/// Returns the map from the bricks of a grid, or from the unit cube of the box, to the world.
 WideMap bricks_to_world(const Volume& v, const VolumeField& field) {
   if (field.grid) return WideMap(v.to_world).after(bricks_to_object(field));
   const Vec3<float> size = v.box[1] - v.box[0];
@@ -35,7 +35,7 @@ PlacedGrid placed_grid(const Volume& v, const VolumeField& field) {
   return placed;
 }
 
-/// The cells that a field of the volume is flown through by.
+/// Packs the bounding cells of a moving field.
 PlacedGrid placed_cells(const Volume& v, const VolumeField& field, const MovedCells& cells) {
   PlacedGrid placed;
   placed.grid.most = cells.most.data();
@@ -44,7 +44,7 @@ PlacedGrid placed_cells(const Volume& v, const VolumeField& field, const MovedCe
   return placed;
 }
 
-/// How a field is looked up from the space that `to_bricks` leads from to its bricks.
+/// Returns the maps for looking up a field from a space that `to_bricks` maps to its bricks.
 FieldDrift drift_of(const Volume& v, const VolumeField& field, const WideMap& to_bricks) {
   const WideMap object = bricks_to_object(field);
   FieldDrift drift{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// VolumeGrid: bricks as files have them become bricks with a border and a table.
+/// VolumeGrid: converts bricks of a file into bricks with a border and a table of them.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,7 +20,7 @@ size_t brick_words(uint32_t components, bool is_half) {
   return is_half ? (values + 1) / 2 : values;
 }
 
-/// A value as a grid keeps it.
+/// Returns the bits of a value as a grid stores it.
 uint32_t value_bits(float value, bool is_half) {
   return is_half ? uint32_t{float_to_half(value)} : float_bits<float>(value);
 }
@@ -28,7 +28,7 @@ float value_of(uint32_t bits, bool is_half) {
   return is_half ? half_to_float<float>(bits) : bits_float<float>(bits);
 }
 
-/// The bricks that came in, by cell.
+/// Input bricks, indexed by cell.
 class BrickSource {
  public:
   BrickSource(const GridBricks& b, const std::array<int32_t, 3>& first,
@@ -45,7 +45,7 @@ class BrickSource {
       at_[cell] = static_cast<uint32_t>(i);
     }
   }
-  /// The bricks that a cell's voxels and those on its upper faces are in.
+  /// The bricks that contain the voxels of a cell and those on its upper faces.
   class Corner {
    public:
     Corner(const BrickSource& source, const std::array<uint32_t, 3>& cell)
@@ -58,8 +58,8 @@ class BrickSource {
                        : kNoBrick;
       }
     }
-    /// The bits of component c of a voxel of the cell, each index below kBrickRow. But for their
-    /// signs, bits are ordered as values are.
+    /// Returns the bits of component c of a voxel of the cell, each index below kBrickRow. Apart
+    /// from the sign, the bits have the same order as the values.
     uint32_t bits(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
       const uint32_t brick = near_[x / kBrickEdge | y / kBrickEdge << 1 | z / kBrickEdge << 2];
       if (brick == kNoBrick) return background_;
@@ -131,7 +131,8 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
   }
   uint64_t cells = 1;
   for (size_t k = 0; k < 3; ++k) {
-    // One cell more below: what lies between its last voxels and the first ones there.
+    // One more cell at the lower end, for interpolation between the background and the first
+    // voxels.
     first_[k] = static_cast<int32_t>(lo[k]) - static_cast<int32_t>(kBrickEdge);
     size_[k] = static_cast<uint32_t>((hi[k] - first_[k]) / kBrickEdge + 1);
     cells *= size_[k];
@@ -146,7 +147,8 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
   const uint32_t background = value_bits(background_, is_half_);
   const uint32_t magnitude = is_half_ ? 0x7fffu : 0x7fffffffu;
 
-  // Which cells have anything, and their greatest value; then their voxels.
+  // Find the cells that differ from the background and their maximum values, then copy their
+  // voxels.
   const auto fill = [&](size_t cell, uint32_t* out) {
     const BrickSource::Corner corner(source, {static_cast<uint32_t>(cell % size_[0]),
                                               static_cast<uint32_t>(cell / size_[0] % size_[1]),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A lookup at p at the time t reads a field at p - v(p) t. Of a cell's points the velocities lie
-/// between bounds, so that what they read lies in a box, and the greatest value of that box bounds
-/// the lookups. Greatest values of boxes come from tables of maxima of 2^3, 4^3 ... cells.
+/// A lookup at p at time t reads a field at p - v(p) t. The velocities in a cell lie within bounds,
+/// so all lookups from the cell read within a box, and the maximum over this box bounds their
+/// values. Maxima over boxes come from tables of maxima of 2^3, 4^3 ... cells.
 #include "wavecomb/scene/volume_motion.h"
 
 #include <algorithm>
@@ -14,17 +14,17 @@
 namespace wavecomb {
 namespace {
 
-/// Cells of a field; more are made larger.
+/// Maximum number of bounding cells of a field; with more, cells are made larger.
 constexpr double kMostCells = 1 << 22;
-/// What kernels may round, in bricks. Cells that stand still do not reach into their neighbours by
-/// it.
+/// Rounding tolerance of kernels, in bricks. It keeps the box of a cell without motion from
+/// reaching into neighbouring cells.
 constexpr double kBrickSlack = 1e-5;
 
 struct WideBox {
   std::array<double, 3> lo, hi;
 };
 
-/// The box about the image of a box.
+/// Returns the bounding box of the image of a box.
 WideBox image_of(const WideMap& map, const WideBox& box) {
   WideBox out{};
   for (size_t i = 0; i < 3; ++i) {
@@ -38,10 +38,10 @@ WideBox image_of(const WideMap& map, const WideBox& box) {
   return out;
 }
 
-/// Greatest numbers of boxes of cells.
+/// Table of maxima over boxes of cells.
 class MaxPyramid {
  public:
-  /// `cells`: x quickest; `outside`: beyond them.
+  /// `cells`: values, x fastest; `outside`: the value beyond them.
   MaxPyramid(const uint32_t (&size)[3], std::vector<float> cells, float outside)
       : outside_(outside) {
     levels_.push_back({{size[0], size[1], size[2]}, std::move(cells)});
@@ -75,7 +75,7 @@ class MaxPyramid {
     float at(uint32_t x, uint32_t y, uint32_t z) const {
       return values[x + size_t{size[0]} * (y + size_t{size[1]} * z)];
     }
-    /// Of cells of level 0.
+    /// Returns the maximum over a box of cells of level 0.
     float most(const std::array<uint32_t, 3>& lo, const std::array<uint32_t, 3>& hi,
                uint32_t level) const {
       float greatest = at(lo[0] >> level, lo[1] >> level, lo[2] >> level);
@@ -104,7 +104,7 @@ class MaxPyramid {
   float outside_;
 };
 
-/// Bounds of a velocity grid: of boxes of its space.
+/// Bounds of the velocities in boxes of a velocity grid.
 class VelocityBounds {
  public:
   explicit VelocityBounds(const VolumeGrid& grid) : view_(grid.view()) {
@@ -125,7 +125,7 @@ class VelocityBounds {
     });
     for (auto& one : ends) pyramids_.emplace_back(view_.size, std::move(one), 0.f);
   }
-  /// Velocities in a box of the grid's space.
+  /// Returns the bounds of the velocities in a box of the grid's space.
   WideBox within(const WideBox& box) const {
     WideBox v{};
     for (size_t c = 0; c < 3; ++c) {
@@ -134,7 +134,7 @@ class VelocityBounds {
     }
     return v;
   }
-  /// Where there are any.
+  /// Returns the box outside which the velocity is 0.
   WideBox table() const {
     return {{0, 0, 0}, {double(view_.size[0]), double(view_.size[1]), double(view_.size[2])}};
   }
@@ -152,7 +152,7 @@ class VelocityBounds {
   std::vector<MaxPyramid> pyramids_;
 };
 
-/// A field, and what moves it.
+/// A field with the velocity field that moves it.
 class MovedField {
  public:
   MovedField(const Volume& v, const VolumeField& field, const VelocityBounds& velocity)
@@ -193,7 +193,7 @@ class MovedField {
   }
 
  private:
-  /// How far what has velocities in a box goes, in bricks of the field.
+  /// Returns the bounds of the displacement, in bricks of the field, for velocities in a box.
   WideBox drift_in(const WideBox& velocities) const {
     const WideBox over = image_of(drift_, velocities);
     WideBox out{};
@@ -205,7 +205,8 @@ class MovedField {
     }
     return out;
   }
-  /// All that the field may come to: its table, and beyond as far as there are velocities.
+  /// Returns the cells of the space that the field can reach: its table, and the space beyond in
+  /// which velocities are not 0.
   MovedCells space() const {
     const WideBox way = drift_in(velocity_.within(velocity_.table()));
     const WideBox windy = image_of(from_velocity_, velocity_.table());

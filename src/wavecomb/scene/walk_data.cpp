@@ -13,12 +13,13 @@ namespace wavecomb {
 
 namespace {
 
-/// Free paths that are shorter count as this: an object has no room for more collisions.
+/// Lower limit of mean free paths, which bounds the number of collisions inside an object.
 constexpr float kLeastFreePath = 1e-6f;
-/// What is darker counts as this where walks are shared out among channels.
+/// Lower limit of the colours by which random walks select a channel.
 constexpr float kLeastColor = 0.05f;
-/// What van de Hulst's s is off by, over s (1 - s), by powers of s and of the mean cosine: fitted
-/// to colours by adding and doubling (tests/python/test_walks.py has them), to 0.4 % of the colour.
+/// Correction of van de Hulst's s, divided by s (1 - s), as a polynomial in s and in the mean
+/// cosine. Fitted to colours computed by adding and doubling (tests/python/test_walks.py), to 0.4 %
+/// of the colour.
 constexpr float kOffSimilarity[4][5] = {{0.0153f, -0.0261f, -0.1611f, 0.0637f, 0.1811f},
                                         {-0.0526f, 0.3743f, 0.5764f, -0.9722f, -0.4419f},
                                         {0.0812f, -0.9642f, -0.2726f, 1.9433f, 0.3053f},

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading normals that a viewer may see.
+/// Adjustment of shading normals to the viewing direction.
 ///
-/// A shading normal n that differs from the geometric one, g, is seen from directions from which no
-/// surface could be: it may look away from the viewer, and mirror what is behind the surface, from
-/// where no light comes. Below, w points to the viewer, and g and n to his side.
+/// A shading normal n that differs from the geometric normal g is visible from directions from
+/// which a real surface could not be: it may point away from the viewer, or its mirror direction
+/// may point below the surface, from which no light arrives. In the following, w points to the
+/// viewer, and g and n are on the viewer's side.
 #pragma once
 
 #include "wavecomb/core/vec.h"
@@ -11,15 +12,15 @@
 namespace wavecomb {
 
 namespace detail {
-/// 1 where a ray along `dir` meets the side that `ng` points to, else -1.
+/// Returns 1 if a ray along `dir` hits the side to which `ng` points, else -1.
 template <typename F>
 WAVECOMB_INLINE F side_met(const Vec3<F>& dir, const Vec3<F>& ng) {
   return select(dot(dir, ng) < 0.f, F(1.f), F(-1.f));
 }
 }  // namespace detail
 
-/// `n` for a ray along `dir`, bent towards it until it is seen edge-on (w . n >= 0.001) where it
-/// looks away.
+/// Returns `n`, for a ray along `dir`, bent towards the viewer until w . n >= 0.001 if it points
+/// away from the viewer.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
   constexpr float kEdge = 1e-3f;
@@ -30,11 +31,11 @@ WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, con
   return select<F>(away, normalize(fma(dir, F(-towards * (kEdge - seen)), n)), n);
 }
 
-/// `n`, which faces the ray, bent until its mirror direction r = 2 (w . n) n - w leaves the
-/// surface: where r . g is below t = min(0.9 w . g, 0.01), r is lifted to that height, and n is
-/// half way between w and that (A. Keller et al., "The Iray Light Transport Simulation and
-/// Rendering System", 2017, appendix A.3). Without, glossy surfaces with a normal map have black
-/// rims.
+/// Returns `n`, which faces the viewer, bent until its mirror direction r = 2 (w . n) n - w leaves
+/// the surface. If r . g is below t = min(0.9 w . g, 0.01), r is lifted to that height, and n
+/// becomes the half vector of w and the lifted r (A. Keller et al., "The Iray Light Transport
+/// Simulation and Rendering System", 2017, appendix A.3). This avoids black rims on glossy surfaces
+/// with a normal map.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
   constexpr float kHeight = 0.01f, kLeastCosine = 1e-4f;
@@ -46,7 +47,7 @@ WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng,
   const Mask<F> below = height < least;
   if (none(below)) return n;
   const Vec3<F> lifted = normalize(fma(g, F(least - height), r));
-  // At the very edge both would cancel.
+  // At grazing incidence the sum would cancel out.
   const Vec3<F> between = select<F>(c < kLeastCosine, g, w + lifted);
   return select<F>(below, normalize(between) * towards, n);
 }

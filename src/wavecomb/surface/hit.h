@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a hit is on: the material there.
+/// Material lookup at hits.
 #pragma once
 
 #include "wavecomb/core/rows.h"
@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Material of primitive `prim` of a mesh: the face's, else the mesh's, else what the instance
-/// hands on (`inherited`, InstanceRecord::material).
+/// Returns the material of primitive `prim` of a mesh: that of the face if given, otherwise that of
+/// the mesh, otherwise that of the instance (`inherited`, InstanceRecord::material).
 template <typename F>
 inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inherited, const UInt<F>& mesh,
                             const UInt<F>& prim, const Mask<F>& active) {

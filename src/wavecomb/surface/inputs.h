@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads the inputs of materials at hits: constants from records, or textures.
+/// Reads material inputs at hits, from constants of records or from textures.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -10,23 +10,23 @@
 
 namespace wavecomb {
 
-/// Radiance is kept below this, so that no product of a path overflows.
+/// Upper limit of emitted radiance, so that no product of a path overflows.
 inline constexpr float kMaxEmission = 1e18f;
 
 namespace detail {
 
-/// What an input's texture gives: texel * scale + bias of the chosen channels.
+/// Returns texel * scale + bias of the chosen channels of an input's texture.
 template <typename F>
 Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const Vec2<F>& uv,
                      const Footprint<F>& footprint, const Mask<F>& active);
 
-/// Values of inputs at a hit.
+/// Values of material inputs at a hit.
 template <typename F>
 struct InputReader {
   const MaterialView& view;
   const UInt<F>& material;
   const Vec2<F>& uv;
-  const Footprint<F>& footprint;  ///< in uv
+  const Footprint<F>& footprint;  ///< footprint in uv space
   Mask<F> active;
   bool uniform;
   RecordReader<F> record;
@@ -43,14 +43,15 @@ struct InputReader {
         record(make_reader<MaterialRecord, F>(view_.materials, material_, uniform, active_)),
         textured_inputs(record[&MaterialRecord::textured_inputs]) {}
 
-  /// The value of input `s`: `constant`, or the texture's in the lanes that have one.
+  /// Returns the value of input `s`: the texture's in lanes that have one, otherwise `constant`.
   Vec3<F> value(Input s, const Vec3<F>& constant) const {
     const uint32_t bit = input_bit(s);
     const Mask<F> textured = Mask<F>((textured_inputs & UInt<F>(bit)) != UInt<F>(0u)) & active;
     if (none(textured)) return constant;
     const UInt<F> index = material * kInputCount + static_cast<uint32_t>(s);
     const auto use = make_reader<TextureUseRecord, F>(view.uses, index, uniform, textured);
-    // Light is filtered whole: emitters are few and bright, and light samples know no texels.
+    // Emission is filtered isotropically: emitters are few and bright, and light samples have no
+    // ray footprint.
     const Footprint<F> seen = s == Input::kEmission ? Footprint<F>(footprint.width) : footprint;
     return select<F>(textured, read_texture<F>(view, use, uv, seen, textured), constant);
   }
@@ -59,7 +60,7 @@ struct InputReader {
 
 template <typename F>
 inline F saturate(const F& x) {
-  return min(max(x, F(0.f)), F(1.f));  // NaN gives 0
+  return min(max(x, F(0.f)), F(1.f));  // maps NaN to 0
 }
 template <typename F>
 inline Color<F> saturate(const Color<F>& c) {
@@ -72,7 +73,7 @@ inline Color<F> sane_emission(const Color<F>& c) {
           min(max(c.z, F(0.f)), F(kMaxEmission))};
 }
 
-/// Lanes whose opacity is presence: it says how much of the surface is there, not how it transmits.
+/// Returns the lanes whose opacity is presence instead of transparency.
 template <typename F>
 inline Mask<F> opacity_is_presence(const InputReader<F>& inputs, const F& threshold) {
   const UInt<F> flags = inputs.record[&MaterialRecord::flags];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where things are at the time of a path. Bodies that read moved meshes are in motion.inl.
+/// Positions at the time of a path. motion.inl defines the functions that read moving meshes.
 ///
-/// Everything moves along straight lines between the steps that the scene holds, as Embree moves
-/// what it traverses. Time runs from 0, where the shutter opens, to 1.
+/// Everything moves along straight lines between the steps that the scene stores, as Embree
+/// interpolates during traversal. Time runs from 0 at shutter open to 1 at shutter close.
 #pragma once
 
 #include <array>
@@ -15,13 +15,14 @@
 
 namespace wavecomb {
 
-/// When a path sees the scene, in [0, 1): one time for all its rays, a function of its key alone.
+/// Returns the time of a path in [0, 1), which all its rays share. It depends on the sample key
+/// only.
 template <typename F>
 inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
   return sample_4d<F>(sampler, key, kTimeSet).x;
 }
 
-/// A transform, rows of A and the translation.
+/// A transform for each lane: rows of A and the translation.
 template <typename F>
 struct MatrixLanes {
   Vec3<F> row[3], t;
@@ -29,13 +30,13 @@ struct MatrixLanes {
 
 namespace detail {
 
-/// The transforms of two steps, and what lies between.
+/// Transforms of two consecutive steps and the weight between them.
 template <typename F>
 struct MatrixPair {
   std::array<F, 16> a, b;
   F part;
 
-  /// `first`, `segments`: of each active lane's StepRange, which moves.
+  /// `first`, `segments`: the StepRange of each active lane, which must move.
   MatrixPair(const MatrixStep* steps, const UInt<F>& first, const UInt<F>& segments, const F& time,
              const Mask<F>& active) {
     const BetweenSteps<F> at(time, segments);
@@ -49,11 +50,11 @@ struct MatrixPair {
     return {{{at(0), at(1), at(2)}, {at(4), at(5), at(6)}, {at(8), at(9), at(10)}},
             {at(3), at(7), at(11)}};
   }
-  /// The larger magnitude of word k of the two.
+  /// Returns the larger magnitude of word k of the two transforms.
   F reach(size_t k) const { return max(abs(a[k]), abs(b[k])); }
 };
 
-/// One of the arrays of meshes, whose values may differ from step to step.
+/// One of the arrays of meshes whose values may differ between steps.
 template <typename F>
 class MovingRows {
  public:
@@ -68,14 +69,14 @@ class MovingRows {
       const MeshMotion& motion = scene.motion.meshes[record.motion];
       const BetweenSteps<float> place(at[i], motion.segments);
       before_[i] = record.*array + place.before * (motion.*stride);
-      after_[i] = before_[i] + (motion.*stride);  // 0 for a mesh that keeps its shape
+      after_[i] = before_[i] + (motion.*stride);  // the stride is 0 for a mesh that does not deform
       parts[i] = place.part;
     }
     part_ = load<F>(parts);
   }
 
   struct Value {
-    Vec3<F> v, reach;  ///< and the larger magnitudes of the two steps
+    Vec3<F> v, reach;  ///< the value, and the larger magnitudes at the two steps
   };
   Value operator()(const UInt<F>& index, const Mask<F>& active) const {
     const auto rows = [&](const uint64_t* base) {
@@ -86,7 +87,7 @@ class MovingRows {
     };
     const Vec3<F> a = rows(before_), b = rows(after_);
     const auto larger = [](const F& x, const F& y) { return max(abs(x), abs(y)); };
-    // No fma: traversal of curves comes to the same bits in any build.
+    // No fma, so that this gives the same bits as curve traversal in every build.
     return {Vec3<F>(b - a) * part_ + a, {larger(a.x, b.x), larger(a.y, b.y), larger(a.z, b.z)}};
   }
 
@@ -97,24 +98,25 @@ class MovingRows {
 
 }  // namespace detail
 
-/// Where the instances of hits are at the hits' time.
+/// Transforms of the instances of hits at the times of the hits.
 template <typename F>
 struct MovedInstance {
   Mask<F> moves;
-  MatrixLanes<F> to_world;  ///< where it moves
-  F side;                   ///< sign of its determinant
-  F size;                   ///< bounds all terms of a world position
+  MatrixLanes<F> to_world;  ///< set in lanes that move
+  F side;                   ///< sign of the determinant of to_world
+  F size;                   ///< bound of all terms of a world position
 };
 
-/// `maps`: row and t of the instances at rest. `reach`: bounds the magnitudes of what is placed.
-/// Not inline, like what follows: kernels of scenes at rest keep their size.
+/// Returns the transforms of moving instances. `maps` holds `row` and `t` of the instances at rest.
+/// `reach` bounds the magnitudes of local positions. Like the following functions it is not
+/// inlined, so that kernels of scenes without motion keep their size.
 template <typename F, typename Maps>
 [[gnu::noinline, gnu::cold]] MovedInstance<F> moved_instance(const SceneView& scene,
                                                              const UInt<F>& inst, const F& time,
                                                              const Maps& maps, const Vec3<F>& reach,
                                                              const Mask<F>& active);
 
-/// The triangle of a hit at the hit's time, and where its instance is.
+/// The triangle of a hit at the time of the hit, and the transform of its instance.
 template <typename F>
 struct MovedTriangle {
   Vec3<F> p[3];
@@ -126,7 +128,7 @@ template <typename F, typename Maps>
     const SceneView& scene, const UInt<F>& inst, const UInt<F>& mesh,
     const std::array<UInt<F>, 3>& corners, const F& time, const Maps& maps, const Mask<F>& active);
 
-/// Normals with the given indices at a hit's time.
+/// Returns the normals of the given indices at the time of a hit.
 template <typename F>
 [[gnu::noinline, gnu::cold]] std::array<Vec3<F>, 3> moved_normals(
     const SceneView& scene, const UInt<F>& mesh, const std::array<UInt<F>, 3>& indices,

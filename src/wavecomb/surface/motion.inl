@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of motion.h, for the units that instantiate them.
+/// Definitions for motion.h, for the translation units that instantiate them.
 #pragma once
 
 #include "wavecomb/surface/motion.h"

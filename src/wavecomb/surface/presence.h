@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Opacity at places of meshes that no path has shaded: what rays ask for that meet a cut-out, and
-/// light samples that aim at one.
+/// Opacity at points of meshes that no path shades: for rays that hit a cut-out, and for light
+/// samples that aim at one.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -9,7 +9,8 @@
 
 namespace wavecomb {
 
-/// Whether materials of lanes are there in part: their opacity is presence and below 1 somewhere.
+/// Returns the lanes whose materials need a presence lookup: their opacity is presence and below 1
+/// somewhere.
 template <typename F>
 inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
                             const Mask<F>& active) {
@@ -18,9 +19,9 @@ inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
   return active & Mask<F>((flags & uint32_t{kPresence}) != U(0u));
 }
 
-/// What graphs are given of a place on a mesh without a path: on triangles places at rest and the
-/// plane's normals, which the view is along; on curves and points texture coordinates alone.
-/// Images are read at their finest level.
+/// Makes the inputs of graphs at a point of a mesh without a path: on triangles, the position at
+/// rest and the plane's normal as normal and viewing direction; on curves and points, only texture
+/// coordinates. Images are read at their finest level.
 template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> point_at_rest(const MeshRecord* meshes,
                                                          const InstanceRecord* instances,
@@ -55,7 +56,8 @@ template <typename F>
   return at;
 }
 
-/// Opacity of `material` at a place of a mesh of `instance`, whose texture coordinates are `uv`.
+/// Returns the opacity of `material` at a point of a mesh of `instance` with texture coordinates
+/// `uv`.
 template <typename F>
 inline F opacity_at(const MaterialView& view, const MeshRecord* meshes,
                     const InstanceRecord* instances, const UInt<F>& material,

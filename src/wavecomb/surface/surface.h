@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// From a hit to what shading needs of the surface there.
+/// Shading points of hits.
 #pragma once
 
 #include "wavecomb/curve/surface.h"
@@ -10,14 +10,14 @@
 
 namespace wavecomb {
 
-/// Everything about the surface at a hit. `with_uv`: uv, dpdu and uv_per_length are wanted.
-/// `dir` is the unit direction of the ray that hit. Scenes without curves, and those where nothing
-/// moves, may say so to the compiler.
+/// Computes the shading point of a hit. `dir` is the unit direction of the ray. `with_uv` computes
+/// uv, dpdu and uv_per_length, `with_terminator` the terminator vector. kWithCurves and kWithMotion
+/// can be false for scenes without curves or motion.
 ///
-/// The offset bounds the distance between p and the true surface: interpolation, transform and the
-/// traversal's own rounding, in the manner of Pharr, Jakob, Humphreys, "Physically Based
-/// Rendering", section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator",
-/// Ray Tracing Gems II.
+/// The offset bounds the distance between p and the true surface due to rounding in interpolation,
+/// transform and traversal, in the manner of Pharr, Jakob, Humphreys, "Physically Based Rendering",
+/// section 6.8. The terminator vector follows Hanika, "Hacking the Shadow Terminator", Ray Tracing
+/// Gems II.
 template <typename F, bool kWithCurves = true, bool kWithMotion = true>
 WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
                                          const Vec3<F>& dir, bool with_uv, bool with_terminator,
@@ -54,9 +54,9 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
 
-  // What was rounded: the interpolated point in all its terms, and, less so, the triangle's corners
-  // that traversal subtracts the ray's origin from. All axes count, since the traversal's products
-  // mix them.
+  // Bound of the rounding error: all terms of the interpolated point and, with a smaller weight,
+  // the triangle's corners, from which traversal subtracts the ray's origin. All axes count, since
+  // the products of traversal mix them.
   const Vec3<F> q0 = detail::abs3(p0), q1 = detail::abs3(p1), q2 = detail::abs3(p2);
   const Vec3<F> size = (q0 * abs(b0) + q1 * b1 + q2 * b2) + max(q0, max(q1, q2)) * F(0.25f);
   const auto magnitude = [&](int i, const F& t) {
@@ -64,7 +64,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   };
   s.offset =
       max(max(magnitude(0, maps.t.x), magnitude(1, maps.t.y)), magnitude(2, maps.t.z)) * 0x1p-20f;
-  // And what lies between steps was rounded as they are.
+  // Interpolation between motion steps adds rounding errors of the size of both steps.
   if (kWithMotion && scene.has_motion) [[unlikely]]
     s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
 
@@ -95,7 +95,8 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     s.ns = select<F>(good, ns, s.ng);
 
     if (with_terminator) {
-      // Project p to the tangent planes at the vertices and interpolate, on the normals' side only.
+      // Project p to the tangent planes at the vertices and interpolate, on the side of the normals
+      // only.
       const auto lift = [&](const Vec3<F>& q, const Vec3<F>& vertex_normal) {
         const F n2len = length_squared(vertex_normal);
         const F h = dot(Vec3<F>(p - q), vertex_normal) / select(n2len > 0.f, n2len, F(1.f));
@@ -119,7 +120,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
     s.uv_per_length = sqrt(F(abs(det) / safe_area2));
     const Mask<F> mirrored = det < 0.f;
     s.handedness = select(mirrored, F(-maps.side), maps.side);
-    // dp/du = (d2.v e1 - d1.v e2) / det; only its direction is used.
+    // dp/du = (d2.v e1 - d1.v e2) / det. Only its direction is used.
     const Vec3<F> across = e1 * d2.y - e2 * d1.y;
     Vec3<F> tangent = select<F>(mirrored, -across, across);
     if (scene.tangents)
@@ -135,15 +136,15 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   return s;
 }
 
-/// The origin of a ray that leaves `s` along `dir`, clear of the surface on that side, without the
-/// terminator vector.
+/// Returns the origin of a ray that leaves `s` along `dir`, offset from the surface on that side,
+/// without the terminator vector.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> clear_origin(const Surface<F>& s, const Vec3<F>& dir) {
   return fma(s.ng, select(dot(dir, s.ng) > 0.f, s.offset, F(-s.offset)), s.p);
 }
 
-/// The origin of a ray that leaves `s` along `dir`, clear of the surface and of its terminator on
-/// that side.
+/// Returns the origin of a ray that leaves `s` along `dir`, offset from the surface and by the
+/// terminator vector on that side.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> spawn_origin(const Surface<F>& s, const Vec3<F>& dir) {
   const Mask<F> outside = dot(dir, s.ng) > 0.f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a hit and a surface are, and how lanes read the meshes and instances they are on.
+/// Hits and shading points, and the access of lanes to their meshes and instances.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -11,33 +11,35 @@
 
 namespace wavecomb {
 
-/// A hit on a mesh: instance (index into SceneView::instances), mesh, primitive, and barycentrics
-/// of vertices 1 and 2 of a triangle, or what curve/segment.h says.
+/// A hit on a mesh: instance (index into SceneView::instances), mesh, primitive, and the
+/// barycentrics of vertices 1 and 2 of a triangle, or the coordinates defined in curve/segment.h.
 template <typename F>
 struct MeshHit {
   UInt<F> inst, mesh, prim;
   F u, v;
-  F time{};  ///< of the path, where the scene moves
+  F time{};  ///< time of the path, if the scene moves
 };
 
-/// A surface point in world space.
+/// A shading point in world space.
 template <typename F>
 struct Surface {
   Vec3<F> p;
-  Vec3<F> ng;    ///< unit geometric normal, outside by winding
+  Vec3<F> ng;    ///< unit geometric normal, pointing outwards by the winding order
   Vec3<F> ns;    ///< unit shading normal on the same side as ng
-  Vec3<F> dpdu;  ///< tangent along u, any length; zero where uv is not asked for
-  F handedness;  ///< -1 where v goes along dpdu x ng, as in a mirror; else 1: along ng x dpdu
+  Vec3<F> dpdu;  ///< tangent along u, of any length; zero if uv was not requested
+  /// 1 if v runs along ng x dpdu; -1 if it runs the other way, as in a mirrored texture.
+  F handedness;
   Vec2<F> uv;
-  F uv_per_length;     ///< sqrt(uv area / world area) of the triangle
-  F offset;            ///< bound of the error of p along ng
-  Vec3<F> terminator;  ///< from p to the smooth surface that the vertex normals suggest, along ng
-  Vec3<F> unbent;      ///< ns before facing_normal has bent it
+  F uv_per_length;  ///< sqrt(uv area / world area) of the triangle
+  F offset;         ///< bound of the position error along ng
+  /// Vector along ng from p to the smooth surface that the vertex normals suggest.
+  Vec3<F> terminator;
+  Vec3<F> unbent;  ///< ns before facing_normal adjusted it
 };
 
 namespace detail {
 
-/// The meshes of the lanes, read row by row.
+/// Access to the meshes of the lanes, row by row.
 template <typename F>
 class MeshReader {
  public:
@@ -53,7 +55,7 @@ class MeshReader {
     flags = gather_member<F>(meshes, &MeshRecord::flags, mesh, active);
   }
 
-  /// Row `index` of N words of one of a mesh's arrays.
+  /// Returns row `index`, of N 32-bit words, of one of a mesh's arrays.
   template <size_t N>
   WAVECOMB_INLINE std::array<F, N> row(uint64_t MeshRecord::* array, const UInt<F>& index,
                                        const Mask<F>& active) const {
@@ -75,13 +77,13 @@ class MeshReader {
     const auto r = row<2>(array, index, active);
     return {r[0], r[1]};
   }
-  /// Vertices of triangle `prim`.
+  /// Returns the vertex indices of triangle `prim`.
   std::array<UInt<F>, 3> corners(const UInt<F>& prim, const Mask<F>& active) const {
     const auto r = row<3>(&MeshRecord::indices, prim, active);
     return {float_bits<F>(r[0]), float_bits<F>(r[1]), float_bits<F>(r[2])};
   }
 
-  /// Word `index` of one of a mesh's arrays.
+  /// Returns 32-bit word `index` of one of a mesh's arrays.
   UInt<F> word(uint64_t MeshRecord::* array, const UInt<F>& index, const Mask<F>& active) const {
     const InMemory<UInt<F>> at(index);
     InMemory<UInt<F>> out(UInt<F>(0u));
@@ -95,7 +97,7 @@ class MeshReader {
   UInt<F> flags;
 
  private:
-  /// Not inline: most packets are full.
+  /// Not inlined, since most packets are full.
   template <size_t N>
   [[gnu::noinline]] std::array<F, N> some_rows(uint64_t MeshRecord::* array, UInt<F> word,
                                                Mask<F> active) const {
@@ -104,15 +106,15 @@ class MeshReader {
         active);
   }
 
-  const MeshRecord* shared_ = nullptr;  ///< of all active lanes, where they have one
+  const MeshRecord* shared_ = nullptr;  ///< the mesh of all active lanes, if they share one
   const MeshRecord* records_[kWidth<F>];
 };
 
-/// The transforms of the lanes' instances.
+/// Transforms of the lanes' instances.
 template <typename F>
 struct InstanceMaps {
   Vec3<F> row[3], t;
-  F side;  ///< sign of the determinant
+  F side;  ///< sign of the determinant of A
 
   WAVECOMB_INLINE InstanceMaps(const InstanceRecord* instances, const UInt<F>& inst,
                                const Mask<F>& active) {
@@ -126,7 +128,7 @@ struct InstanceMaps {
     }
   }
 
-  /// Takes other transforms where instances move.
+  /// Replaces the transforms of instances that move.
   void place(const MovedInstance<F>& to) {
     for (int i = 0; i < 3; ++i) row[i] = select<F>(to.moves, to.to_world.row[i], row[i]);
     t = select<F>(to.moves, to.to_world.t, t);
@@ -140,14 +142,14 @@ struct InstanceMaps {
   Vec3<F> vector(const Vec3<F>& v) const {
     return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
   }
-  /// Normals go by the cofactors, whose rows are the cross products of the other two rows.
+  /// Maps a normal by the cofactor matrix, whose rows are the cross products of pairs of rows.
   Vec3<F> map_normal(const Vec3<F>& n) const {
     return Vec3<F>(dot(cross(row[1], row[2]), n), dot(cross(row[2], row[0]), n),
                    dot(cross(row[0], row[1]), n)) *
            side;
   }
-  /// Row j of the inverse of the map of vectors: a normal (a, b, c) there is a times row 0 and so
-  /// on in the world, but for its length.
+  /// Returns row j of the inverse of the linear map. A normal (a, b, c) in local space has the
+  /// world direction a row 0 + b row 1 + c row 2, up to its length.
   Vec3<F> inverse_row(int j) const {
     const Vec3<F> c[3] = {cross(row[1], row[2]), cross(row[2], row[0]), cross(row[0], row[1])};
     const F det = dot(row[0], c[0]), inverse = 1.f / select(det == 0.f, F(1.f), det);
@@ -156,7 +158,7 @@ struct InstanceMaps {
   }
 
  private:
-  /// From the words of an InstanceRecord.
+  /// Reads the transform from the words of an InstanceRecord.
   template <typename Word>
   WAVECOMB_INLINE void take(const Word& word) {
     for (uint32_t i = 0; i < 3; ++i) row[i] = {word(4 * i), word(4 * i + 1), word(4 * i + 2)};
@@ -165,7 +167,7 @@ struct InstanceMaps {
   }
 };
 
-/// Whether the lanes' meshes are curves or points.
+/// Returns the lanes whose meshes are curves, points or splats.
 template <typename F>
 inline Mask<F> is_curved(const SceneView& scene, const UInt<F>& mesh, const Mask<F>& active) {
   const UInt<F> flags = gather_member<F>(scene.meshes, &MeshRecord::flags, mesh, active);

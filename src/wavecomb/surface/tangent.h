@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tangents that vary smoothly over triangles; part of surface/surface.h.
+/// Smooth tangents of triangles; part of surface/surface.h.
 #pragma once
 
 #include <array>
@@ -10,11 +10,11 @@
 
 namespace wavecomb::detail {
 
-/// The tangents of three corners as the lanes' meshes hold them, before and after a time.
+/// Encoded tangents of the three corners of each lane, at the steps before and after its time.
 template <typename F>
 struct TangentCodes {
   InMemory<UInt<F>> before[3], after[3];
-  alignas(64) float part[kWidth<F>] = {};  ///< of the way from one to the other
+  alignas(64) float part[kWidth<F>] = {};  ///< interpolation weight of `after`
   bool moves = false;
 
   TangentCodes(const TangentRecord* records, const MeshHit<F>& hit,
@@ -47,7 +47,7 @@ struct TangentCodes {
         for (size_t k = 0; k < 3; ++k) after[k].value[i] = before[k].value[i];
     }
   }
-  /// The tangent of corner k.
+  /// Returns the tangent of corner k.
   Vec3<F> tangent(size_t k) const {
     const Vec3<F> a = decode_direction<F>(load<UInt<F>>(before[k].value));
     if (!moves) return a;
@@ -56,9 +56,9 @@ struct TangentCodes {
   }
 };
 
-/// The tangent at hits, in the mesh's space: between those of the triangle's corners, or `flat`,
-/// the triangle's own, where a mesh has none or they cancel out. Not inline: kernels of scenes
-/// without such meshes keep their size.
+/// Returns the tangent at hits in the mesh's local space, interpolated between the corners of the
+/// triangle, or `flat`, that of the triangle, if the mesh has none or they cancel out. Not inlined,
+/// so that kernels of scenes without such meshes keep their size.
 template <typename F>
 [[gnu::noinline]] Vec3<F> smooth_tangent(const SceneView& scene, const MeshHit<F>& hit,
                                          const std::array<UInt<F>, 3>& corners, const Vec3<F>& flat,

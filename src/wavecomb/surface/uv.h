@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Texture coordinates of hits.
+/// Texture coordinates at hits.
 #pragma once
 
 #include <array>
@@ -9,14 +9,15 @@
 
 namespace wavecomb {
 
-/// Texture coordinates over a triangle: those of vertex 0, and how much the others differ.
+/// Texture coordinates over a triangle: those of vertex 0, and the differences of the other
+/// vertices.
 template <typename F>
 struct UvTriangle {
   Vec2<F> t0, d1, d2;
 
   UvTriangle(const Vec2<F>& a, const Vec2<F>& b, const Vec2<F>& c)
       : t0(a), d1{b.x - a.x, b.y - a.y}, d2{c.x - a.x, c.y - a.y} {}
-  /// At barycentrics (b1, b2) of vertices 1 and 2.
+  /// Returns the value at barycentrics (b1, b2) of vertices 1 and 2.
   Vec2<F> at(const F& b1, const F& b2) const {
     return {fma(d2.x, b2, fma(d1.x, b1, t0.x)), fma(d2.y, b2, fma(d1.y, b1, t0.y))};
   }
@@ -24,7 +25,8 @@ struct UvTriangle {
 
 namespace detail {
 
-/// Of triangle `prim`, whose vertices are `corners`; barycentrics where the mesh has none.
+/// Returns the texture coordinates of triangle `prim`, whose vertices are `corners`; barycentrics
+/// if the mesh has no texture coordinates.
 template <typename F>
 WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
                                           const std::array<UInt<F>, 3>& corners,
@@ -48,7 +50,8 @@ WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
 
 }  // namespace detail
 
-/// Texture coordinates of a hit at (u, v) of primitive `prim`, as setup_surface gives them.
+/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`, the same as
+/// setup_surface computes.
 template <typename F>
 inline Vec2<F> hit_uv(const MeshRecord* meshes, const UInt<F>& mesh, const UInt<F>& prim,
                       const F& u, const F& v, const Mask<F>& active) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Emission and opacity of materials at hits, the same for all that ask: shading's own emission is
-/// read by the same inputs and graphs (material/params.h).
+/// Emission and opacity of materials at hits. All callers get the same values; shading reads its
+/// own emission from the same inputs and graphs (material/params.h).
 ///
-/// What a graph drives takes the place of a texture, which takes the place of a constant, component
-/// by component.
+/// Graphs override textures, and textures override constants, for each component.
 #pragma once
 
 #include "wavecomb/graph/value.h"
@@ -13,7 +12,7 @@ namespace wavecomb {
 
 namespace detail {
 
-/// What graphs are given where there is nothing but texture coordinates.
+/// Graph inputs where only texture coordinates are known.
 template <typename F>
 struct UvOnly {
   const Vec2<F>& uv;
@@ -28,9 +27,9 @@ struct UvOnly {
 
 }  // namespace detail
 
-/// Radiance that the surface emits at `uv`, whether it is there or not. `footprint` is the
-/// ray's in uv. Graphs are given what `make_point(active)` says, which is called only where there
-/// is one.
+/// Returns the radiance that the surface emits at `uv`, regardless of its presence. `footprint` is
+/// that of the ray in uv space. Graphs get the inputs that `make_point(active)` returns, which is
+/// called only if there is a graph.
 template <typename F, typename MakePoint>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                                const Footprint<F>& footprint, const MakePoint& make_point,
@@ -43,16 +42,16 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
   if (none(driven)) return plain;
   return graph_value<F>(view, graph, kEmissionOutput, make_point(driven), driven, plain);
 }
-/// The same where graphs have nothing but uv.
+/// Returns the emission for graphs that read only uv.
 template <typename F>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                                const Footprint<F>& footprint, const Mask<F>& active) {
   return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
-/// How much of the surface is there at `uv`: the probability that a ray meets it. It is 0 or 1 with
-/// an opacity threshold, and 1 for materials whose opacity is transparency (the program transmits
-/// then). Graphs as in fetch_emission.
+/// Returns the presence of the surface at `uv`, the probability that a ray hits it. It is 0 or 1
+/// with an opacity threshold, and 1 for materials whose opacity is transparency, which the program
+/// handles. `make_point` as in fetch_emission.
 template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const MakePoint& make_point,
@@ -70,7 +69,7 @@ inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const 
   const F present = select(threshold > 0.f, cut, opacity);
   return select(detail::opacity_is_presence(inputs, threshold), present, F(1.f));
 }
-/// The same where graphs have nothing but uv.
+/// Returns the presence for graphs that read only uv.
 template <typename F>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const Mask<F>& active) {
