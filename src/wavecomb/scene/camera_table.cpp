@@ -86,47 +86,51 @@ CameraParameter counted(CameraParameter p) {
 std::vector<CameraParameter> make_camera_parameters() {
   using C = Camera;
   return {
-      counted(number_from<&C::lens_radius>("lens_radius", 0,
-                                           "Of the lens, scene units; 0: all is sharp.")),
-      counted(distance<&C::focus_distance>("focus_distance",
-                                           "Along -z, scene units; above 0 with a lens.")),
-      counted(number_from<&C::near_clip>("near_clip", 0,
-                                         "Along -z, scene units; of a latlong camera a distance.")),
-      counted(distance<&C::far_clip>("far_clip",
-                                     "Along -z, scene units; of a latlong camera a distance.")),
+      counted(number_from<&C::lens_radius>(
+          "lens_radius", 0, "Lens radius in scene units; 0 gives a pinhole camera.")),
+      counted(distance<&C::focus_distance>(
+          "focus_distance",
+          "Distance of the focal plane along -z, scene units; above 0 with a lens.")),
+      counted(number_from<&C::near_clip>(
+          "near_clip", 0,
+          "Near clipping distance along -z, scene units; radial for a latlong camera.")),
+      counted(distance<&C::far_clip>(
+          "far_clip", "Far clipping distance along -z, scene units; radial for a latlong camera.")),
       counted(needed(row<&C::window>(
           "window",
-          "x0, x1, y0, y1 of what the picture shows: on the plane z = -1, across the axis of an "
-          "orthographic camera, longitude and latitude in radians of a latlong one."))),
+          "Visible region (x0, x1, y0, y1): on the plane z = -1, in scene units for an "
+          "orthographic camera, longitude and latitude in radians for a latlong one."))),
       choice<&C::projection>("projection", {"perspective", "orthographic", "latlong"},
-                             "latlong: all directions, longitude to the right, latitude up."),
+                             "latlong shows all directions, longitude to the right, latitude up."),
       choice<&C::conform>("conform",
                           {"expandAperture", "cropAperture", "adjustApertureWidth",
                            "adjustApertureHeight", "adjustPixelAspectRatio"},
-                          "What gives way where the shapes of window and picture differ: "
+                          "How the window is fitted to an image of another aspect ratio: "
                           "UsdRender's aspectRatioConformPolicy."),
-      number_above<&C::pixel_aspect>("pixel_aspect", 0, "Width of a pixel / its height."),
+      number_above<&C::pixel_aspect>("pixel_aspect", 0, "Pixel width / pixel height."),
       row<&C::clip_planes>("clip_planes",
-                           "Planes (a, b, c, d) in the camera's space; of what it sees itself, "
-                           "points with a x + b y + c z + d < 0 are cut off."),
-      number_from<&C::exposure>("exposure", 0, "What light is multiplied by in the picture."),
-      number_from<&C::aperture_blades>("aperture_blades", 0,
-                                       "Corners of the aperture, 3 or more; 0: it is round."),
-      row<&C::aperture_rotation>("aperture_rotation", "Of the aperture, degrees."),
+                           "Planes (a, b, c, d) in camera space; camera rays ignore points with a "
+                           "x + b y + c z + d < 0."),
+      number_from<&C::exposure>("exposure", 0, "Factor of the image's radiance."),
+      number_from<&C::aperture_blades>(
+          "aperture_blades", 0, "Number of corners of the aperture, 3 or more; 0 gives a disk."),
+      row<&C::aperture_rotation>("aperture_rotation", "Rotation of the aperture, degrees."),
       number_above<&C::lens_squeeze>("lens_squeeze", 0,
-                                     "The aperture's height / its width: anamorphic lenses."),
-      row<&C::lens_k1>("lens_k1", "Radial distortion, of r^2 on the plane at distance 1."),
-      row<&C::lens_k2>("lens_k2", "Radial distortion, of r^4."),
-      row<&C::lens_k3>("lens_k3", "Radial distortion, of r^6."),
+                                     "Aperture height / aperture width, for anamorphic lenses."),
+      row<&C::lens_k1>("lens_k1",
+                       "Radial distortion, coefficient of r^2 on the plane at distance 1."),
+      row<&C::lens_k2>("lens_k2", "Radial distortion, coefficient of r^4."),
+      row<&C::lens_k3>("lens_k3", "Radial distortion, coefficient of r^6."),
       row<&C::lens_p1>("lens_p1", "Tangential distortion."),
       row<&C::lens_p2>("lens_p2", "Tangential distortion."),
-      row<&C::lens_map>("lens_map",
-                        "Distortion as a map: n x n nodes over the picture, two in each four "
-                        "numbers; shares of the undistorted picture's width and height."),
+      row<&C::lens_map>(
+          "lens_map",
+          "Distortion as a map of n x n nodes over the image, two in each four numbers: positions "
+          "in fractions of the undistorted image's width and height."),
       choice<&C::rolling_shutter>("rolling_shutter", {"off", "top", "bottom", "left", "right"},
-                                  "The edge of the picture at which a rolling shutter begins."),
-      number_from<&C::rolling_duration>("rolling_duration", 0,
-                                        "Share of the shutter's time that a row is exposed."),
+                                  "Image edge at which a rolling shutter begins."),
+      number_from<&C::rolling_duration>(
+          "rolling_duration", 0, "Fraction of the shutter interval for which a row is exposed."),
   };
 }
 
