@@ -163,7 +163,7 @@ void CameraParameter::check(const Camera& camera) const {
     if (!finite(*four)) wrong("is not finite; mend it");
   } else if (const auto* planes = std::get_if<std::vector<FourNumbers>>(&value)) {
     for (const FourNumbers& plane : *planes)
-      if (!finite(plane)) wrong("are not finite; mend them");
+      if (!finite(plane)) wrong("are not finite; give finite numbers");
   }
 }
 
@@ -174,11 +174,13 @@ std::span<const CameraParameter> camera_table() {
 
 void check_camera(const Camera& camera) {
   if (!is_place(camera.to_world))
-    throw Error("the camera's transform is singular or not finite; mend it");
+    throw Error("the camera's transform is singular or not finite; give an invertible one");
   if (camera.steps.size() == 1 || camera.steps.size() > kMostSteps)
     throw Error("the camera's motion needs 2 to " + std::to_string(kMostSteps) + " steps");
   for (const Affine& step : camera.steps)
-    if (!is_place(step)) throw Error("the camera's motion is singular or not finite; mend it");
+    if (!is_place(step))
+      throw Error(
+          "the camera's motion has a singular or non-finite transform; give invertible ones");
   for (const CameraParameter& p : camera_table()) p.check(camera);
   // Checks that involve several parameters.
   const float* w = camera.window;
@@ -196,7 +198,7 @@ void check_camera(const Camera& camera) {
     throw Error("the camera's rolling_duration is " + text(camera.rolling_duration) +
                 "; it must be from 0 to 1");
   if (!camera.lens_map.empty() && lens_map_nodes(camera) == 0)
-    throw Error("the camera's lens_map must have as many nodes along each edge, an even number");
+    throw Error("the camera's lens_map needs n x n nodes with an even n");
   if (!(camera.far_clip > camera.near_clip))
     throw Error("the camera's clipping range must end beyond its start");
 }

@@ -275,7 +275,8 @@ void check_value(const std::string& of, const LightParameter& p, const LightValu
                   text(double{c->z}) + "); each must be " + limits(p));
   if (const auto* maps = std::get_if<std::vector<Affine>>(&value))
     for (const Affine& map : *maps)
-      if (!finite(map)) throw Error(of + "a transform of " + p.name + " is not finite; mend it");
+      if (!finite(map))
+        throw Error(of + "a transform of " + p.name + " is not finite; give finite numbers");
   const auto* number = std::get_if<uint32_t>(&value);
   const size_t counts[] = {kNone, there.textures, there.profiles, there.sets, kNone, there.filters};
   if (!number || *number < counts[static_cast<size_t>(p.refers)]) return;
@@ -336,7 +337,7 @@ void check_light(const Light& light, const LightReferences& there) {
 
 void check_mesh_light(const Light& light, const LightReferences& there) {
   if (light.kind != kMeshLight)
-    throw Error(quoted("light", light.name) + ": it is no light of meshes");
+    throw Error(quoted("light", light.name) + ": its kind is not a mesh light");
   check(light, there);
 }
 

@@ -42,13 +42,13 @@ void check_attributes(const Mesh& mesh, const std::string& name,
     if (a.width < 1 || a.width > 4) throw Error(where + ", which needs 1 to 4 components");
     const size_t want = value_count(mesh, a.rate) * a.width;
     if (want == 0 && mesh.primitive_count() > 0)
-      throw Error(where + " where such a mesh can have none");
+      throw Error(where + " at a rate that this type of mesh does not support");
     if (a.values.size() != want)
       throw Error(where + " with " + std::to_string(a.values.size() / a.width) + " values where " +
                   std::to_string(want / a.width) + " are needed");
     for (const float value : a.values)
       if (!std::isfinite(value))
-        throw Error(where + " with values that are not finite; mend or remove them");
+        throw Error(where + " with values that are not finite; fix or remove them");
   }
 }
 

@@ -42,7 +42,7 @@ void check_mesh(const Mesh& mesh, const std::vector<std::string>& names) {
     throw Error(name + " has too many points or triangles for 32-bit offsets; split it");
   for (float x : mesh.positions)
     if (!std::isfinite(x))
-      throw Error(name + " has points that are not finite (NaN or infinite); mend or remove them");
+      throw Error(name + " has points that are not finite (NaN or infinite); fix or remove them");
   const size_t vertices = mesh.vertex_count();
   uint32_t highest = 0;
   for (uint32_t i : mesh.indices) highest = std::max(highest, i);

@@ -59,7 +59,9 @@ ObjectNames::ObjectNames(const Scene& scene) : scene_(scene) {
   light_count_ = set.first_triangle();
   volume_count_ = static_cast<uint32_t>(scene.volumes().size());
   if (next + light_count_ + volume_count_ >= kNoName)
-    throw Error("more than 4 thousand million objects: ids of objects cannot be told apart");
+    throw Error(
+        "the scene has more than 4,294,967,294 objects, the limit of object ids; use fewer "
+        "instances");
   first_light_ = static_cast<uint32_t>(next);
   light_of_record_.resize(light_count_);
   for (size_t i = 0; i < scene.lights().size(); ++i)

@@ -129,7 +129,7 @@ std::shared_ptr<const Scene> Scene::edited(const SceneEdit& edit, uint32_t threa
     for (const ProgramId program : {material.program, materials()[id].program})
       if (static_cast<uint32_t>(program) >= kSurfaceProgramCount)
         throw Error(quoted("material", material.name) +
-                    " is what paths meet in a volume; it cannot be edited");
+                    " is the internal material of a medium; it cannot be edited");
   }
   for (const auto& [i, light] : edit.lights) {
     if (i >= lights().size()) throw_unknown("light", i, lights().size());

@@ -98,7 +98,7 @@ uint32_t SceneBuilder::add_material(Material material) {
   check_material(material, textures_.size(), graphs_.programs.size());
   if (static_cast<uint32_t>(material.program) >= kSurfaceProgramCount)
     throw Error(quoted("material", material.name) + " has program '" +
-                info_of(material.program).name + "', which no surface can wear; choose another");
+                info_of(material.program).name + "', which is not for surfaces; choose another");
   const bool glows = material.emission.x > 0 || material.emission.y > 0 ||
                      material.emission.z > 0 || material.has_texture(Input::kEmission);
   if (glows && !material.emits())
@@ -156,7 +156,7 @@ void SceneBuilder::add_instance(uint32_t parent, uint32_t child, const Affine& t
   if (!finite(transform) ||
       !std::all_of(steps.begin(), steps.end(), [](const Affine& m) { return finite(m); }))
     throw Error("an instance of " + quoted("group", groups_[child].name) +
-                " has a transform that is not finite; mend it");
+                " has a transform that is not finite; give finite numbers");
   if (steps.size() == 1 || steps.size() > kMostSteps)
     throw Error("the motion of an instance of " + quoted("group", groups_[child].name) +
                 " needs 2 to " + std::to_string(kMostSteps) + " steps");

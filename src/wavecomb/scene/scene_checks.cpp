@@ -40,7 +40,7 @@ void check_material(const Material& material, size_t texture_count, size_t graph
       for (float x : values)
         if (!std::isfinite(x))
           throw Error(name +
-                      " reads a texture through a number that is not finite; mend its scale, bias "
+                      " reads a texture through a number that is not finite; fix its scale, bias "
                       "or transform");
     if (use.channel > 4)
       throw Error(name + " reads a texture channel that is not r, g, b, a or rgb");
@@ -85,8 +85,8 @@ void check_profile(const IesProfile& p) {
       !ascending(p.horizontal) || !(p.vertical.front() >= 0) || !(p.vertical.back() <= 180) ||
       !(p.vertical.back() > p.vertical.front()))
     throw Error(
-        "an IES profile needs two or more vertical angles in [0, 180], ascending, and "
-        "horizontal ones likewise");
+        "an IES profile needs two or more vertical angles in [0, 180], and at least one "
+        "horizontal angle, each list ascending");
   if (p.horizontal.size() > 1 && (p.horizontal.front() != 0 || p.horizontal.back() != 360))
     throw Error("the horizontal angles of an IES profile must go from 0 to 360");
   if (p.candela.size() != p.vertical.size() * p.horizontal.size())
@@ -103,11 +103,11 @@ void check_filter(const LightFilter& f, size_t textures, size_t filters) {
   for (const Vec3<float>& line :
        {f.sides[0], f.sides[1], f.sides[2], f.sides[3], f.picture_u, f.picture_v})
     is_finite = is_finite && good(line.x, line.y, line.z);
-  if (!is_finite) throw Error("a light filter has a value that is not finite; mend it");
+  if (!is_finite) throw Error("a light filter has a value that is not finite; give finite numbers");
   if (f.texture != kNoTexture && f.texture >= textures)
     throw Error("a light filter's texture was never added; add textures before filters");
   if (f.next != kNoFilter && f.next >= filters)
-    throw Error("the filter that a light filter goes with was never added; add that before");
+    throw Error("the next filter of a light filter was never added; add it first");
 }
 
 }  // namespace wavecomb

@@ -88,7 +88,7 @@ void check_field(const std::string& name, const char* what, const VolumeField& f
   const double det = bricks_to_world(v, field).determinant();
   if (!std::isfinite(det) || std::abs(det) < 1e-30)
     throw Error(name + ": its " + what +
-                " grid is placed by a transform that is singular or not finite; mend it");
+                " grid has a transform that is singular or not finite; give an invertible one");
 }
 
 }  // namespace
@@ -125,7 +125,7 @@ void check_volume(const Volume& v) {
   if (!v.density.grid) {
     const double det = bricks_to_world(v, box).determinant();
     if (!std::isfinite(det) || std::abs(det) < 1e-30)
-      throw Error(name + " is placed by a transform that is singular or not finite; mend it");
+      throw Error(name + " has a transform that is singular or not finite; give an invertible one");
   }
   check_field(name, "density", v.density, v);
   check_field(name, "color", v.color, v);

@@ -41,7 +41,7 @@ class BrickSource {
         stride *= size[k];
       }
       if (at_[cell] != kNoBrick)
-        throw Error("grid '" + b.name + "' has two bricks at one place; leave one out");
+        throw Error("grid '" + b.name + "' has two bricks at the same position; remove one");
       at_[cell] = static_cast<uint32_t>(i);
     }
   }
@@ -92,12 +92,13 @@ void check_values(const GridBricks& b) {
     });
     if (!good)
       throw Error("grid '" + b.name + "' has values that are " +
-                  (b.is_signed ? "" : "negative or ") + "not finite; mend the file");
+                  (b.is_signed ? "" : "negative or ") + "not finite; fix the file");
   };
   check(b.floats, [](float x) { return x; });
   check(b.halves, [](uint16_t x) { return half_to_float<float>(uint32_t{x}); });
   if (!(b.background >= 0 && b.background <= kMost))
-    throw Error("grid '" + b.name + "' has a background that is negative or not finite; mend it");
+    throw Error("grid '" + b.name +
+                "' has a background that is negative or not finite; fix the file");
 }
 
 }  // namespace
@@ -118,7 +119,7 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
   if (count == 0) throw Error(name + " has no voxels; leave it out");
   if (b.origins.size() % 3 != 0 ||
       b.floats.size() + b.halves.size() != count * kInner * b.components)
-    throw Error(name + " has not 8 x 8 x 8 voxels for each brick");
+    throw Error(name + " does not have 8 x 8 x 8 voxels for each brick");
   check_values(b);
   std::array<int64_t, 3> lo{}, hi{};
   for (size_t i = 0; i < b.origins.size(); ++i) {
