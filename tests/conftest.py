@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Skips that CI does not allow, tests that take minutes (see parts.py), what files share."""
+"""Skips that CI rejects, long tests (see parts.py), and fixtures shared by test files."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ import parts
 import pytest
 import tiers
 
-# A command in the sandbox is a fresh Python, which hundreds of tests would wait for. Tests of the
-# sandbox give --sandbox on.
+# A command in the sandbox starts a new Python process, which would delay hundreds of tests. Tests
+# of the sandbox pass --sandbox on.
 os.environ.setdefault("WAVECOMB_SANDBOX", "off")
 
-# Hundreds of processes: none of them has to compile the package. What is in a sandbox could not
-# keep what it compiled.
+# Tests start hundreds of processes, which should not compile the package each time. A process in
+# the sandbox could not save the result.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
     sys.dont_write_bytecode = False
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compiles the package, once and before there are workers."""
+    """Compile the package once, before workers start."""
     if not hasattr(config, "workerinput"):
         compileall.compile_dir(parts.PACKAGE, quiet=2)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """A file stays with one worker, and so do its fixtures, until another has nothing to do."""
+    """Keep the tests of a file in one worker, with its fixtures, until another worker is idle."""
     if config.getvalue("dist") != "load":
         return None
     from xdist.scheduler import WorkStealingScheduling
@@ -44,7 +44,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def caustics(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The stage of that name, a coarse one."""
+    """The scene caustics with a coarse teapot."""
     from wavecomb.scenes import write_scene
 
     path = tmp_path_factory.mktemp("caustics") / "caustics.usdc"
@@ -54,7 +54,7 @@ def caustics(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def forked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Processes that the package starts, such as readers of stages, are forked, too."""
+    """Also fork the processes that the package starts, such as readers of stages."""
     import forks
 
     monkeypatch.setattr(subprocess, "Popen", forks.Popen)
@@ -62,7 +62,7 @@ def forked(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leaves the long tests to `make test-long`."""
+    """Skip the long tests unless `make test-long` runs."""
     rows = tiers.read(tiers.FILE.read_text(encoding="utf-8"))
     by_file: dict[str, list[str]] = {}
     for row in rows:
@@ -80,7 +80,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
-    """Makes a failure of a skip for want of a part."""
+    """Turn a skip because of a missing requirement into a failure."""
     if not report.skipped or hasattr(report, "wasxfail"):
         return
     where = report.longrepr
@@ -92,7 +92,7 @@ def refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Notes CPU time. Strict: no test is skipped for want of a part."""
+    """Record CPU time. In strict mode, reject skips because of missing requirements."""
     report = yield
     report.user_properties.append((cpu_times.PROPERTY, cpu_times.since_last()))
     if parts.is_strict():
@@ -102,7 +102,7 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Strict: no file of tests is skipped for want of a part."""
+    """In strict mode, reject test files that are skipped because of missing requirements."""
     report = yield
     if parts.is_strict():
         refuse_skip(report)
@@ -110,12 +110,12 @@ def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Adds up what tests took; with xdist, in the process that collects the reports."""
+    """Sum the CPU time of tests; with xdist, in the process that collects the reports."""
     cpu_times.add(report.nodeid, dict(report.user_properties).get(cpu_times.PROPERTY, 0.0))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Says which files and tests took most CPU time."""
+    """Print the files and tests that took the most CPU time."""
     lines = cpu_times.table()
     if lines:
         terminalreporter.section("CPU time")

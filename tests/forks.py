@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Processes that need not import OpenUSD and NumPy anew.
+"""Run Python processes without importing OpenUSD and NumPy each time.
 
-A fresh `wavecomb` takes most of a second before it does anything. `wavecomb(...)`, `code(...)` and
-`Popen` ask a server that has imported everything, and done nothing else: it has one thread, and
-forks for each request. What is forked gets the folder, variables and descriptors that it was to be
-started with, and goes on as `python -m` or `python -c` do, to the end: supervisor, sandbox, signals
-and exit codes are those of a command. What cannot be so is started as ever: other programs, limits
-set by `preexec_fn`, variables that are read at import and are not what they were (`HARMLESS` are
-not). Tests of what is imported and when start real processes.
+Importing `wavecomb` takes most of a second. `wavecomb(...)`, `code(...)` and `Popen` send a request
+to a server process, which has imported all modules, has a single thread, and forks for each
+request. The forked process uses the requested folder, variables and descriptors and then runs like
+`python -m` or `python -c`, with the same supervisor, sandbox, signals and exit codes as a command.
+Requests that a fork cannot serve start a process as usual: other programs, limits set by
+`preexec_fn`, and changes of variables that are read at import (all except `HARMLESS`). Tests of
+what is imported and when start real processes.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ HARMLESS = frozenset((
     "WAVECOMB_DEBUG", "HOME", "TMPDIR", "PYTEST_CURRENT_TEST", "COLUMNS",
     "OPENBLAS_NUM_THREADS",
 ))  # fmt: skip
-"""Variables that are read when a command runs, or that a command sets itself before it imports
-what reads them; any other may be read at import."""
+"""Variables that are read when a command runs, or that a command sets before it imports the module
+which reads them. All others may be read at import."""
 
 _MOST = 100_000
-_Popen = subprocess.Popen  # tests may put the one below in its place
+_Popen = subprocess.Popen  # tests may replace it by the class below
 _server: Server | None = None
 _lock = threading.Lock()
 
 
 def wavecomb(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    """What `wavecomb ARGUMENTS` says, and how it ends. Options: of `run`."""
+    """Run `wavecomb ARGUMENTS` and return its output and exit code; options are those of `run`."""
     return run(["-m", "wavecomb", *map(str, arguments)], **options)
 
 
 def code(text: str, *arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    """What `python -c TEXT ARGUMENTS` says; what `wavecomb` needs is imported already."""
+    """Run `python -c TEXT ARGUMENTS`; the imports of `wavecomb` are done already."""
     return run(["-c", text, *map(str, arguments)], **options)
 
 
@@ -55,7 +55,7 @@ def run(
     cwd: str | Path | None = None,
     timeout: float = 100,
 ) -> subprocess.CompletedProcess[str]:
-    """As `subprocess.run`, of Python with these words, captured, as text."""
+    """Run Python with these arguments like `subprocess.run`, and capture its output as text."""
     pipe, command = subprocess.PIPE, [sys.executable, *words]
     process = Popen(command, stdout=pipe, stderr=pipe, text=True, env=env, cwd=cwd)
     with process:
@@ -68,7 +68,7 @@ def run(
 
 
 def close() -> None:
-    """Ends the server, if there is one."""
+    """End the server if it is running."""
     global _server
     if _server is not None:
         _server.close()
@@ -76,7 +76,7 @@ def close() -> None:
 
 
 class Server:
-    """The process that forks, seen from the tests."""
+    """Connection of the tests to the server process."""
 
     def __init__(self) -> None:
         self._variables = _read_at_import(os.environ)
@@ -90,11 +90,11 @@ class Server:
             )
 
     def serves(self, variables: Mapping[str, str]) -> bool:
-        """Whether variables that are read at import are what they were."""
+        """Whether the variables that are read at import are those of the server."""
         return _read_at_import(variables) == self._variables
 
     def fork(self, request: Mapping[str, Any], descriptors: Sequence[int]) -> socket.socket:
-        """Has a process forked; gives the socket that tells its pid, and how it ended."""
+        """Fork a process; return the socket that reports its process id and exit status."""
         mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with its:
             data = json.dumps(request).encode()
@@ -102,7 +102,7 @@ class Server:
         return mine
 
     def close(self) -> None:
-        """Ends the server."""
+        """End the server."""
         self._channel.close()
         self._process.wait(10)
 
@@ -112,7 +112,7 @@ def _read_at_import(variables: Mapping[str, str]) -> dict[str, str]:
 
 
 class Popen(_Popen):
-    """`subprocess.Popen`, forked by the server where that makes no difference."""
+    """`subprocess.Popen` that lets the server fork where this makes no difference."""
 
     _told: socket.socket | None = None
 
@@ -175,7 +175,7 @@ def _is_python(words: Sequence[str]) -> bool:
 
 
 def _is_booted(words: Sequence[str]) -> bool:
-    """Whether this is a command of ``wavecomb.processes``, without more flags of Python."""
+    """Whether this is a command of ``wavecomb.processes`` without other flags of Python."""
     return words[0] == "-I" and words[1].endswith(os.path.join("wavecomb", "boot.py"))
 
 
@@ -188,13 +188,13 @@ def _started() -> Server | None:
         return _server
 
 
-# ---- the process that forks ----------------------------------------------------------------------
+# ---- server process ------------------------------------------------------------------------------
 
 
 def _import_everything() -> None:
-    """All modules of the package but the window's, and what they import when they need it.
+    """Import all modules of the package except the window's, and their deferred imports.
 
-    Not the plug-in for volumes: what OpenVDB logs with starts threads when it is loaded.
+    The volume plug-in is excluded, because OpenVDB's logging starts threads when it is loaded.
     """
     import importlib
     import pkgutil
@@ -205,13 +205,13 @@ def _import_everything() -> None:
     names += ["difflib", "runpy"]
     for name in names:
         if not name.startswith(("wavecomb.gui", "wavecomb._vdb")) and not name.endswith("__main__"):
-            # Without an extra that is not installed; who needs it says so.
+            # Modules of optional extras may be missing; commands that need them report it.
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
 
 
 def _serve(channel: socket.socket) -> dict[str, Any] | None:
-    """Forks for each request; gives it, in the fork. None: nobody asks any more."""
+    """Fork for each request and return it in the child; None when the tests have ended."""
     while True:
         data, descriptors, _, _ = socket.recv_fds(channel, 2 * _MOST, 16)
         with contextlib.suppress(ChildProcessError):
@@ -229,7 +229,7 @@ def _serve(channel: socket.socket) -> dict[str, Any] | None:
 
 
 def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
-    """Goes on in a child, with its descriptors; this process waits for it, and tells its end."""
+    """Continue in a child with its descriptors; this process waits and reports the child's exit."""
     import fcntl
 
     told, *given = (fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, 500) for one in descriptors)
@@ -254,7 +254,7 @@ def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
 
 
 def _end(code: object) -> None:
-    """Ends this process as Python does, but takes down no module: that is half of what is left."""
+    """End this process as Python does, but skip module teardown, half of the remaining time."""
     if code is not None and not isinstance(code, int):
         print(code, file=sys.stderr)
         code = 1
@@ -266,7 +266,7 @@ def _end(code: object) -> None:
 
 
 def _main(descriptor: int) -> None:
-    # NumPy's matrix products would start threads; commands say so, too.
+    # NumPy's matrix products would start threads; commands set this variable as well.
     mine = "OPENBLAS_NUM_THREADS" not in os.environ
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     here = os.path.dirname(os.path.abspath(__file__))
@@ -295,7 +295,7 @@ def _main(descriptor: int) -> None:
         if way == "-I":
             from wavecomb import boot
 
-            # Its parent is the process that waits for it.
+            # The parent is the process that waits for it.
             alive = f"--parent={os.getppid()}"
             boot.main([alive if one.startswith("--parent=") else one for one in rest])
         elif way == "-m":

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a test needs, in words that CI understands.
+"""Requirements of tests, and skips that CI accepts.
 
-A test without a part that it needs is skipped on a user's machine, and fails where all parts have
-to be: in CI (`CI=true`), or with `WAVECOMB_STRICT=1`. `conftest.py` sees to that for every skip,
-also for `pytest.skip` and `pytest.importorskip`. Only two kinds of skips are left alone: what
-`make test-long` runs, and where `only_where` or `not_here` says that this machine or this build is
-the wrong one.
+A test whose requirement is missing is skipped on a user's machine. It fails where everything must
+be installed: in CI (`CI=true`), or with `WAVECOMB_STRICT=1`. `conftest.py` applies this to every
+skip, including `pytest.skip` and `pytest.importorskip`. Two kinds of skips are always accepted:
+tests that only `make test-long` runs, and those that `only_where` or `not_here` skips because of
+the machine or the build.
 
     pytestmark = needs("wavecomb._core")
 
@@ -27,7 +27,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "python" / "wavecomb"
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
-"""Stages, pictures and meshes of others; not on a user's machine."""
+"""Third-party stages, images and meshes; not available on a user's machine."""
 
 NOT_HERE = "not here: "
 LONG = "long: "
@@ -35,22 +35,22 @@ _OFF = ("", "0", "false", "no", "off")
 
 
 def is_on(name: str, environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether an environment variable says yes."""
+    """Whether an environment variable is set to a true value."""
     return environment.get(name, "").strip().lower() not in _OFF
 
 
 def is_strict(environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether a missing part is a failure: as `WAVECOMB_STRICT` says, or else in CI."""
+    """Whether a missing requirement is a failure: by `WAVECOMB_STRICT` if set, otherwise in CI."""
     return is_on("WAVECOMB_STRICT" if "WAVECOMB_STRICT" in environment else "CI", environment)
 
 
 def is_long(environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether tests take as long as they need: `WAVECOMB_LONG=1`, as `make test-long` sets it."""
+    """Whether long tests run: `WAVECOMB_LONG=1`, which `make test-long` sets."""
     return is_on("WAVECOMB_LONG", environment)
 
 
 def missing(part: str) -> str:
-    """Why a part is not to be had: a module, a program (`bin:objdump`) or `userfaultfd`; or ''."""
+    """Reason why a module, a program (`bin:objdump`) or `userfaultfd` is unavailable, or ''."""
     if part.startswith("bin:"):
         return "" if shutil.which(part[4:]) else f"the program {part[4:]} is not installed"
     if part == "userfaultfd":
@@ -65,19 +65,19 @@ def missing(part: str) -> str:
 
 
 def needs(*parts: str) -> pytest.MarkDecorator:
-    """Marks tests that need these parts; see `missing` for their names."""
+    """Mark tests that have these requirements; `missing` lists the possible names."""
     reasons = [f"{part}: {reason}" for part in parts if (reason := missing(part))]
     return pytest.mark.skipif(bool(reasons), reason="needs " + "; ".join(reasons))
 
 
 def needs_asset(*files: str) -> pytest.MarkDecorator:
-    """Marks tests that need these files below `ASSETS`; a folder does not do."""
+    """Mark tests that need these files below `ASSETS`; folders are not accepted."""
     absent = [file for file in files if not (ASSETS / file).is_file()]
     return pytest.mark.skipif(bool(absent), reason=f"needs {', '.join(absent)} in {ASSETS}")
 
 
 def asset(file: str) -> Path:
-    """The file below `ASSETS`, from within a test; without it the test is skipped."""
+    """Return a file below `ASSETS` to a test, which is skipped if the file is missing."""
     path = ASSETS / file
     if not path.is_file():
         pytest.skip(f"needs {file} in {ASSETS}")
@@ -85,7 +85,7 @@ def asset(file: str) -> Path:
 
 
 def written_scenes() -> list[str]:
-    """Names of the scenes that can be written and read here: reading grids needs OpenVDB."""
+    """Names of the scenes that this machine can write and read: reading grids needs OpenVDB."""
     from wavecomb import vdb
     from wavecomb.scenes import SCENES
 
@@ -94,10 +94,10 @@ def written_scenes() -> list[str]:
 
 
 def only_where(condition: object, reason: str) -> pytest.MarkDecorator:
-    """Marks tests of other machines or builds: no part is missing, so CI may skip them, too."""
+    """Mark tests for certain machines or builds only. CI accepts the skip."""
     return pytest.mark.skipif(not condition, reason=NOT_HERE + reason)
 
 
 def not_here(reason: str) -> NoReturn:
-    """Ends a test that this machine or this build cannot run; CI may skip it, too."""
+    """Skip a test that this machine or this build cannot run. CI accepts the skip."""
     pytest.skip(NOT_HERE + reason)

@@ -16,7 +16,8 @@ namespace {
 
 using F = float;
 using Rgb = Vec3<F>;
-constexpr uint32_t kMostCrossings = 32;  ///< surfaces that are looked through for a light
+/// Maximum number of surfaces that a ray crosses in search of mesh lights.
+constexpr uint32_t kMostCrossings = 32;
 
 Vec3<F> triple(const float* v) {
   return {v[0], v[1], v[2]};
@@ -25,15 +26,15 @@ bool is_positive(const Rgb& c) {
   return c.x > 0 || c.y > 0 || c.z > 0;
 }
 
-/// A ray and what those who emit may ask of it.
+/// A ray, with the data that emission depends on.
 struct Ray {
   Vec3<F> o, d;
-  bool is_seen = true;  ///< by the camera, or in a mirror; else a uniform direction
-  uint32_t link = 0;    ///< class of the surface that it left
+  bool is_seen = true;  ///< set for camera rays and mirror directions, false for uniform directions
+  uint32_t link = 0;    ///< light linking class of the surface where it starts
   F cone_width = 0, cone_spread = 0;
 
-  /// As production's functions of values take it. A density above 0 says that a bounce made it,
-  /// and is not looked at beyond that.
+  /// Returns the path state that production functions expect. Their only use of the density is to
+  /// check that it is above 0, which means that a bounce made the ray.
   PathState<F> state() const {
     return {d, Rgb(1.f), is_seen ? 0.f : 1.f, 1.f, cone_width, cone_spread, o, 0u, link};
   }
@@ -58,7 +59,7 @@ class Integrator {
       if (m.program == ProgramId::kOpenPbr) scene_.materials.energy = EnergyTables::shared().data();
   }
 
-  /// Radiance of one path through a pixel.
+  /// Returns the radiance of one path through a pixel.
   Rgb sample(uint32_t x, uint32_t y) {
     time_ = scene_.has_motion || camera_.moves() ? number() : 0.f;
     const F u = number(), v = number(), lens_u = number(), lens_v = number();
@@ -93,7 +94,7 @@ class Integrator {
                      keys);
     return h;
   }
-  /// Whether light `light` reaches `o` along -d from the distance t.
+  /// Returns whether nothing blocks light `light` at distance t from `o` along d.
   bool is_free(const Vec3<F>& o, const Vec3<F>& d, F t, uint32_t light) {
     const F tfar = t * 0.9999f;
     uint32_t words[2], blocked = 0, set = 0;
@@ -110,11 +111,11 @@ class Integrator {
     return !scene_.lights.links.members ||
            is_linked<F>(scene_.lights.links, link, scene_.lights.lights[record].light_link, true);
   }
-  /// Whether a light is looked for apart from what rays meet.
+  /// Returns whether the contribution of a light is computed separately, not when rays hit it.
   static bool is_apart(const LightRecord& light) {
     return light.sampled_only != 0 || light.diffuse != 1 || light.specular != 1;
   }
-  /// Share of record `light` that a ray gets which meets it.
+  /// Returns the factor of the radiance of record `light` for a ray that hits it.
   F share_met(uint32_t record, const Ray& ray, bool from_camera) const {
     const LightRecord& light = scene_.lights.lights[record];
     if (!lights_class(record, ray.link)) return 0;
@@ -122,7 +123,7 @@ class Integrator {
     return !ray.is_seen ? 0.f : (from_camera ? 1.f : light.specular);
   }
 
-  /// What infinite light `i` sends against d.
+  /// Returns the radiance of infinite light `i` along d.
   Rgb infinite(uint32_t i, const Vec3<F>& o, const Vec3<F>& d) const {
     const LightView& view = scene_.lights;
     const LightRecord& record = view.lights[i];
@@ -131,7 +132,7 @@ class Integrator {
                 : detail::hit_distant<F>(detail::LightReader<F>(record, true), d).radiance;
     return record.shaping == kNoShaping ? c : detail::shaped<F>(view, record.shaping, -d, c, true);
   }
-  /// What the shape of light `i` sends against d from the distance t.
+  /// Returns the radiance of the shape of light `i`, hit along d at distance t.
   Rgb finite(uint32_t i, const Vec3<F>& o, const Vec3<F>& d, F t) const {
     return light_hit<F>(scene_.lights, i, LightReceiver<F>(o, 0u), d, t, true).radiance;
   }
@@ -146,7 +147,7 @@ class Integrator {
                                   : mesh.material;
     return material == kInheritMaterial ? scene_.instances[hit.inst].material : material;
   }
-  /// The record of the mesh light that a hit is on, or kNoLight.
+  /// Returns the record of the mesh light at a hit, or kNoLight.
   uint32_t mesh_light_of(const Hit& hit) const {
     return scene_.mesh_lights
                ? scene_.mesh_lights[placed_geometry<F>(scene_, hit.inst, hit.geom, true)]
@@ -170,7 +171,7 @@ class Integrator {
     return out;
   }
 
-  /// A surface at a hit, with what its material says there.
+  /// The shading point of a hit, with its material parameters.
   template <typename Bsdf>
   struct Point {
     static constexpr uint32_t kInputs = kVertexInputs<Bsdf>;
@@ -200,13 +201,14 @@ class Integrator {
       return fetch_for<Bsdf, kInputs, F>(scene.materials, material, s.uv, uv_width, make_point,
                                          true);
     }
-    /// The shading frame: along the texture where one is read, bent by a normal map.
+    /// Returns the shading frame: along u if the material reads a texture, with the normal of a
+    /// normal map.
     Frame<F> frame(const Ray& ray) const {
       if (!reads_texture) return make_frame<F>(s.ns);
       Vec3<F> n = s.ns;
       if ((record.textured_inputs & (input_bit(Input::kNormal) | kGraphNormal)) != 0) {
         n = normalize(make_frame<F>(n, s.dpdu, s.handedness).to_world(params.normal));
-        // A normal that looks away is bent until it is seen edge-on.
+        // A normal that points away from the viewer is bent until it is perpendicular to the ray.
         const F towards = dot(ray.d, s.ng) < 0 ? 1.f : -1.f, seen = -dot(ray.d, n) * towards;
         if (seen < 1e-3f) n = normalize(n + ray.d * (-towards * (1e-3f - seen)));
       }
@@ -246,7 +248,7 @@ class Integrator {
     }
     if (!bsdf.has_non_delta()) return passed * out;
 
-    // Where light samples of production start, which all light has to agree with.
+    // Start at the same point as production's light samples, so that all estimates agree.
     next.o = spawn_origin<F>(s, -ray.d);
     next.is_seen = false;
     out += delta_lights(bsdf, s, frame, wo, next);
@@ -275,7 +277,8 @@ class Integrator {
             static_cast<F>(z)};
   }
 
-  /// All delta lobes that some numbers choose, each once. weight * pdf is the lobe's factor.
+  /// Returns all delta lobes that a set of random numbers selects, each once. weight * pdf is the
+  /// factor of a lobe.
   template <typename Bsdf>
   std::vector<BsdfSample<F>> delta_lobes(const Bsdf& bsdf, const Vec3<F>& wo) const {
     std::vector<BsdfSample<F>> lobes;
@@ -290,13 +293,13 @@ class Integrator {
     return lobes;
   }
 
-  /// f |cos| as a light with multipliers sees it.
+  /// Returns f |cos| with the multipliers of a light applied.
   Rgb lit(const LightRecord& light, const Rgb& f_cos, const Rgb& diffuse) const {
     if (!is_apart(light)) return f_cos;
     return (f_cos - diffuse) * light.specular + diffuse * light.diffuse;
   }
 
-  /// Lights of one point or one direction.
+  /// Returns the contribution of lights from a single point or direction.
   template <typename Bsdf>
   Rgb delta_lights(const Bsdf& bsdf, const Surface<F>& s, const Frame<F>& frame, const Vec3<F>& wo,
                    const Ray& from) {
@@ -321,7 +324,8 @@ class Integrator {
     return sum;
   }
 
-  /// What lights send against a direction that only light samples find, times f |cos|.
+  /// Returns the contribution from a direction of lights that production finds only by light
+  /// samples, times f |cos|.
   Rgb sampled_only(const Rgb& f_cos, const Rgb& diffuse, const Ray& ray) {
     const LightView& view = scene_.lights;
     Rgb sum(0.f);
@@ -339,7 +343,7 @@ class Integrator {
     return sum + sampled_only_meshes(f_cos, diffuse, ray) + hidden_meshes(f_cos, diffuse, ray);
   }
 
-  /// The same of mesh lights: all surfaces along the ray are looked at.
+  /// Returns the same contribution for mesh lights, from all surfaces along the ray.
   Rgb sampled_only_meshes(const Rgb& f_cos, const Rgb& diffuse, const Ray& ray) {
     Rgb sum(0.f);
     F before = 0;
@@ -363,7 +367,7 @@ class Integrator {
     return sum;
   }
 
-  /// The same of meshes that no ray meets: their triangles, one by one.
+  /// Returns the same contribution for mesh lights that rays cannot hit, triangle by triangle.
   Rgb hidden_meshes(const Rgb& f_cos, const Rgb& diffuse, const Ray& ray) {
     const LightView& view = scene_.lights;
     Rgb sum(0.f);

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A path tracer that is too simple to be wrong in the ways that production may be: test code.
+/// A path tracer for tests that is simple enough to be obviously correct.
 ///
-/// It takes from production what is a value: what a ray hits, the surface there, f |cos| of a BSDF,
-/// what a light or a surface emits along a ray, who is linked to whom. It shares nothing that is
-/// sampled: directions are uniform over the sphere (or, of opaque programs, the hemisphere), there
-/// is no light sampling, hence no MIS, and no roulette; the random numbers are its own.
+/// It shares with production all functions without random decisions: ray intersection, shading
+/// points, f |cos| of BSDFs, emission of lights and surfaces along a ray, and light linking. It
+/// shares no sampling. Directions are uniform over the sphere (over the hemisphere for opaque
+/// programs), there is no light sampling and hence no MIS, no Russian roulette, and the random
+/// number generator is a separate one.
 ///
 ///   L(x, wo) = Le + sum over delta lobes c L(x', wi)                    (each followed)
 ///                 + (2 or 4) pi / n sum over n uniform wi f |cos| L(x', wi)
-///                 + sum over delta lights f |cos| E V                   (no density has them)
+///                 + sum over delta lights f |cos| E V                   (they have no density)
 ///
-/// Lights with multipliers, and those that production finds by light samples alone
-/// (LightRecord::sampled_only: hidden shapes, links of shadows) are looked for along the same
-/// uniform directions, whatever else is there, and what is in their way is asked for with their own
-/// set.
+/// Lights with multipliers, and lights that production finds only by light samples
+/// (LightRecord::sampled_only: invisible shapes, shadow links), are evaluated along the same
+/// uniform directions, whether or not other objects are in front of them. Their visibility is
+/// tested with their own shadow set.
 ///
-/// Beyond the first vertex textures are read as blurred as after a diffuse bounce, so that scenes
+/// Beyond the first vertex, textures are read with the footprint after a diffuse bounce. So scenes
 /// with textured indirect light are exact for diffuse surfaces only.
 #pragma once
 
@@ -29,15 +30,16 @@ namespace wavecomb {
 
 struct NaiveSettings {
   uint32_t width = 16, height = 16;
-  uint32_t samples = 16;     ///< of each pixel, which is even over it
-  uint32_t max_depth = 1;    ///< as Settings::max_depth
-  uint32_t directions = 1;   ///< uniform ones at the first vertex; one later
-  uint32_t delta_tries = 0;  ///< numbers by which delta lobes are looked for; 0: there are none
+  uint32_t samples = 16;    ///< per pixel, uniform over the pixel
+  uint32_t max_depth = 1;   ///< same as Settings::max_depth
+  uint32_t directions = 1;  ///< uniform directions at the first vertex; one at later vertices
+  /// Random numbers used to find delta lobes; 0 for scenes without delta lobes.
+  uint32_t delta_tries = 0;
   uint64_t seed = 0;
   bool schlick_fresnel = false;
 };
 
-/// Radiance as the camera exposes it: rows from the top, rgb side by side.
+/// Returns radiance with the camera's exposure: rows from the top, RGB interleaved.
 std::vector<double> render_naively(const std::shared_ptr<const Scene>& scene,
                                    const NaiveSettings& settings);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where a ray meets the lit side of a light's shape, by school formulas in double precision.
+/// Ray intersection with the emitting side of a light's shape, by textbook formulas in double
+/// precision.
 #pragma once
 
 #include <cmath>
@@ -29,7 +30,8 @@ inline double dot3(const Double3n& a, const Double3n& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-/// The smaller t > 0 with a t^2 + 2 b t + c = 0, or 0: only a ray from outside enters.
+/// Returns the smaller solution t > 0 of a t^2 + 2 b t + c = 0, or 0 if there is none. Only rays
+/// from outside enter the shape.
 inline double entry(double a, double b, double c) {
   const double root2 = b * b - a * c;
   if (!(a > 0) || !(root2 > 0) || !(c > 0)) return 0;
@@ -37,7 +39,8 @@ inline double entry(double a, double b, double c) {
   return t > 0 ? t : 0;
 }
 
-/// Distance at which the ray o + t d meets the side of the light that shines, or 0. `d` is unit.
+/// Returns the distance at which the ray o + t d hits the emitting side of the light, or 0. `d` is
+/// a unit vector.
 inline double meets(const LightRecord& light, const Vec3<float>& origin,
                     const Vec3<float>& direction) {
   const Double3n o = of(origin), d = of(direction), p = of(light.p), u = of(light.u),
@@ -47,7 +50,7 @@ inline double meets(const LightRecord& light, const Vec3<float>& origin,
     const double facing = -dot3(d, n);
     const double t = dot3(from, n) / facing;
     if (!(facing > 0) || !(t > 0)) return 0;
-    // h = a u + b v by the normal equations.
+    // h = a u + b v, solved by the normal equations.
     const Double3n h = along(o, d, t) - p;
     const double uu = dot3(u, u), uv = dot3(u, v), vv = dot3(v, v), hu = dot3(h, u),
                  hv = dot3(h, v), det = uu * vv - uv * uv;
@@ -59,7 +62,7 @@ inline double meets(const LightRecord& light, const Vec3<float>& origin,
   const double r = light.radius;
   if (kind == LightKind::kSphere) return entry(dot3(d, d), dot3(d, from), dot3(from, from) - r * r);
   if (kind == LightKind::kCylinder) {
-    // Across the axis u; open ends, dark inside.
+    // Perpendicular to the axis u. The ends are open, and the inside does not emit.
     const double uu = dot3(u, u), du = dot3(d, u), fu = dot3(from, u);
     const double t = entry(dot3(d, d) - du * du / uu, dot3(d, from) - du * fu / uu,
                            dot3(from, from) - fu * fu / uu - r * r);
@@ -69,7 +72,7 @@ inline double meets(const LightRecord& light, const Vec3<float>& origin,
   return 0;
 }
 
-/// The same of a triangle, which shines to both sides.
+/// Returns the distance for a triangle, which emits on both sides.
 inline double meets(const TriangleLight& light, const Vec3<float>& origin,
                     const Vec3<float>& direction) {
   const Double3n o = of(origin), d = of(direction), p = of(light.p), u = of(light.u),

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Writes an .nvdb file of the first grids of .vdb files, by NanoVDB's own code.
+/// Writes an .nvdb file from the first grids of .vdb files, with NanoVDB's own code.
 ///
-///     wavecomb_nvdb_writer OUT.nvdb PACKED (BITS IN.vdb)...
+///   wavecomb_nvdb_writer OUT.nvdb PACKED (BITS IN.vdb)...
 ///
-/// PACKED is none, zip or blosc. BITS of a number: 32, and of a float grid 4, 8, 16 or n, in which
+/// PACKED is none, zip or blosc. BITS is 32; for a float grid it can also be 4, 8, 16 or n, to
+/// which leaves are quantised. Equal grids give equal bytes.
 /// leaves are quantised. The same grids give the same bytes.
 #include <openvdb/openvdb.h>
 
@@ -23,7 +24,7 @@
 #include <new>
 #include <stdexcept>
 
-// By their prototypes: the libraries are OpenVDB's, and their headers need not be installed.
+// Declared here because the libraries are those of OpenVDB, and their headers may not be installed.
 extern "C" {
 int blosc_compress_ctx(int level, int shuffle, size_t type_size, size_t bytes, const void* from,
                        void* to, size_t most, const char* name, size_t block, int threads);
@@ -34,7 +35,7 @@ unsigned long compressBound(unsigned long size);
 
 namespace {
 
-/// Memory of a grid, 0 where nothing is written, so that the same grids give the same bytes.
+/// Memory of a grid. Bytes that are never written are 0, so that equal grids give equal bytes.
 class ZeroedBuffer {
  public:
   ZeroedBuffer() = default;
@@ -89,7 +90,7 @@ Handle convert(const openvdb::GridBase& grid, const std::string& bits) {
   return convert<float, float>(grid);
 }
 
-/// What nanovdb::io::writeGrid writes of a grid.
+/// Returns the bytes that nanovdb::io::writeGrid writes for a grid.
 std::string packed_bytes(const Handle& handle, nanovdb::io::Codec codec) {
   std::string out;
   const auto add = [&](const void* from, uint64_t size) {

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wheel in a root with Python, glibc and libstdc++ and nothing else: no compiler, shell, pip or
-network. It installs from a folder of wheels and renders the same pictures as outside, with each of
-its libraries, also with another Python. `make test-wheel` runs this; it needs `apt-get`.
+"""The wheel in a root file system with only Python, glibc and libstdc++.
+
+There is no compiler, shell, pip or network. The wheel installs from a folder of wheels and renders
+the same images as outside, with each of its libraries, also with another Python version. `make
+test-wheel` runs this; it needs `apt-get`.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ NEWER = {"bookworm": "trixie", "jammy": "noble"}
 
 
 def suites() -> list[str]:
-    """This machine's suite, and one with another Python."""
+    """This machine's suite, and one with another Python version."""
     if not (shutil.which("apt-get") and shutil.which("dpkg-deb")):
         return []
     own = succeed([ROOT / "tools" / "debs", "suite"]).strip()
@@ -56,7 +58,7 @@ class Empty:
 
 
 def collect(python: str, folder: Path) -> None:
-    """Downloads the wheel's dependencies for that Python, and pip."""
+    """Download the wheel's dependencies for a Python version, and pip."""
     newest = int(platform.libc_ver()[1].split(".")[1])
     named = (1, 2010, 2014)
     tags = [f"manylinux{n}" for n in named] + [f"manylinux_2_{n}" for n in range(5, newest + 1)]
@@ -70,7 +72,7 @@ def collect(python: str, folder: Path) -> None:
 
 
 def runnable() -> list[str]:
-    """The libraries that this CPU runs; "" in a wheel of one library."""
+    """The libraries that this CPU can run; "" for a wheel with one library."""
     built = isa.libraries(wavecomb.__path__)
     if not built:
         return [""]

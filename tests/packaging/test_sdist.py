@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The source distribution of `make sdist` builds in a folder of its own, and renders what this
-build renders. `make test-sdist` runs this.
+"""The source distribution of `make sdist` builds in a separate folder.
+
+It renders the same image as this build. `make test-sdist` runs this.
 """
 
 from __future__ import annotations
@@ -61,9 +62,9 @@ def test_without_a_compiler_it_says_what_to_install(sources: Path, tmp_path: Pat
 
 @needs("wavecomb._core")
 def test_it_builds_and_renders(sources: Path, tmp_path: Path) -> None:
-    # What tools/setup_embree would stage there once more.
+    # Reuse the dependencies that tools/setup_embree would stage again.
     (sources / ".deps").symlink_to(ROOT / ".deps")
-    # Fewest lanes, little optimised: whether it builds, not how fast it is.
+    # One lane width and little optimisation, because only the build matters here.
     defines = {
         "WAVECOMB_LANE_WIDTHS": "1",
         "WAVECOMB_BATCH": "ON",
@@ -78,7 +79,7 @@ def test_it_builds_and_renders(sources: Path, tmp_path: Path) -> None:
         cwd=sources,
     )
     (wheel,) = tmp_path.glob("wavecomb-*.whl")
-    # With dependencies of its own: oneTBB lies in the lib of an environment.
+    # A new environment with its dependencies: oneTBB is in the environment's lib folder.
     environment = tmp_path / "env"
     succeed([sys.executable, "-m", "venv", "--without-pip", environment])
     python = environment / "bin/python"

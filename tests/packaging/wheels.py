@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tests of packages share: where packages are, and renders by an installed Wavecomb."""
+"""Shared code of packaging tests: location of packages, and renders by an installed Wavecomb."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ RENDER = ("--size", "96", "96", "--spp", "16")
 
 
 def package(pattern: str) -> Path:
-    """The one package in `dist` that matches."""
+    """Return the only package in `dist` that matches."""
     found = sorted((ROOT / "dist").glob(pattern))
     names = [path.name for path in found]
     assert len(found) == 1, f"dist/{pattern}: {names}; make wheels, make sdist"
@@ -20,7 +20,7 @@ def package(pattern: str) -> Path:
 
 
 def succeed(command: Sequence[str | Path], **options: object) -> str:
-    """What a command prints, which has to end well."""
+    """Run a command that must succeed, and return its output."""
     done = subprocess.run(command, capture_output=True, text=True, timeout=3000, **options)  # type: ignore[call-overload]
     assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}\n{done.stderr[-6000:]}"
     return str(done.stdout)

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes with a reference picture: <Name>/{scene.usda, test.toml, ref.exr, ref_var.exr}.
+"""Scenes with a reference image: <Name>/{scene.usda, test.toml, ref.exr, ref_var.exr}.
 
 `ref.exr` is the mean of independent renders by the reference integrator (scalar, depth first),
-`ref_var.exr` the variance of that mean, for each pixel and channel. Both are made by
-tools/update_references and by nothing else.
+`ref_var.exr` the variance of that mean for each pixel and channel. Only tools/update_references
+writes them.
 
-A picture is tested against them as independent renders, too ("batches", one seed each), so nothing
-is assumed of the noise within a render:
+An image is tested as independent renders as well ("batches" with one seed each), so nothing is
+assumed about the noise within a render:
 
-- pixels: z = (a - ref) / sqrt(var_a + var_ref), Welch's t; at least 99.75 % of the values pass at
-  the level that Sidak's correction leaves of 0.01;
-- blocks of 8 x 8 pixels, which see an eighth of the noise: all of them pass, corrected likewise;
-- the mean of the whole picture, channel by channel, at a level of 0.001: finds a small bias.
+- pixels: z = (a - ref) / sqrt(var_a + var_ref), Welch's t; at least 99.75 % of the values must pass
+  at the level 0.01 with Sidak's correction;
+- blocks of 8 x 8 pixels, with an eighth of the noise: all must pass, with the same correction;
+- the mean of the whole image for each channel, at a level of 0.001, which finds a small bias.
 
-What is below TOLERANCE of the value itself counts as no difference: pixels without noise.
+Differences below TOLERANCE of the value are ignored, for pixels without noise.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ BLOCK = 8
 
 @dataclass(frozen=True)
 class Golden:
-    """A scene and how it is rendered.
+    """A scene and its render options.
 
     Attributes:
-        name: Of its folder.
+        name: Name of its folder.
         size: Width and height; multiples of 8.
         reference_spp: Samples of each of the reference's 32 batches.
         spp: Samples of each of the test's 16 batches.
-        settings: Of both renders.
+        settings: Settings of both renders.
     """
 
     name: str
@@ -64,11 +64,11 @@ class Golden:
 
     @property
     def folder(self) -> Path:
-        """Where it is."""
+        """Folder of the scene."""
         return FOLDER / self.name
 
     def batches(self, count: int, first_seed: int, spp: int, **settings: Any) -> Array:
-        """Renders of `count` seeds, (count, height, width, 3)."""
+        """Render `count` seeds, (count, height, width, 3)."""
         import wavecomb
 
         stage = wavecomb.load(self.folder / "scene.usda")
@@ -82,7 +82,7 @@ class Golden:
         ).astype(np.float64)
 
     def reference(self) -> tuple[Array, Array]:
-        """The mean and its variance, each (height, width, 3)."""
+        """Read the mean and its variance, each (height, width, 3)."""
         from wavecomb.picture.image import read_image
 
         mean, variance = (
@@ -91,7 +91,7 @@ class Golden:
         return mean, variance
 
     def update(self) -> None:
-        """Renders the reference again, by the reference integrator."""
+        """Render the reference again with the reference integrator."""
         from wavecomb.picture.image import write_exr
 
         made = self.batches(
@@ -104,7 +104,7 @@ class Golden:
 
 
 def read_golden(name: str) -> Golden:
-    """The scene in folder `name`."""
+    """Read the scene in folder `name`."""
     with open(FOLDER / name / "test.toml", "rb") as file:
         table = tomllib.load(file)
     width, height = table["size"]
@@ -115,13 +115,13 @@ def read_golden(name: str) -> Golden:
 
 
 def golden_names() -> list[str]:
-    """All scenes."""
+    """Names of all scenes."""
     return sorted(path.parent.name for path in FOLDER.glob("*/test.toml"))
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the test found; `good` where the pictures differ by noise only."""
+    """Result of a test; `good` if the images differ only by noise."""
 
     pixels: float
     blocks: float
@@ -173,16 +173,16 @@ def _accepted(z: Array) -> float:
 
 
 def _blocks(a: Array) -> Array:
-    """Means over blocks of the two axes before the last."""
+    """Return means over blocks of the two axes before the last."""
     *rest, height, width, channels = a.shape
     cut = a.reshape(*rest, height // BLOCK, BLOCK, width // BLOCK, BLOCK, channels)
     return cut.mean(axis=(-4, -2))
 
 
 def verdict(made: Array, mean: Array, variance: Array) -> Verdict:
-    """Tests batches (n, height, width, 3) against a reference."""
+    """Test batches (n, height, width, 3) against a reference."""
     pixels = _accepted(_deviates(made, mean, variance))
-    # Pixels are independent, so the variance of a mean of m is the mean variance / m.
+    # Pixels are independent, so the variance of a mean of m pixels is the mean variance / m.
     area = BLOCK * BLOCK
     blocks = _accepted(_deviates(_blocks(made), _blocks(mean), _blocks(variance) / area))
     count = mean.shape[0] * mean.shape[1]
@@ -192,6 +192,6 @@ def verdict(made: Array, mean: Array, variance: Array) -> Verdict:
 
 
 def each(names: list[str]) -> Iterator[Golden]:
-    """The scenes of those names, all for none."""
+    """Yield the scenes of these names, or all scenes if there are none."""
     for name in names or golden_names():
         yield read_golden(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hooks of MkDocs: add pages of the root and reference pages to those of docs/."""
+"""Hooks of MkDocs that add pages from outside docs/ to the site."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import reference  # noqa: E402
 
 PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
-"""Pages of the root -> their names in the site."""
+"""Pages of the repository root -> their names in the site."""
 LINK = re.compile(r"(!?\[[^\]]*\])\(([^)\s]+)\)")
 CODE = re.compile(r"^(```.*?^```$|    .*?$)", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"`[^`\n]+`")
@@ -28,7 +28,7 @@ DOXYGEN = {
     "JAVADOC_AUTOBRIEF": "YES", "QUIET": "YES", "WARNINGS": "NO", "HAVE_DOT": "NO",
     "HTML_TIMESTAMP": "NO", "SORT_MEMBER_DOCS": "NO", "SHOW_INCLUDE_FILES": "NO",
 }  # fmt: skip
-"""Settings of Doxygen, without paths."""
+"""Settings of Doxygen, except paths."""
 STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
@@ -39,7 +39,7 @@ STYLE = """
 
 
 def on_config(config: Any) -> Any:
-    """Lists all decisions in the navigation, in the order of their page."""
+    """List all decisions in the navigation, in the order of docs/decisions/README.md."""
     text = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
     pages = ["decisions/README.md"]
     pages += [f"decisions/{name}" for name in re.findall(r"\]\(([a-z0-9-]+\.md)\)", text)]
@@ -51,7 +51,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Adds files that are not in docs/."""
+    """Add files that are not in docs/."""
     made = {f"reference/{name}": text for name, text in reference.pages().items()}
     made["site.css"] = STYLE
     made["iframe-worker.js"] = Path(__file__).with_name("iframe-worker.js").read_text("utf-8")
@@ -63,7 +63,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_post_build(config: Any) -> None:
-    """Adds the C++ reference, where Doxygen is installed."""
+    """Add the C++ reference if Doxygen is installed."""
     if not shutil.which("doxygen"):
         return
     folder = Path(config["site_dir"]) / "cpp"
@@ -80,7 +80,7 @@ def on_post_build(config: Any) -> None:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Rewrites links of and to pages of the root for the site."""
+    """Adapt links from and to pages of the repository root."""
     name = page.file.src_uri
     at_root = name in PAGES.values()
 
@@ -92,17 +92,17 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         if target.startswith("../") and file in PAGES:
             return f"{text}({'../' * name.count('/')}{PAGES[file]})"
         if not target.startswith("#") and "://" not in target and _is_elsewhere(name, target):
-            return text[1:-1]  # a file that is no page
+            return text[1:-1]  # links to files that are not pages become text
         return match[0]
 
-    # GitHub wants the bar of a table escaped in code, too; here the stroke would be seen.
+    # GitHub requires "\|" in code inside tables, but MkDocs would show the backslash.
     markdown = INLINE.sub(lambda match: match[0].replace("\\|", "|"), markdown)
     parts = CODE.split(markdown)
     return "".join(part if k % 2 else LINK.sub(link, part) for k, part in enumerate(parts))
 
 
 def _is_elsewhere(page: str, target: str) -> bool:
-    """Whether a link leads to a file of the repository outside of docs/."""
+    """Whether a link points to a file of the repository outside docs/."""
     folder = ROOT if page in PAGES.values() else (ROOT / "docs" / page).parent
     path = (folder / target.partition("#")[0]).resolve()
     return path.exists() and ROOT / "docs" not in path.parents

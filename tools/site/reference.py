@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reference pages, generated from the program's tables and docstrings."""
+"""Generate reference pages from the program's tables and docstrings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ABOUT = {
 
 
 def pages() -> dict[str, str]:
-    """Name -> Markdown."""
+    """Return file name -> Markdown."""
     return {
         "options.md": options_page(),
         "settings.md": settings_page(),
@@ -47,26 +47,26 @@ def pages() -> dict[str, str]:
 
 
 def cell(text: object) -> str:
-    """Text that does not end a cell of a table, and is no markup."""
+    """Escape text for a table cell, so that it neither ends the cell nor is markup."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return plain.replace("<", "&lt;").replace("{", "&#123;").replace("*", "\\*")
 
 
 def code(text: object) -> str:
-    """A name in a cell."""
+    """Format a name as code for a table cell."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return f"`{plain}`" if plain else ""
 
 
 def table(head: Sequence[str], body: Iterable[Sequence[str]]) -> str:
-    """A table of Markdown."""
+    """Format a Markdown table."""
     lines = [f"| {' | '.join(head)} |", f"|{' --- |' * len(head)}"]
     lines += [f"| {' | '.join(row)} |" for row in body]
     return "\n".join(lines) + "\n"
 
 
 def bounds(least: float | None, most: float | None) -> str:
-    """The numbers that there are."""
+    """Format the bounds that are given."""
     ends = [f"{end:.10g}" if end is not None and abs(end) < 1e30 else "" for end in (least, most)]
     if ends[0] and ends[1]:
         return f"{ends[0]} to {ends[1]}"
@@ -74,7 +74,7 @@ def bounds(least: float | None, most: float | None) -> str:
 
 
 def options_page() -> str:
-    """Every command with its options."""
+    """Make the page of all commands and their options."""
     parts = ["# Options of all commands\n", NOTE]
     root = click.Context(main, info_name="wavecomb")
     for path, command, context in walk(main, root):
@@ -92,7 +92,7 @@ def options_page() -> str:
 
 
 def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
-    """Cells of an option: names, value, effect, default, from what its help says.
+    """Return the cells of an option from its help: names, value, effect, default.
 
     >>> option_row("-o, --output FILE", "Image.  [default: out.exr]")
     ('`-o, --output`', '`FILE`', 'Image.', 'out.exr')
@@ -117,7 +117,7 @@ def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
 
 
 def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple[str, Any, Any]]:
-    """Commands of a group and below, with their paths."""
+    """Yield the commands of a group and its subgroups, with their paths."""
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         if command is None or command.hidden:
@@ -130,7 +130,7 @@ def walk(group: Any, context: click.Context, before: str = "") -> Iterable[tuple
 
 
 def settings_page() -> str:
-    """The settings of a render."""
+    """Make the page of render settings."""
     parts = ["# Settings of a render\n", NOTE,
              "Keywords of `wavecomb.render`, fields of `wavecomb.Settings`, keys of a suite. As "
              "options of commands they have `-` for `_`. *Expectation*: whether the setting "
@@ -153,7 +153,7 @@ def settings_page() -> str:
 
 
 def loading_page() -> str:
-    """How a stage is read."""
+    """Make the page of options for loading a stage."""
     item = re.compile(r"^    (\w+): (.+?)(?=^    \w+:|\Z)", re.DOTALL | re.MULTILINE)
     about = dict(item.findall(attributes(LoadOptions)))
     body = []
@@ -169,12 +169,12 @@ def loading_page() -> str:
 
 
 def attributes(owner: Any) -> str:
-    """The part "Attributes" of a class's docstring."""
+    """Return the section "Attributes" of a class's docstring."""
     return inspect.getdoc(owner).partition("Attributes:\n")[2] + "\n"  # type: ignore[union-attr]
 
 
 def layers_page() -> str:
-    """The AOVs."""
+    """Make the page of AOVs."""
     body = [(code(row.name), str(row.channels or ""), cell(row.kind.replace("_", " ")),
              cell(row.title)) for row in aovs.core_aovs().values()]  # fmt: skip
     several = [(code(name), ", ".join(map(code, names))) for name, names in aovs.groups().items()]
@@ -188,7 +188,7 @@ def layers_page() -> str:
 
 
 def lights_page() -> str:
-    """The parameters of lights."""
+    """Make the page of light parameters."""
     body = []
     for row in light_parameters().values():
         values = ", ".join(map(code, row.choices)) or bounds(row.least, row.most) or row.kind
@@ -199,7 +199,7 @@ def lights_page() -> str:
 
 
 def materials_page() -> str:
-    """The parameters of materials."""
+    """Make the page of material parameters."""
     body = [(code(row.name), row.kind, code(row.default), bounds(row.least, row.most),
              code(row.program)) for row in material_parameters().values()]  # fmt: skip
     head = ("parameter", "kind", "default", "values", "of the program alone")
@@ -208,7 +208,7 @@ def materials_page() -> str:
 
 
 def cameras_page() -> str:
-    """The parameters of cameras."""
+    """Make the page of camera parameters."""
     body = []
     for row in camera_parameters().values():
         values = ", ".join(map(code, row.choices)) or bounds(row.least, None) or row.kind
@@ -219,7 +219,7 @@ def cameras_page() -> str:
 
 
 def python_page() -> str:
-    """The public names of `wavecomb`, from docstrings."""
+    """Make the page of the public names of `wavecomb`."""
     parts = ["# Python\n", "Public names of the package, from docstrings.\n"]
     for name in wavecomb.__all__:
         thing = getattr(wavecomb, name)
@@ -239,14 +239,14 @@ def python_page() -> str:
 
 
 def public_headers() -> list[Path]:
-    """Headers of programs that link with the core."""
+    """Return the public headers, for programs that link with the core."""
     text = (ROOT / "tools" / "words" / "public_headers.txt").read_text(encoding="utf-8")
     return [ROOT / "src" / "wavecomb" / line for line in text.splitlines()
             if line and not line.startswith("#")]  # fmt: skip
 
 
 def cpp_page() -> str:
-    """How to use the core from C++, its headers, and where Doxygen's pages are."""
+    """Make the page on using the core from C++: example, headers, and link to Doxygen's pages."""
     body = []
     for path in public_headers():
         comment = re.search(r"^///? (?!SPDX)(.+)", path.read_text(encoding="utf-8"), re.MULTILINE)
@@ -270,7 +270,7 @@ def cpp_page() -> str:
 
 
 def signature(function: Any) -> str:
-    """As Python writes it, a line for each argument where there are many."""
+    """Format a signature as in Python source, with one line per argument if it is long."""
     text = str(inspect.signature(function)).replace("'", "")
     if len(text) < 70:
         return text
@@ -280,7 +280,7 @@ def signature(function: Any) -> str:
 
 
 def docstring(thing: Any) -> str:
-    """Google's sections as headings and lists; examples as code."""
+    """Convert a docstring: Google's sections become headings and lists, examples become code."""
     out: list[str] = []
     text = (inspect.getdoc(thing) or "").replace("``", "`").replace("  # doctest: +SKIP", "")
     is_code = False
@@ -303,5 +303,5 @@ def docstring(thing: Any) -> str:
 
 
 def escaped(line: str) -> str:
-    """A line whose angle brackets are no markup."""
+    """Escape angle brackets, so that they are not markup."""
     return line.replace("<", "&lt;")
