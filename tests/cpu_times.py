@@ -8,7 +8,7 @@ import os
 PROPERTY = "cpu_s"
 """Name of the property of a test report that holds the seconds."""
 _LEAST_S = 60.0
-"""Runs that took less print no table."""
+"""Minimum total for which a table is printed."""
 _FILES, _TESTS = 30, 40
 _last: float = 0.0
 _by_test: dict[str, float] = {}
@@ -25,12 +25,12 @@ def since_last() -> float:
 
 
 def add(test: str, seconds: float) -> None:
-    """Adds what a phase of a test took."""
+    """Add the CPU time of one phase of a test."""
     _by_test[test] = _by_test.get(test, 0.0) + seconds
 
 
 def table() -> list[str]:
-    """The files, then the tests, that took most; nothing after a short run."""
+    """Format the files and the tests that took the most CPU time; empty after a short run."""
     total = sum(_by_test.values())
     if total < _LEAST_S:
         return []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that are left to `make test-long`: the rows of long_tests.txt."""
+"""Tests that only `make test-long` runs: the rows of long_tests.txt."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ FILE = Path(__file__).with_name("long_tests.txt")
 
 @dataclass(frozen=True)
 class Row:
-    """Tests that are long, and one of their kind that is not; patterns of node ids."""
+    """A pattern of node ids of long tests, and one of a short test of the same kind."""
 
     long: str
     representative: str
 
 
 def matches(pattern: str, node: str) -> bool:
-    """Whether a test or one of its cases has this name; * stands for any text."""
+    """Whether a pattern matches a test or one of its cases; * stands for any text."""
     wanted = re.escape(pattern).replace(r"\*", ".*")
     return re.fullmatch(rf"{wanted}(\[.*\])?", node, re.DOTALL) is not None
 
 
 def read(text: str) -> list[Row]:
-    """The rows of a file.
+    """Read the rows of a file.
 
     Raises:
-        ValueError: A line is no row.
+        ValueError: A line is not a row.
     """
     rows = []
     for number, line in enumerate(text.splitlines(), 1):

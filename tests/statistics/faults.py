@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts known faults of light transport back, and shows that pairs.py names each.
+"""Reintroduce known faults of light transport, and check that pairs.py finds each.
 
     .venv/bin/python tests/statistics/faults.py              # builds in out/faults: 5 to 15 minutes
-    .venv/bin/python tests/statistics/faults.py --keep       # with the build that is there
+    .venv/bin/python tests/statistics/faults.py --keep       # uses the existing build
 
-The tree is copied, one line of each fix is undone, and the program is built once with all faults,
-for scalar lanes. Each fault has a stage in which the others do not show. The exit code is 0 where
-pairs.py finds all of them.
+The source tree is copied, one line of each fix is undone, and the program is built once with all
+faults, for scalar lanes. Each fault has a stage in which the other faults have no effect. The exit
+code is 0 if pairs.py finds all of them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out" / "faults"
 TREE, BUILD, VENV = OUT / "tree", OUT / "build", OUT / "venv"
 LIBRARIES = (Path(sys.prefix) / "lib", ROOT / ".deps" / "embree" / "lib")
-"""Of the environment, where the module of another one finds oneTBB and Embree."""
+"""Library folders of this environment, where the module built here finds oneTBB and Embree."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Fault:
     """A fault that was fixed.
 
     Attributes:
-        name: What was wrong.
-        seed: Stage of pairs.py that shows it.
+        name: Description of the fault.
+        seed: Seed of the stage of pairs.py that reveals it.
         changes: (file, text of the fix, text without the fix).
     """
 
@@ -103,7 +103,7 @@ FAULTS = (
 
 
 def copy_tree() -> None:
-    """Copies what git knows and the working tree has, and puts the faults back."""
+    """Copy the tracked files of the working tree, and reintroduce the faults."""
     shutil.rmtree(TREE, ignore_errors=True)
     listed = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
@@ -121,7 +121,7 @@ def copy_tree() -> None:
 
 
 def build() -> None:
-    """Builds the module and an environment that has it."""
+    """Build the module, and an environment that contains it."""
     tools = Path(sys.prefix) / "bin"
     definitions = {
         "CMAKE_BUILD_TYPE": "Release",
@@ -147,19 +147,20 @@ def build() -> None:
     )
     run([tools / "cmake", "--install", BUILD, "--component", "python", "--prefix", site])
     shutil.copytree(TREE / "python" / "wavecomb", site / "wavecomb", dirs_exist_ok=True)
-    # Packages of this environment, but not its editable Wavecomb: a .pth there is not read.
+    # Make the packages of this environment available without its editable Wavecomb, since the .pth
+    # files of that folder are not read.
     (site / "others.pth").write_text(f"{others}\n")
 
 
 def run(words: list[object]) -> None:
-    """Runs a command; ends with its exit code where it fails."""
+    """Run a command; exit with its exit code if it fails."""
     done = subprocess.run([str(word) for word in words], stdout=subprocess.DEVNULL)
     if done.returncode:
         sys.exit(done.returncode)
 
 
 def main() -> int:
-    """The command."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--keep", action="store_true", help="take the build that is there")
     if not parser.parse_args().keep:

@@ -45,7 +45,7 @@ PLAIN: dict[str, Any] = {
     "light_selection": "auto",
     "light_weights": "calibrated",
     "sampler": "sobol",
-    # A single texel has another mean where shading is not linear.
+    # Stochastic lookup of a single texel changes the mean where shading is not linear.
     "texture_filter": "whole",
     "filter": "box",
     "filter_width": 1.0,
@@ -107,7 +107,7 @@ class Result:
     tries: int = 1
 
     def is_fault(self, tests: int) -> bool:
-        """Whether it is too far for chance, as one of so many comparisons."""
+        """Whether the difference exceeds chance, given the number of comparisons."""
         return self.found is not None and self.found.is_fault(tests)
 
 
@@ -143,7 +143,7 @@ class Renders:
         self.trained: dict[str, Any] = {}
 
     def stage(self, load: dict[str, Any]) -> Any:
-        """The stage, loaded with these options beside the scene's."""
+        """Return the stage, loaded with these options in addition to the scene's."""
         import wavecomb
 
         key = str(sorted(load.items()))
@@ -152,7 +152,7 @@ class Renders:
         return self.stages[key]
 
     def settings(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """All settings of a render but samples and seed."""
+        """Return all settings of a render except samples and seed."""
         fresnel = "schlick" if self.scene.schlick else "exact"
         common = {"size": (SIZE, SIZE), "threads": 1, "max_depth": self.scene.depth}
         return {**PLAIN, **common, "fresnel": fresnel, **changes}
@@ -169,7 +169,7 @@ class Renders:
         return Variant("light", {"transport": "light"}, {}) if hidden else Variant("plain", {}, {})
 
     def reference_batches(self, variant: Variant, more: int, first: int) -> Array:
-        """Batches of ``reference``, rendered once."""
+        """Render the batches of ``reference`` once, and return them."""
         reference = self.reference(variant)
         key = reference.name, more
         if key not in self.references:
@@ -177,7 +177,7 @@ class Renders:
         return self.references[key]
 
     def batches(self, variant: Variant, more: int, first: int) -> Array:
-        """``BATCHES`` renders of a variant, (n, height, width, 3)."""
+        """Render ``BATCHES`` images of a variant, (n, height, width, 3)."""
         import wavecomb
 
         stage = self.stage(variant.load)
@@ -192,7 +192,7 @@ class Renders:
         return np.stack([np.asarray(one, np.float64) for one in renders])
 
     def field(self, stage: Any, settings: dict[str, Any]) -> Any:
-        """A render that has trained a guiding field with these settings."""
+        """Return a render that has trained a guiding field with these settings."""
         import wavecomb
 
         key = str(settings["cosine_sampling"])
@@ -201,7 +201,7 @@ class Renders:
         return self.trained[key]
 
     def sees_lights(self) -> bool:
-        """Whether the camera sees the shape of a light, be it the dark back."""
+        """Whether the camera sees the shape of a light, even if only its dark back."""
         import wavecomb
 
         def seen(lights: str) -> Any:
@@ -215,7 +215,7 @@ class Renders:
         return bool(visible[0].any()) or not same
 
     def tolerance(self, variant: Variant) -> float:
-        """Relative difference of means that the documentation admits."""
+        """Relative difference of means that the documentation allows for."""
         if variant.settings.get("transport", "path") == "path":
             return 0.0
         if "merge_radius" in variant.settings:
@@ -224,7 +224,7 @@ class Renders:
         return SMOOTH_TOLERANCE if smooth & set(self.scene.features) else 0.0
 
     def compare(self, variant: Variant, turn: int) -> Comparison:
-        """Compares a variant with plain settings; later turns have more samples, other seeds."""
+        """Compare a variant with plain settings; later tries use more samples and other seeds."""
         more = (1, *MORE)[turn]
         found = judge(
             self.batches(variant, more, 1000 * turn + 500),
@@ -236,7 +236,7 @@ class Renders:
 
 
 def examine(scene: RandomScene, seed: int, repeats: int = len(MORE)) -> Iterator[Result]:
-    """Compares all variants of a scene, suspicious ones up to ``repeats`` times again."""
+    """Compare all variants of a scene; repeat suspicious ones up to ``repeats`` times."""
     from wavecomb import _core
 
     renders = Renders(scene)
@@ -258,7 +258,7 @@ def examine(scene: RandomScene, seed: int, repeats: int = len(MORE)) -> Iterator
 
 
 def save(result: Result, folder: Path) -> None:
-    """Writes the variant's image, the plain one and z side by side."""
+    """Write the variant's image, the plain image and z side by side."""
     from agreement import picture_of
 
     assert result.found is not None
@@ -272,7 +272,7 @@ def save(result: Result, folder: Path) -> None:
 
 
 def main() -> int:
-    """The command."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("seed", nargs="?", type=int, help="of one stage")
     parser.add_argument("--from", dest="first", type=int, default=0, metavar="SEED")

@@ -95,9 +95,7 @@ def test_a_light_below_a_surface_is_the_walks_to_find(weights: str) -> None:
 
 
 def test_guided_bounces_by_cosine() -> None:
-    """The field is mixed with the density that samples bounces; 15 % of the light were missing
-    once.
-    """
+    """Guiding is mixed with the density that samples bounces; a fault once lost 15 % of the light."""
     stage = wavecomb.load(CASES / "glossy_box.usda")
     settings = {"spp": 128, "max_depth": 4, "cosine_sampling": True}
     guided = seeds(stage, 4, guiding="on", **settings)
@@ -113,7 +111,7 @@ def test_depth_0_has_no_scattered_light(transport: str) -> None:
 
 
 def test_light_paths_do_not_go_with_a_stone_in_tinted_glass() -> None:
-    """They dimmed other segments than the camera's paths did; `auto` keeps to the latter."""
+    """Light paths would attenuate other segments than camera paths; `auto` uses camera paths."""
     stage = wavecomb.load(CASES / "stone_in_glass.usda")
     with pytest.raises(_core.Error, match="objects inside of absorbing glass"):
         mean(stage, spp=1, transport="light")

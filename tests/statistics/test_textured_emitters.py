@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Textured emission has one mean, whichever technique finds it.
+"""Textured emission has the same mean for all sampling techniques.
 
-A floor is lit by a square that shows half of its texture: fine stripes beside a part that is far
-brighter, and that a blurred look-up would mix in. Light samples read the finest level, and so must
-bounces, whose cones are wide.
+A floor is lit by a square that shows half of its texture: fine stripes, next to a much brighter
+part that a filtered lookup would blend in. Light samples read the finest level, so bounces must do
+the same although their ray cones are wide.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from wavecomb.scenes.textures import write_image
 ALBEDO = 0.6
 SIZE = 64
 END = (SIZE // 2 - 0.5) / SIZE
-"""Texture coordinate where the last dark texel still counts alone."""
+"""Texture coordinate up to which a lookup reads only dark texels."""
 
 
 def stripes() -> NDArray[np.float32]:
-    """Texels 2 and 0 in turns on the left, 40 on the right, (64, 64, 3)."""
+    """Alternating texels of 2 and 0 on the left, 40 on the right, (64, 64, 3)."""
     image = np.full((SIZE, SIZE, 3), 40.0, np.float32)
     image[:, : SIZE // 2] = np.where(np.arange(SIZE // 2) % 2, 0.0, 2.0)[None, :, None]
     return image
 
 
 def square(height: float) -> str:
-    """1 x 1 and facing down, with the left half of the texture."""
+    """A square of 1 x 1 that faces down, with the left half of the texture."""
     corners = [(-0.5, 0.5, 0), (0.5, 0.5, 0), (0.5, -0.5, 0), (-0.5, -0.5, 0)]
     lines = [
         f"point3f[] points = {numbers(corners)}",
@@ -75,7 +75,7 @@ GLOW = """def Material "G" {
 
 
 def exact(height: float) -> float:
-    """Radiance of the floor below the middle, by integrating the finest level over the square."""
+    """Radiance of the floor below the centre, integrating the finest level over the square."""
     x, z = (np.arange(2048) + 0.5) / 2048, (np.arange(256) + 0.5) / 256
     at = x * END * SIZE - 0.5
     texels = stripes()[0, :, 0]
@@ -93,8 +93,8 @@ def exact(height: float) -> float:
 def test_one_mean(
     tmp_path: Path, beauty: Any, technique: str, height: float, texture_filter: str
 ) -> None:
-    """Of light samples with bounces, which have small weights far away; of bounces nearly alone,
-    where a light that shines on nothing takes most light samples; and with light paths."""
+    """Test light samples with bounces, which have small weights far away; almost only bounces,
+    because a light without effect takes most light samples; and light paths."""
     write_image(tmp_path / "stripes.exr", stripes(), "float")
     prims = [
         camera((0, 0.2, 0.001), (0, 0, 0), half=0.02),
@@ -121,7 +121,7 @@ def test_one_mean(
 
 
 def test_every_way_gives_the_same_picture(tmp_path: Path) -> None:
-    """Lanes, waves, threads and the reference integrator, with bounces that meet the square."""
+    """Lanes, waves, threads and the reference integrator give equal images."""
     write_image(tmp_path / "stripes.exr", stripes(), "float")
     prims = [
         camera((0, 1.0, 2.0), (0, 0.1, 0), half=0.4),
