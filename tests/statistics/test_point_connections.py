@@ -95,7 +95,7 @@ def test_a_light_below_a_surface_is_the_walks_to_find(weights: str) -> None:
 
 
 def test_guided_bounces_by_cosine() -> None:
-    """Guiding is mixed with the density that samples bounces; a fault once lost 15 % of the light."""
+    """Guiding is mixed with the density that samples bounces; a fault once lost 15 % of light."""
     stage = wavecomb.load(CASES / "glossy_box.usda")
     settings = {"spp": 128, "max_depth": 4, "cosine_sampling": True}
     guided = seeds(stage, 4, guiding="on", **settings)

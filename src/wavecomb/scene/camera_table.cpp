@@ -47,21 +47,21 @@ CameraParameter row(const char* name, const char* help) {
   p.kind = static_cast<CameraValueKind>(p.read(Camera{}).index());
   return p;
 }
-/// Makes the row of a number of at least `least`.
+/// Makes the row of a numeric parameter with an inclusive lower bound.
 template <auto kMember>
 CameraParameter number_from(const char* name, double least, const char* help) {
   CameraParameter p = row<kMember>(name, help);
   p.least = least;
   return p;
 }
-/// Makes the row of a number above `least`.
+/// Makes the row of a numeric parameter with an exclusive lower bound.
 template <auto kMember>
 CameraParameter number_above(const char* name, double least, const char* help) {
   CameraParameter p = number_from<kMember>(name, least, help);
   p.is_above = true;
   return p;
 }
-/// Makes the row of a number that may be infinite.
+/// Makes the row of a numeric parameter that may be infinite.
 template <auto kMember>
 CameraParameter distance(const char* name, const char* help) {
   CameraParameter p = row<kMember>(name, help);

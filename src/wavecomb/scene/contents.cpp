@@ -135,8 +135,8 @@ class GlassTree {
   static constexpr size_t kLeaf = 4;
   struct Node {
     Bounds bounds;
-    size_t first, last;  ///< range of all_, for a leaf
-    size_t second = 0;   ///< second child, the first being the next node; 0 for a leaf
+    size_t first, last;  ///< range of the solids in a leaf node
+    size_t second = 0;   ///< index of the second child (the first is the next node); 0 for a leaf
   };
 
   size_t build(size_t first, size_t last) {

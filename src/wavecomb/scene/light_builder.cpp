@@ -126,7 +126,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
                       std::span<const IesProfile> profiles,
                       std::span<const PlacedMeshLight> mesh_lights, size_t most_picked,
                       TreeTime tree_time, std::span<const LightFilter> filters) {
-  (void)centre;  // directions of infinite lights do not depend on it
+  (void)centre;  // unused: directions of infinite lights do not depend on the centre
   check_light_count(lights.size() + triangle_count);
   SceneCounts counts{.lights = lights.size() + mesh_lights.size()};
   for (const Light& light : lights) counts.lights += light.portals.size();

@@ -147,9 +147,9 @@ double image_solid_angle(const Distribution2D& d);
 /// Builds the table that selects a light with probability proportional to its weight (>= 0). Lights
 /// before `first_triangle` are one group, the triangles another. `numbers` receives how many of the
 /// 2^24 random numbers select each light: none for weight 0, and at least a small number for every
-/// other light. If all weights are 0, all entries are 0. There may be at most kMaxPicked lights.
-/// Alias tables in integers after M. Vose, "A Linear Algorithm for Generating Random Numbers with a
-/// Given Distribution", 1991.
+/// other light. If all weights are 0, no random number selects a light. There may be at most
+/// kMaxPicked lights. Alias tables in integers after M. Vose, "A Linear Algorithm for Generating
+/// Random Numbers with a Given Distribution", 1991.
 PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
                            std::vector<uint32_t>& bins, std::vector<uint32_t>& numbers);
 

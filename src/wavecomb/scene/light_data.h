@@ -20,7 +20,7 @@ struct InstanceRecord;
 
 /// Index of a kind of light in the list of light/kinds.h.
 enum class LightKind : uint8_t;
-/// Lights of meshes: LightKind::kTriangle.
+/// Kind of the lights that belong to meshes, LightKind::kTriangle.
 inline constexpr LightKind kMeshLight = LightKind{6};
 /// Maximum number of parameters specific to one kind of light.
 inline constexpr size_t kMaxOwnParameters = 4;
@@ -293,7 +293,7 @@ struct Distribution2D {
   };
   uint32_t width = 0, height = 0;
   uint32_t row_lines = 0;     ///< cache lines of a row of `cumulative`
-  double mean_luminance = 0;  ///< over the sphere (dome) or the square (rect)
+  double mean_luminance = 0;  ///< mean over the sphere (dome) or the square (rect)
   /// 1 / (integral of the squared density over the square): 1 for a uniform image, near 0 if a few
   /// pixels dominate. Used for rects.
   float spread = 1;
@@ -413,7 +413,7 @@ struct LightView {
   float radius = 0, reach = 0;
   bool sends_paths() const { return radius > 0; }
   const LightAim* aim = nullptr;  ///< target spheres of light paths; null for none
-  // Used by opacity graphs that read positions; null for lights without geometry.
+  // Geometry for opacity graphs that read positions; null for a light set without geometry.
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
 };

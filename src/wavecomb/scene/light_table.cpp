@@ -18,7 +18,7 @@ namespace {
 constexpr uint32_t kNone = 0xffffffffu;
 static_assert(kNoTexture == kNone && kNoIes == kNone && kNoSet == kNone && kNoFilter == kNone);
 
-/// Returns a member of a light, or a member of such a member.
+/// Returns a member of a light, or a nested member.
 template <auto kFirst, auto... kRest, typename Object>
 auto& member(Object& object) {
   if constexpr (sizeof...(kRest) == 0)
@@ -61,7 +61,7 @@ constexpr LightValueKind kValueKind = std::is_same_v<T, float>         ? LightVa
                                       : std::is_enum_v<T> ? LightValueKind::kChoice
                                                           : LightValueKind::kTransforms;
 
-/// Makes a row without limits.
+/// Makes the row of a parameter without limits.
 template <auto... kPath>
 LightParameter row(const char* name, const char* label, const char* input, const char* help) {
   LightParameter p;
@@ -75,7 +75,7 @@ LightParameter row(const char* name, const char* label, const char* input, const
   return p;
 }
 
-/// Makes the minimum of a row 0.
+/// Limits a parameter to values of 0 or more.
 LightParameter positive(LightParameter p, double usual) {
   p.least = 0;
   p.usual = usual;

@@ -78,7 +78,7 @@ inline Affine between(const Affine& a, const Affine& b, float part) {
           mix(a.t, b.t)};
 }
 
-/// Resamples `steps` at step k of n.
+/// Returns the transform at step k of n, resampled from `steps`.
 inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
   const uint64_t place = uint64_t{k} * (steps.size() - 1);
   const size_t before = place / n;

@@ -21,7 +21,7 @@ void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint
   const auto given = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
   for (uint32_t b = 0; b < bins.size(); ++b) bins[b] = b << shift;  // all full
   size_t next = bins.size(), rich = bins.size();
-  uint32_t left = size;  // surplus of bin `rich`
+  uint32_t left = size;  // random numbers that bin `rich` has left
   for (;;) {
     while (next > 0 && given(next - 1) >= size) --next;
     if (next == 0) return;

@@ -25,12 +25,14 @@ struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
   const TangentRecord* tangents = nullptr;  ///< by mesh; null if no mesh has tangents
-  const uint32_t* geometry_mesh = nullptr;  ///< mesh at (instance.geometry + geometry id)
-  /// First triangle light at (instance.emissive + geometry id).
+  const uint32_t* geometry_mesh = nullptr;  ///< mesh id, at (instance.geometry + geometry id)
+  /// Index of the first triangle light of a mesh instance, at (instance.emissive + geometry id).
   const uint32_t* emissive_lights = nullptr;
-  /// Record of the mesh light at the same index, or kNoLight. Null if there are no mesh lights.
+  /// Record of the mesh light of a mesh instance, or kNoLight, indexed like emissive_lights. Null
+  /// if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  /// RayVisibility at the same index. Null if all rays see everything.
+  /// RayVisibility of a mesh instance, indexed like emissive_lights. Null if all rays see
+  /// everything.
   const uint32_t* visibility = nullptr;
   const uint32_t* material_program = nullptr;
   const uint32_t* material_variant = nullptr;  ///< see material_parts.h
@@ -119,10 +121,9 @@ class Scene {
   /// Returns a scene with other values that shares all unchanged data with this one, and equals a
   /// scene built from scratch with these values. `threads`: 0 uses all.
   ///
-  /// A camera edit takes microseconds. A material edit copies the materials, an edit of lights or
-  /// emission rebuilds the light set, and tangents are made for meshes whose new material needs
-  /// them. Throws Error naming the object for invalid values, as SceneBuilder does, and for unknown
-  /// ids.
+  /// A camera edit takes microseconds. A material edit copies the materials. An edit of lights or
+  /// of emission rebuilds the light set. If a new material needs tangents, they are computed.
+  /// Throws Error naming the object for invalid values, as SceneBuilder does, and for unknown ids.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
   /// Returns the parts of the scene, to be compared with those of scenes derived by edits.
@@ -187,8 +188,8 @@ class SceneBuilder {
   /// Adds a mesh after checking sizes, indices and radii. Throws Error for faces with non-finite
   /// points; faces without area are kept (no ray hits them).
   uint32_t add_mesh(Mesh mesh);
-  /// Replaces the arrays of a mesh, with the checks of add_mesh. Its name, its light group and its
-  /// groups stay.
+  /// Replaces the arrays of a mesh, with the checks of add_mesh. The mesh keeps its name, its light
+  /// group and its place in groups.
   void replace_mesh(uint32_t id, Mesh mesh);
   /// Adds an empty group, to hold meshes and instances of other groups. Group 0, the world, always
   /// exists. `root` is the prim path prefix of the names in the group; in the names of objects, the

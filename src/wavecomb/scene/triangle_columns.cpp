@@ -10,8 +10,8 @@ namespace {
 /// Lines run along (kSlopeX, kSlopeY, 1); coordinates perpendicular to them are x - kSlopeX z and y
 /// - kSlopeY z.
 constexpr float kSlopeX = 0.2371f, kSlopeY = 0.1549f;
-constexpr uint32_t kMostCells = 512;  ///< cells along one side
-constexpr size_t kMostEntries = 16;   ///< cells that a triangle overlaps, on average
+constexpr uint32_t kMostCells = 512;  ///< grid cells along one side
+constexpr size_t kMostEntries = 16;   ///< mean number of cells that a triangle overlaps
 
 }  // namespace
 

@@ -101,7 +101,7 @@ struct Volume {
   /// Three signed components in the volume's local space per second; if not given, the volume does
   /// not move.
   VolumeField velocity;
-  std::array<float, 2> seconds{0, 0};          ///< t at shutter open and close
+  std::array<float, 2> seconds{0, 0};          ///< times t of shutter open and close
   std::shared_ptr<const VolumeMotion> motion;  ///< made by SceneBuilder::add_volume
   /// Corners in local space, used if there is no density field.
   std::array<Vec3<float>, 2> box{Vec3<float>(0.f),

@@ -51,7 +51,7 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
 
 /// Returns the presence of the surface at `uv`, the probability that a ray hits it. It is 0 or 1
 /// with an opacity threshold, and 1 for materials whose opacity is transparency, which the program
-/// handles. `make_point` as in fetch_emission.
+/// handles. `make_point` has the same role as in fetch_emission.
 template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const MakePoint& make_point,
