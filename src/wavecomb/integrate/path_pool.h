@@ -21,8 +21,8 @@ template <typename F>
 struct PathRow {
   Vec3<F> o, d;  ///< the ray to trace
   Color<F> throughput;
-  /// density of the bounce that made the ray; 0 for a delta bounce or camera ray; negative if the
-  /// ray enters a subsurface body and starts a random walk
+  /// Density of the bounce that made the ray; 0 for a delta bounce or camera ray; negative if the
+  /// ray enters a subsurface body and starts a random walk.
   F pdf;
   F eta_scale;  ///< product of eta^2 of the refractions so far, for roulette
   /// Ray cone at the origin: width in scene units, spread in radians. In a subsurface body the

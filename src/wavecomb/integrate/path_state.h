@@ -34,7 +34,7 @@ struct ShadeSettings {
   bool joins_light = false;  ///< whether MIS weights of camera paths include light paths
   /// Merge radius divided by the width of the path's ray cone. 0 disables merging.
   float merge_scale = 0;
-  float light_paths = 0;  ///< light paths per sample, if vertices are merged
+  float light_paths = 0;  ///< light paths in the image per sample, if merged
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -69,8 +69,8 @@ template <typename F>
 struct PathState {
   Vec3<F> dir;
   Color<F> throughput;
-  /// density of the previous bounce; 0 for a delta bounce or camera ray; negative if the bounce
-  /// entered a subsurface body
+  /// Density of the previous bounce; 0 for a delta bounce or camera ray; negative if the bounce
+  /// entered a subsurface body.
   F pdf;
   F eta_scale;
   F cone_width, cone_spread;
@@ -180,7 +180,7 @@ struct ConnectionOffer {
   F vertices;                ///< LightVertexRow::vertices
   Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
   ConnectionRow<F> row;  ///< output; black where `wanted` is false
-  /// output, if light path expressions are active; undefined where `wanted` is false
+  /// Output, if light path expressions are active; undefined where `wanted` is false.
   ScatteringNote<F> note{};
 };
 

@@ -62,13 +62,13 @@ struct WaveContext {
   bool discards = false;  ///< if true, paths serve `histories` only, and the film gets none
   const SplatFilter* splat_filter = nullptr;  ///< filter of light paths; null without light paths
   AimLessons* lessons = nullptr;  ///< receives the contributions of light paths instead of the film
-  float light_paths = 1;          ///< light paths for each camera path
+  float light_paths = 1;          ///< light paths per camera path, averaged over the image
   /// Brightness above which a light splat carries its predicted addition to the variance of a
   /// pixel's samples, if camera paths had to find that light, instead of its light
   /// (light_vertex.h). 0 means that splats always carry light.
   float camera_squares = 0;
 
-  /// points of camera paths to merge light paths with; null without merging
+  /// Points of camera paths to merge light paths with; null without merging.
   const VisibleGrid* visible = nullptr;
 
   /// Returns whether light paths are merged with points of camera paths.
@@ -77,7 +77,7 @@ struct WaveContext {
   bool joins_light() const { return splat_filter != nullptr; }
   /// Returns whether vertices of camera paths connect to vertices of light paths.
   bool connects() const { return joins_light() && settings->connects(); }
-  /// Returns one over the number of light paths for each camera path of a pixel.
+  /// Returns one over the number of light paths in the whole image for each sample of a pixel.
   float light_path_share() const {
     return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
                   light_paths);
@@ -159,7 +159,7 @@ struct Wave {
   SplatList splats;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
-  /// number of shading queues so far, of which some are measured for coherence
+  /// Number of shading queues so far, of which some are measured for coherence.
   uint32_t queues = 0;
   PhaseClock clock;
   Counts counts;
