@@ -46,7 +46,7 @@ namespace detail {
 
 /// Lower bound for the density of camera paths relative to light paths.
 inline constexpr float kLeastRatio = 1e-9f;
-/// Cosine between the normals of a point and of what ends there.
+/// Least cosine between the normals of a visible point and of a vertex that is merged with it.
 inline constexpr float kLeastAlike = 0.7f;
 
 /// Shading point of a light path, with the direction that the light arrives from.

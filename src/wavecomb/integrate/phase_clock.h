@@ -18,7 +18,7 @@ enum class Phase : uint8_t {
   kShade,
   kShadow,
   kResolve,
-  kMetrics,  ///< looking at what the others did; part of no picture
+  kMetrics,  ///< measuring the other phases; not part of rendering
 };
 inline constexpr size_t kPhaseCount = 10;
 inline constexpr const char* kPhaseNames[kPhaseCount] = {
