@@ -96,7 +96,7 @@ static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
 
 /// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. Its state
 /// is a row of one cache line, and its shadow ray is a second row, so that shading touches only the
-/// cache lines of its own paths in any order of hits (docs/decisions/path-rows.md).
+/// cache lines of the paths it shades, in any order of hits (docs/decisions/path-rows.md).
 ///
 /// Contract: owned by one wave.
 class PathPool {

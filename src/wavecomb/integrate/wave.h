@@ -63,9 +63,9 @@ struct WaveContext {
   const SplatFilter* splat_filter = nullptr;  ///< filter of light paths; null without light paths
   AimLessons* lessons = nullptr;  ///< receives the contributions of light paths instead of the film
   float light_paths = 1;          ///< light paths per camera path, averaged over the image
-  /// Brightness above which a light splat carries its predicted addition to the variance of a
-  /// pixel's samples, if camera paths had to find that light, instead of its light
-  /// (light_vertex.h). 0 means that splats always carry light.
+  /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
+  /// light would add to a sample of a pixel if camera paths had to find it, divided by this
+  /// brightness (light_vertex.h). 0 means that splats carry light.
   float camera_squares = 0;
 
   /// Points of camera paths to merge light paths with; null without merging.

@@ -18,7 +18,7 @@ inline constexpr uint32_t kNothing = 0xffffffffu;
 /// Bound of a medium.
 template <typename F>
 struct Bound {
-  UInt<F> place;     ///< placed_geometry
+  UInt<F> place;     ///< placed_geometry() of the mesh
   UInt<F> material;  ///< kNothing if there is no bound
 };
 

@@ -139,7 +139,7 @@ class Interiors {
            (max_component(m.scattering) > 0.f);
   }
   /// Samples the distance to the next collision with the random number `u`. A medium without
-  /// scattering has no collision, and keeps a stored first number. If lights guide the distance,
+  /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
   /// stores the number until the length of the segment is known.
   template <typename F>
   void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;

@@ -3,8 +3,8 @@
 /// where v is the velocity at p and t the time in seconds since the grids were sampled.
 ///
 /// Moving volumes are traversed by the cells of a grid that bounds the field over the whole shutter
-/// interval (scene/volume_motion.h), others by the cells of their own grids. All lanes use the same
-/// one of the two.
+/// interval (scene/volume_motion.h), others by the cells of the field's grid. All lanes use the
+/// same one of the two.
 #pragma once
 
 #include "wavecomb/medium/grid_lookup.h"

@@ -42,7 +42,7 @@ namespace wavecomb {
 inline constexpr uint32_t kLongWalk = 512;
 /// Fraction of the initial light below which a walk is subject to roulette.
 inline constexpr float kFaintWalk = 0.25f;
-/// Fraction of guided walks below a thick surface if scattering is isotropic.
+/// Fraction of walks that are guided, in a thick body with isotropic scattering.
 inline constexpr float kLedShare = 0.75f;
 
 /// State of a walk before its next collision.

@@ -33,7 +33,8 @@ class Walkers {
 
   static constexpr uint32_t kNoMedium = 0xffffffffu;
 
-  /// Takes over walks in the active lanes. `who`: what `finish` is told; `slot`: of the path.
+  /// Adds the walks in the active lanes. `who` is passed to `finish`, and `slot` is the path's
+  /// slot.
   template <typename F>
   void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const F& time,
            const Mask<F>& active) {
