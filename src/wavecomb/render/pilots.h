@@ -35,8 +35,8 @@ struct PilotCache {
 
 /// Results of the pilots of one render.
 struct PilotResults {
-  std::shared_ptr<const LightCalibration> lights;  ///< null: not calibrated yet
-  std::shared_ptr<const LightAiming> aiming;       ///< null: light paths are not aimed
+  std::shared_ptr<const LightCalibration> lights;  ///< null if not calibrated yet
+  std::shared_ptr<const LightAiming> aiming;       ///< null if light paths are not aimed
   /// Never null; without a field before and unless it is trained.
   std::shared_ptr<const GuideTraining> training = std::make_shared<const GuideTraining>();
   LightView light_view;  ///< lights with calibrated weights, and aimed if they send paths
