@@ -23,9 +23,9 @@ inline constexpr uint32_t kNoGroup = 0xffffffffu;
 struct AovTables {
   AovLayout layout;
   CryptoTables crypto;
-  /// By light: index of its group among the film's groups, or kNoGroup.
+  /// Index of each light's group among the film's groups, or kNoGroup.
   std::vector<uint32_t> kept_group;
-  uint32_t group_of_rest = kNoGroup;  ///< index of the group for other emission
+  uint32_t group_of_rest = kNoGroup;  ///< index of the group of emission without a light
   /// Names of the film's light groups, or of its expressions.
   std::vector<std::string> kept_names;
   PathAutomaton automaton;             ///< of the light path expressions

@@ -30,8 +30,8 @@ struct CameraSetup : Camera {
   const float* filter;             ///< FilterTable::offsets()
   bool has_far;                    ///< whether a far plane or a clipping plane limits rays
   LensTable distortion;            ///< empty without lens distortion
-  /// Time at which a rolling shutter exposes pixel (x, y): a + b (x + 1/2) + c (y + 1/2) + duration
-  /// t.
+  /// Time at which a rolling shutter exposes pixel (x, y):
+  ///   a + b (x + 1/2) + c (y + 1/2) + duration t.
   std::array<float, 3> rolling{};
 
   /// `overscan` is the number of pixels beyond the window at each edge. Throws Error if the camera

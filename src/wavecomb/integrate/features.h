@@ -16,7 +16,7 @@ enum Feature : uint32_t {
   kExperiments = 32,  ///< cosine sampling, Schlick's approximation
   kBelow = 128,       ///< subsurface scattering
   kInside = 256,      ///< nested dielectrics
-  kJoined = 64,       ///< light paths that share the MIS weights of camera paths
+  kJoined = 64,       ///< MIS between camera paths and light paths
 };
 inline constexpr uint32_t kPlain = kNotes, kEverything = 511;
 

@@ -10,8 +10,8 @@ namespace wavecomb {
 
 /// Buffers of a worker; empty if the scene has no nested dielectrics.
 struct InteriorBuffers {
-  static constexpr size_t kWords = 32;    ///< row size per ray
-  static constexpr size_t kColumns = 16;  ///< columns of the rays traced together
+  static constexpr size_t kWords = 32;    ///< 32-bit words per ray
+  static constexpr size_t kColumns = 16;  ///< 32-bit words per traced ray
 
   explicit InteriorBuffers(size_t capacity)
       : rows(capacity ? SoaBlock(1, capacity * kWords) : SoaBlock()),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Start of light paths. Each light path has the number of a pixel, and a pass has one light path
-/// for each pixel that it selects. Random numbers depend only on the path's number and the sample,
-/// not on the schedule.
+/// Start of light paths. Light paths are numbered like the pixels of the image, and a pass traces
+/// the same number of samples of each. Random numbers depend only on the path's number and the
+/// sample, not on the schedule.
 #pragma once
 
 #include "wavecomb/core/sampler.h"

@@ -8,12 +8,13 @@
 /// vertex. A contribution to the camera is split by the fraction itself. A connection is split at
 /// both vertices.
 ///
-///   begin   a path starts at a light
-///   shade   a vertex was shaded
-///   keep    camera paths connect to this vertex
-///   show    the camera sees the vertex: the contribution is added to the film
-///   offer, link, connect   a vertex of a camera path, a vertex of a light path, and the ray
-///   between
+///   begin     a path starts at a light
+///   shade     a vertex was shaded
+///   keep      camera paths connect to this vertex
+///   show      the camera sees the vertex: the contribution is added to the film
+///   offer     a vertex of a camera path offers a connection
+///   link      the vertex of the light path was shaded for the connection
+///   connect   the ray between the two is free
 #pragma once
 
 #include <bit>

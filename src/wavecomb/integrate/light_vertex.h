@@ -99,7 +99,7 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
       receiver.normal = pack_normal<F>(select<F>(place.l.z < 0.f, -place.frame.n, place.frame.n));
     const LightReach<F> reach =
         light_reach<F>(v.scene.lights, v.path.receiver, receiver, c.d, distance, first);
-    // Vertices with delta lobes only sample no lights.
+    // Vertices that have only delta lobes do not sample lights.
     place.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
     place.by_light_only = first & reach.is_delta;
   }

@@ -29,8 +29,8 @@ template <typename F>
 struct ConnectionRow {
   Vec3<F> from;  ///< origin of the ray to that vertex
   F pdf;         ///< solid angle density of the camera path's bounce in that direction
-  /// contribution for unit radiance from that vertex, times the number of candidate vertices; black
-  /// without a connection
+  /// Contribution for unit radiance from that vertex, times the number of candidate vertices; black
+  /// without a connection.
   Color<F> light;
   F ratio;         ///< JointVertex::towards
   WAVECOMB_FIELDS(from, pdf, light, ratio)

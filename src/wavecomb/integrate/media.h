@@ -3,14 +3,11 @@
 /// on a class `Media`, so that scenes without volumes use kernels without that code. Its members
 /// are
 ///
-///   static constexpr bool kAny;            whether there are volumes; if false, only Programs is
-///   needed
-///   static constexpr bool kShines;         whether volumes may emit; if true, the class has
-///     bool shines() const;                   whether they do
-///     Color<F> emission(const Passage<F>&, const Mask<F>& active) const;    radiance of the
-///     segment
-///   template <typename F> using Programs;  ProgramList of all programs, including those of
-///   surfaces
+///   static constexpr bool kAny;      whether there are volumes; if not, only Programs is needed
+///   static constexpr bool kShines;   whether volumes may emit; if so, it needs the next two
+///   bool shines() const;             whether they do
+///   Color<F> emission(const Passage<F>&, const Mask<F>& active) const;   radiance of the segment
+///   template <typename F> using Programs;      ProgramList of all programs, with those of surfaces
 ///   template <typename F> Flight<F> fly(const Passage<F>&, const Color<F>& throughput,
 ///                                       const Mask<F>& active) const;
 ///   template <typename F> Color<F> transmittance(const Passage<F>&, const Mask<F>& active) const;

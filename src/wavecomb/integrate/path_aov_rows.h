@@ -46,7 +46,8 @@ inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
   put(Aov::kDistance, hit.distance);
 }
 
-/// Denoiser inputs of a path: albedo and normal of the last vertex so far.
+/// Denoiser inputs of a path: albedo and normal of the first vertex that is not clear, or of the
+/// last vertex so far.
 template <typename F>
 struct GuideRow {
   Color<F> albedo;

@@ -11,7 +11,6 @@
 ///
 /// Rows exist only for the requested AOVs. Direct and indirect light cost nothing in shading: the
 /// radiance is copied before the first scattering and after it.
-/// copied once before the first scattering brings light, and once after.
 #pragma once
 
 #include <array>

@@ -213,9 +213,9 @@ class PathExpressions {
   }
 
  private:
-  /// Adds emission that a bounce hits of lights with different multipliers. Splits `c` between the
-  /// diffuse and glossy lobes of the bounce in proportion to their contributions. Returns the lanes
-  /// it handled.
+  /// Adds the emission that a bounce hits, for lights whose two multipliers differ. Splits `c`
+  /// between the diffuse and glossy lobes of the bounce in proportion to their contributions.
+  /// Returns the lanes with such lights.
   template <typename F>
   [[gnu::noinline, gnu::cold]] Mask<F> add_by_parts(const UInt<F>& slot,
                                                     const ExpressionRow<F>& row,

@@ -30,7 +30,7 @@ struct PathRow {
   F cone_width, cone_spread;
   SampleKey<F> key;
   /// LightReceiver::normal of the vertex that made the ray; object_of() of the body if the ray
-  /// enters a subsurface body; index of the light in light paths
+  /// enters a subsurface body; index of the light in light paths.
   UInt<F> receiver;
   WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
 };

@@ -78,9 +78,10 @@ struct PathState {
   UInt<F> receiver;   ///< LightReceiver::normal of the previous vertex
   UInt<F> link{0u};   ///< link class of the surface that the ray left, if lights are linked
   F importance{0.f};  ///< one over the brightness of the image at the pixel; 0 if unknown
-  /// Camera paths: ratio R of steps/join.h. It is 0 if no light path can produce this path, and
-  /// negative if all bounces so far were deltas and the path waits for a vertex to merge at. Light
-  /// paths: density of the previous bounce, or 0 if the previous vertex cannot be connected.
+  /// For camera paths, the ratio R of steps/join.h. It is 0 if no light path can produce this path,
+  /// and negative if all bounces so far were deltas and the path waits for a vertex to merge at.
+  /// For light paths, the density of the previous bounce, or 0 if the previous vertex cannot be
+  /// connected.
   F ratio{0.f};
   // Only for scenes with nested dielectrics (InsideRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
@@ -90,8 +91,7 @@ struct PathState {
   /// multipliers.
   Color<F> diffuse{F(0.f)};
 
-  /// Returns R of steps/join.h, the density of light paths relative to this camera path. At least
-  /// 0.
+  /// Returns the density of light paths relative to this camera path: max(R, 0) of steps/join.h.
   F joined() const { return max(ratio, F(0.f)); }
   LightReceiver<F> vertex_before() const {
     LightReceiver<F> from(o, receiver);

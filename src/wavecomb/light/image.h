@@ -35,7 +35,7 @@ inline Interval<F> interval_at(const Distribution2D& d, const UInt<F>& row, uint
 }
 
 /// Returns the index of the last of `n` ascending values of a line that is at most x. The first
-/// value must be. The loop compares all values, which takes one or two registers.
+/// value must be at most x. The loop compares all values, which takes one or two registers.
 inline uint32_t last_at_most(const Distribution2D::Line& line, uint32_t n, uint16_t x) {
   uint16_t at_most = 0;
   for (const uint16_t value : line.value) at_most = static_cast<uint16_t>(at_most + (value <= x));

@@ -76,8 +76,8 @@ void finish_area(MadeLight& made, const Light& light, double area);
 void finish_flat(MadeLight& made, const Light& light, const Double3& u, const Double3& v,
                  double area_factor);
 
-/// Returns the sampling distribution of a light with this texture and radiance: an existing one
-/// from before if there is one, else the result of `build`.
+/// Returns the sampling distribution of a light with this texture and radiance: the one in
+/// making.before if it exists, else the result of `build`.
 Distribution2D density_of(const LightRecord& light, const LightMaking& making,
                           Distribution2D (*build)(const TextureView&, const Vec3<float>&));
 

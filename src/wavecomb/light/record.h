@@ -121,7 +121,7 @@ struct EmissionQuery {
 template <typename F>
 struct KindEmission {
   Vec3<F> p, d;  ///< unit d
-  /// unit normal of the light's surface, for the offset of the origin; 0 without a surface
+  /// Unit normal of the light's surface, for the offset of the origin; 0 without a surface.
   Vec3<F> n;
   Color<F> radiance;
   F density;

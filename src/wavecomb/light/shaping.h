@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Directional shaping of a light's radiance: UsdLuxShapingAPI.
 ///
-/// With e the direction of emission and a the light's axis, both unit vectors, and angle = acos(e .
-/// a),
+/// Let e be the direction of emission and a the light's axis, both unit vectors, and let
+/// angle = acos(e . a). The factors
 ///   focus   lerp(focusTint, 1, |e . a|^focus)
 ///   cone    1 - smoothstep(lerp(coneAngle, 0, softness), coneAngle, angle)
 ///   IES     candela at (theta, phi) of e in the light's space, with theta scaled by angleScale;

@@ -10,15 +10,15 @@ namespace wavecomb {
 /// kNoEvent and `ratio` is 1.
 struct Flights {
   static constexpr uint32_t kNoEvent = 0xffffffffu;
-  static constexpr uint32_t kNoHero = 4;  ///< marks a flight that has left all volumes
+  static constexpr uint32_t kNoHero = 4;  ///< volumes no longer apply to the flight
 
   float* t;
   uint32_t* material;  ///< of the volume that stopped the flight
-  /// By channel: probability of the outcome, divided by that of the hero channel.
+  /// Probability of the outcome by channel, divided by that of the hero channel.
   float* ratio[3];
   const uint32_t* hero;  ///< the channel that samples the distance
-  /// By channel: additional factor of the weight, for outcomes that the hero channel did not
-  /// sample. Initially 1.
+  /// Additional factor of the weight by channel, for outcomes that the hero channel did not sample.
+  /// Initially 1.
   float* scale[3];
 };
 /// Results that a pass through one volume computes.

@@ -139,7 +139,7 @@ class Inside {
 template <typename F>
 struct BoundMet {
   Inside<F> after;  ///< medium stack on the other side
-  /// whether the ray passes unchanged, since another bound has priority or this one has no effect
+  /// Whether the ray passes unchanged, since another bound has priority or this one has no effect.
   Mask<F> passes;
   F outer;  ///< index of refraction on the outer side
 };

@@ -67,7 +67,7 @@ struct InteriorState {
   F first;  ///< Walk::first
   /// Distance to the next collision, or kFar. Until something scatters it is kFar (1 + u), which
   /// stores the random number u of the first distance; u is stratified over a pixel's samples. For
-  /// shadow rays: the remaining length.
+  /// shadow rays it is the remaining length.
   F rest;
   UInt<F> seed, number, hero, flags;
   WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)

@@ -139,11 +139,11 @@ class Interiors {
            (max_component(m.scattering) > 0.f);
   }
   /// Samples the distance to the next collision with the random number `u`. A medium without
-  /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
+  /// scattering has no collision, and keeps a stored first number. If lights guide the distance,
   /// stores the number until the length of the segment is known.
   template <typename F>
   void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
-  /// Does so by lamps, with the number that waits, in a medium that ends at `far`.
+  /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
   template <typename F>
   LampWay<F> draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& medium, const F& far,
                            const Mask<F>& lanes) const;

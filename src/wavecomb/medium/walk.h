@@ -24,7 +24,6 @@
 ///
 /// where A_c is the product of the albedos along the walk and p_c the density of a free walk of
 /// channel c. No weight therefore exceeds one over the probability of free walks.
-/// leaves, no weight is more than one over the share of free walks.
 #pragma once
 
 #include <algorithm>

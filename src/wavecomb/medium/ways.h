@@ -64,11 +64,11 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 /// fuller but the total time is longer.
 /// `Visitor` has these functions for the segments of the lanes:
 ///
-///   start(way, lanes)       begins these segments
-///   Mask<F> collide(lanes, x, p, majorant, numbers)    handles a collision at o + x d, which is p
-///   in
-///                           the grid's space, and returns the lanes that end there
-///   finish(way, lanes)      ends these segments
+///   start(way, lanes)    begins these segments
+///   Mask<F> collide(lanes, x, p, majorant, numbers)    handles a collision at o + x d, at the
+///   point
+///                        p of the grid's space, and returns the lanes that end there
+///   finish(way, lanes)   ends these segments
 ///
 /// The result of a segment does not depend on other segments.
 template <typename F, typename Visitor>

@@ -18,8 +18,8 @@ WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeature
     return take_light_steps<Bsdf, F>(v, setup, target);
 }
 
-/// Shades records [begin, end) of the shading order, for the purpose Wave::light_use. See
-/// shade_batch() for camera paths. The words `group` and `set` of the ShadowRow hold the film
+/// Shades records [begin, end) of the shading order for the purpose in Wave::light_use, as
+/// shade_batch() does for camera paths. The words `group` and `set` of the ShadowRow hold the film
 /// position (x, y) of the contribution.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,

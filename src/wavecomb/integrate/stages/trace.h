@@ -79,7 +79,7 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
-/// Tests the shadow rays for occlusion. `linked` is a parameter of presence_keys().
+/// Tests the shadow rays for occlusion. `linked` is passed to presence_keys().
 template <typename F>
 void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool linked) {
   const ShadowQueue& q = wave.shadows;

@@ -5,8 +5,7 @@
 /// A ray that leaves the surface at p starts at one of two origins, depending on its side:
 ///   o+ = p + terminator + offset n  outside,   o- = p - offset n  inside   (surface/surface.h).
 /// Bounces therefore estimate two integrals over solid angle, one about each origin,
-///   sum over s of  int_{s} f(wo, wi) |cos theta_i| L(o_s, wi) dwi,
-/// and emission that a bounce meets is weighted with the density of a light sample as seen from o_s
+///   sum over s of  int_{s} f(wo, wi) |cos theta_i| L(o_s, wi) dwi.
 /// Emission that a bounce hits is weighted with the density of a light sample as seen from o_s
 /// (PathState::o). Light sampling estimates the same two integrals: a sample belongs to the side s
 /// on which it lies as seen from o_s. Its direction, distance, density and shadow ray start at o_s,

@@ -37,7 +37,7 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
 }
 
 /// Returns the MIS weight of the light sample `l` of `light` against bounces with density
-/// `p_bounce` and light paths (join.h). With R up to this vertex, with p_light in place of
+/// `p_bounce` and light paths (join.h). If R includes this vertex with p_light in place of
 /// p_bounce,
 ///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
 /// for a point light the last term has p_light d^2 in place of p_light.
@@ -70,7 +70,7 @@ struct LightCandidate {
   Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
   UInt<F> light;
   UInt<F> shadow_set;    ///< for linked lights
-  ShadowReach<F> reach;  ///< for lights with effects
+  ShadowReach<F> reach;  ///< for lights with shadow attributes
 };
 
 /// Returns the light sample for the sample values `r`.
