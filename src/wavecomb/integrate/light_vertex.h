@@ -54,11 +54,11 @@ template <typename Bsdf, typename F, typename Interaction>
 struct LitPlace {
   const Interaction& at;
   Frame<F> frame;
-  Vec3<F> l;  ///< local direction to the light, computed as a connection (steps/connection.h)
-  F inverse_cos;          ///< 1 / |g l|
-  Color<F> flux;          ///< flux that arrives
-  F linked;               ///< F, see above
-  F sampled;              ///< p_light at the first vertex, else 0
+  Vec3<F> l;      ///< local direction to the light, computed as a connection (steps/connection.h)
+  F inverse_cos;  ///< 1 / |g l|
+  Color<F> flux;  ///< flux that arrives
+  F linked;       ///< F, see above
+  F sampled;      ///< p_light at the first vertex, else 0
   Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
   Mask<F> active;
 

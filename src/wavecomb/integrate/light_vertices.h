@@ -32,7 +32,7 @@ struct ConnectionRow {
   /// Contribution for unit radiance from that vertex, times the number of candidate vertices; black
   /// without a connection.
   Color<F> light;
-  F ratio;         ///< JointVertex::towards
+  F ratio;  ///< JointVertex::towards
   WAVECOMB_FIELDS(from, pdf, light, ratio)
 };
 

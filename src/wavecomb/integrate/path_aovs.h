@@ -6,11 +6,12 @@
 ///   hit_light, hit_surface   the camera ray has its first hit
 ///   vertex     a vertex was shaded
 ///   add        a light contributes to the path
-///   end_depth  the radiance includes all light that arrives before scattering `depth`
+///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
 ///   resolve    the path's values are added to the film
 ///
-/// Rows exist only for the requested AOVs. Direct and indirect light cost nothing in shading: the
-/// radiance is copied before the first scattering and after it.
+/// Rows exist only for the requested AOVs. Splitting the radiance into emission, direct and
+/// indirect light costs nothing in shading, since copies of it before the light samples of the
+/// first two vertices are enough.
 #pragma once
 
 #include <array>
@@ -202,13 +203,13 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         });
   }
 
-  /// Copies the radiance of slots below `slots`. It includes all light that arrives before
-  /// scattering `depth`, and none that this scattering gathers.
+  /// Copies the radiance of slots below `slots`. It includes the emission at the vertex at `depth`,
+  /// but not its light sample.
   void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
     if (depth < parts_.size() && parts_[depth])
       std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
   }
-  /// Copies the radiance for `depth` and all later scatterings, after the paths have ended.
+  /// Copies the radiance for `depth` and all later vertices, after the paths have ended.
   void end_path(uint32_t depth, const float* radiance, size_t slots) const {
     for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
   }
@@ -278,9 +279,9 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   Block vertex_;
   /// First word of each AOV in a row of vertex_, or kNotKept.
   std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
-  std::array<Block, 2> parts_;  ///< radiance before scattering 0 and 1
-  /// Contributions of connections at first vertices. They are indirect light, although the radiance
-  /// includes them at scattering 0.
+  std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
+  /// Contributions of connections at first vertices. They are indirect light, although they are
+  /// added between the two copies in parts_.
   Block early_links_;
   Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;

@@ -176,8 +176,8 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
 /// Connection that a vertex of a camera path offers to a vertex of a light path.
 template <typename F>
 struct ConnectionOffer {
-  Vec3<F> to;                ///< position of the light path's vertex
-  F vertices;                ///< LightVertexRow::vertices
+  Vec3<F> to;      ///< position of the light path's vertex
+  F vertices;      ///< LightVertexRow::vertices
   Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
   ConnectionRow<F> row;  ///< output; black where `wanted` is false
   /// Output, if light path expressions are active; undefined where `wanted` is false.

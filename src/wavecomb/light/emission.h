@@ -2,9 +2,10 @@
 /// Light paths: sampling of a light, a point on it and a direction, and the densities that both
 /// ends of a path need for multiple importance sampling (docs/light-paths.md).
 ///
-/// Two kinds of lights emit no light paths, and only camera paths find them: lights whose
-/// contribution depends on the illuminated surface (LightRecord::camera_only), and mesh lights,
-/// whose visible emission differs from the light they cast. Bodies are in emission.inl.
+/// Two kinds of lights emit no light paths, and only camera paths find them: lights with properties
+/// that light paths do not support, such as links, multipliers, decay or motion
+/// (LightRecord::camera_only), and mesh lights, whose visible emission differs from the light they
+/// cast. Bodies are in emission.inl.
 #pragma once
 
 #include "wavecomb/light/light.h"
@@ -30,10 +31,10 @@ struct EmissionNumbers {
   F pick, u, v, s, t, aim;
 };
 
-/// Density with which camera paths find a light from the first surface that a light path hits:
-/// `density` is the solid angle density of a light sample. For a point light it is multiplied by
-/// the squared distance d^2, since 1 / d^2 replaces its solid angle. For a distant light without an
-/// angle it is the probability of selecting the light.
+/// Density with which camera paths find a light from the first surface that a light path hits.
+/// `density` is the solid angle density of a light sample. For a point light it is the probability
+/// of selecting the light times the squared distance d^2, since 1 / d^2 takes the place of its
+/// solid angle. For a distant light without an angle it is the probability of selecting the light.
 template <typename F>
 struct LightReach {
   F density;

@@ -66,8 +66,8 @@ template <typename F>
 F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                      const Vec3<F>& dir, const F& t, const Mask<F>& active);
 
-/// Factors for lights with multipliers, links or shadow attributes, which do not illuminate all
-/// surfaces alike. Used only with LightView::has_effects.
+/// Factors for lights with diffuse and specular multipliers, and for lights that only light
+/// sampling finds. Used only with LightView::has_effects.
 template <typename F>
 struct LightEffect {
   F diffuse, specular;   ///< multipliers of the diffuse and of the other response

@@ -37,7 +37,7 @@ inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>&
 template <typename F>
 struct LightPick {
   UInt<F> light;
-  F probability;  ///< selection probability, if it is not in the light's record
+  F probability;   ///< selection probability, if it is not in the light's record
   Mask<F> active;  ///< lanes with a light
   bool of_record;
 

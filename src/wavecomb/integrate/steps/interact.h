@@ -88,9 +88,10 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   Vec3<F> tangent() const { return select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f))); }
 };
 
-/// Returns the footprint of a texture lookup `width` wide. The camera filters the whole footprint,
-/// since single texels would be noise in the image. After a bounce the lookup reads one random
-/// texel, since the path is noisier than the texture.
+/// Returns the footprint of a texture lookup `width` wide. Camera rays, and all rays with
+/// filters_textures_whole, filter the whole footprint, since single texels would be noise in the
+/// image. Other lookups after a bounce read one random texel, since the path is noisier than the
+/// texture.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
   using U = UInt<F>;
