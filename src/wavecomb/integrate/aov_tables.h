@@ -26,7 +26,7 @@ struct AovTables {
   /// Index of each light's group among the film's groups, or kNoGroup.
   std::vector<uint32_t> kept_group;
   uint32_t group_of_rest = kNoGroup;  ///< index of the group of emission without a light
-  /// Names of the film's light groups, or of its expressions.
+  /// Names of the film's light groups, followed by those of its expressions.
   std::vector<std::string> kept_names;
   PathAutomaton automaton;             ///< of the light path expressions
   BackwardAutomaton backward;          ///< for light paths, if the render has any

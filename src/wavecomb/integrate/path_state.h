@@ -137,7 +137,7 @@ struct VertexAovs {
   bool wants_events = false;  ///< classifies scatterings; implies wants_lights
   Color<F> albedo;
   Vec3<F> normal;
-  Mask<F> is_clear;  ///< whether the surface shows only specular reflection and transmission
+  Mask<F> is_clear;  ///< whether the surface has only delta lobes, such as a mirror or glass
   Vec2<F> uv;
   UInt<F> emitter, lit_by;  ///< lights that contribute `emitted` and `direct`, or kNoLight
   // With wants_lights: the position from which a light was sampled, and the MIS weight that

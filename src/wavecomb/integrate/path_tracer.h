@@ -266,9 +266,9 @@ class PathTracer {
     return {material - scene.volumes.first_material, 0, material, false};
   }
 
-  /// Adds the light sample of `v`, whose light is in `group`. Volumes attenuate it always, media
-  /// inside meshes only if the shadow ray is free. If an object blocks the ray, only the fraction
-  /// v.shade (the shadow colour of the light) remains.
+  /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate it, and
+  /// media inside meshes do if the shadow ray is free. If an object blocks the ray, only the
+  /// fraction v.shade (the shadow colour of the light) remains.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;

@@ -84,7 +84,7 @@ inline bool is_infinite(LightKind kind) {
   return kind == LightKind::kDistant || kind == LightKind::kDome;
 }
 
-/// Returns g for paths from `light` that the ray from + t dir would meet, traced backwards.
+/// Returns g for paths from `light` that arrive at `from` along -dir over the distance t.
 template <typename F>
 inline F aim_of_kind(const LightView& view, LightKind kind, const LightReader<F>& light,
                      const Vec3<F>& from, const Vec3<F>& dir, const F& t) {

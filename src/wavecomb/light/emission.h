@@ -47,8 +47,8 @@ template <typename F>
 Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
                             const Mask<F>& wanted);
 
-/// Returns Emission::density of a path from `light` that the ray from.p + t dir would meet, traced
-/// backwards. Returns 0 if the light emits no paths.
+/// Returns Emission::density of a path from `light` that arrives at `from` along -dir over the
+/// distance t. Returns 0 if the light emits no paths.
 template <typename F>
 F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& from,
                    const Vec3<F>& dir, const F& t, const Mask<F>& wanted);

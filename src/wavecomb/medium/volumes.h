@@ -177,8 +177,8 @@ class Volumes : public WalksBelow {
                         return begin_inside<F>(sampler, path.key, depth, path.throughput);
                       });
   }
-  /// Returns the start of a ray through media. The first distance uses a stratified number of the
-  /// pixel's samples unless volumes use it.
+  /// Returns the start of a ray through media. The random number of the first distance is
+  /// stratified over the pixel's samples, unless volumes use that number.
   template <typename F>
   InteriorStart<F> begin_inside(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
                                 const Color<F>& throughput) const {

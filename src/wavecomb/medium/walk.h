@@ -16,9 +16,9 @@
 ///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),
 ///   p(t) = s exp(-s t),   s = (1 - mu / nu) e
 ///
-/// where e is the extinction. A stratified number of the pixel's samples selects the technique, and
-/// the weight includes all six techniques (balance heuristic over whole walks). With q_k the
-/// probabilities of the techniques and p_k their densities,
+/// where e is the extinction. A random number that is stratified over the pixel's samples selects
+/// the technique, and the weight includes all six techniques (balance heuristic over whole walks).
+/// With q_k the probabilities of the techniques and p_k their densities,
 ///
 ///   T_c = T_c(0) A_c p_c / sum over k of q_k p_k
 ///
