@@ -55,7 +55,7 @@ struct LinkRow {
 
 /// AOV values of the light paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots are below the capacity.
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
 class LightPathAovs {
  public:
   LightPathAovs() = default;

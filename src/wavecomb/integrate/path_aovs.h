@@ -43,7 +43,7 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
 
 /// AOV rows of the paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots are below the capacity.
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
 class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;

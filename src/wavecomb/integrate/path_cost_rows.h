@@ -14,7 +14,8 @@ inline constexpr float kModelRayNs = 250;
 
 /// Cost of each path.
 ///
-/// Contract: base of PathAovs. Slots are below the capacity, which is 0 without a cost AOV.
+/// Contract: used only as a base of PathAovs. Slots must be below the capacity, which is 0 without
+/// a cost AOV.
 class PathCostRows {
  public:
   PathCostRows() = default;

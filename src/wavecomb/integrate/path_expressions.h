@@ -83,8 +83,8 @@ struct ColourStates {
 
 /// Light path expression states and sums of the paths of a wave.
 ///
-/// Contract: owned by one PathAovs. Slots are below the capacity; those of the active lanes are
-/// distinct.
+/// Contract: owned by one PathAovs. Slots must be below the capacity, and those of the active
+/// lanes distinct.
 class PathExpressions {
  public:
   PathExpressions() = default;

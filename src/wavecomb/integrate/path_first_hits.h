@@ -12,7 +12,7 @@ namespace wavecomb {
 
 /// AOV rows of camera rays and their first hits.
 ///
-/// Contract: base of PathAovs. Slots are below the capacity.
+/// Contract: used only as a base of PathAovs. Slots must be below the capacity.
 class PathFirstHits {
  public:
   PathFirstHits() = default;

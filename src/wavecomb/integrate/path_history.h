@@ -37,7 +37,7 @@ struct HistoryRow {
 
 /// Stored vertices of the paths of a wave.
 ///
-/// Contract: owned by one wave, or one reference integrator. Slots are below the capacity.
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
 class PathHistory {
  public:
   PathHistory() = default;

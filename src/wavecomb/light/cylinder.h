@@ -155,7 +155,7 @@ inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h).
+/// Kind of cylinder lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct CylinderKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

@@ -41,7 +41,7 @@ inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h).
+/// Kind of disk lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct DiskKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

@@ -58,7 +58,7 @@ inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h).
+/// Kind of distant lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct DistantKind : NoShape {
   static LightKindInfo describe();
   template <typename F>

@@ -205,7 +205,7 @@ inline F dome_emission_density(const LightMeeting<F>& m) {
 
 namespace wavecomb {
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h).
+/// Kind of dome lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct DomeKind : NoShape {
   static LightKindInfo describe();
   template <typename F>

@@ -75,8 +75,8 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   return select<F>(given, radiance, glow);
 }
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h). Records of mesh lights are never selected
-/// themselves; their triangles have separate rows.
+/// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds.h). Records of mesh lights are never
+/// selected themselves; their triangles have separate rows.
 struct TriangleKind : NoEscape, NoShape {
   static LightKindInfo describe();
   template <typename F>

@@ -141,8 +141,8 @@ inline F even_emission_density(const F& area) {
   return select((area > 0.f) & is_finite(density), density, F(0.f));
 }
 
-/// Returns a path along `d` towards the sphere around the scene, from a point on the disk of that
-/// sphere's cross section sampled by (u, v).
+/// Returns a path along `d` through the sphere around the scene. It starts on a disk of the
+/// sphere's radius in front of the scene, at a point sampled by (u, v).
 template <typename F>
 inline KindEmission<F> emit_from_afar(const LightView& view, const Vec3<F>& d, const F& u,
                                       const F& v, const Color<F>& radiance,

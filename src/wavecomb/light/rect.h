@@ -309,7 +309,7 @@ inline F rect_emission_density(const LightMeeting<F>& m) {
 
 namespace wavecomb {
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h).
+/// Kind of rect lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct RectKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

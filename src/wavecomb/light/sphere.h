@@ -92,7 +92,7 @@ inline F sphere_emission_density(const LightReader<F>& light) {
 
 namespace wavecomb {
 
-/// Entry of WAVECOMB_LIGHT_KINDS (light/kinds.h).
+/// Kind of sphere lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct SphereKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

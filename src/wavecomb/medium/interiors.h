@@ -139,8 +139,8 @@ class Interiors {
            (max_component(m.scattering) > 0.f);
   }
   /// Samples the distance to the next collision with the random number `u`. A medium without
-  /// scattering has no collision, and keeps a stored first number. If lights guide the distance,
-  /// stores the number until the length of the segment is known.
+  /// scattering has no collision and keeps a stored number for the first distance. If lights guide
+  /// the distance, stores `u` until the length of the segment is known.
   template <typename F>
   void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
   /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
