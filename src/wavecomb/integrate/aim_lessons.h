@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What paths from lights teach of where to aim them (learn/aim_targets.h).
+/// Training samples from light paths, for aiming later light paths (learn/aim_targets.h).
 #pragma once
 
 #include <vector>
@@ -9,17 +9,18 @@
 
 namespace wavecomb {
 
-/// Rows by the number of the path (light_path_number): one sample of each. Contract: a path's row
-/// is written by who traces it; no two waves have the same path.
+/// Training samples, one for each light path, by light path number.
+///
+/// Contract: only the wave that traces a path writes its row, and no two waves trace the same path.
 class AimLessons {
  public:
   explicit AimLessons(size_t paths) : rows_(paths) {}
 
-  /// Path `path` met something first at `place`.
+  /// Records the first hit `place` of path `path`.
   void begin(uint32_t path, const Vec3<float>& place) {
     rows_[path] = {place.x, place.y, place.z, 0.f};
   }
-  /// What its vertex `depth` brought, unblocked, for all pixels.
+  /// Adds the unblocked contribution of the path's vertex at `depth`, summed over all pixels.
   void bring(uint32_t path, uint32_t depth, const Vec3<float>& light) {
     if (depth > 0) rows_[path].worth += luminance(light);
   }

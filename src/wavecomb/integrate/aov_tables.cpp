@@ -26,7 +26,7 @@ AovTables::AovTables(const Scene& scene, const Settings& settings) {
   if (layout.set.has(Aov::kMotion) && scene.camera().projection == Projection::kLatlong)
     throw Error("the AOV motion is none of latlong cameras; give others, or another projection");
   check_id_layers(layout.set, scene.instances().size() + 1, scene.materials().size());
-  // Ids of instances and materials need none of it; positions of objects do.
+  // Ids of instances and materials do not need these tables, but ids of objects do.
   if (layout.set.has(AovKind::kCoverage)) crypto = CryptoTables(scene, layout.set);
   if (layout.set.has(Aov::kLightGroups)) keep_groups(scene, settings);
   if (layout.set.has(Aov::kExpressions)) keep_expressions(scene, settings);

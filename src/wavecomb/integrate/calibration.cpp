@@ -6,10 +6,10 @@
 namespace wavecomb {
 namespace {
 
-/// Instances looked at: enough to meet every material of any sane scene, few enough to cost
-/// nothing.
+/// Largest number of instances to search. It suffices to find every material of a typical scene and
+/// takes negligible time.
 constexpr size_t kMostInstances = 1 << 14;
-/// Faces looked at per mesh, evenly spread.
+/// Number of faces to inspect in each mesh, evenly spaced.
 constexpr size_t kFaces = 256;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Costs of materials before anything is rendered: synthetic hits, or a fixed model.
+/// Material costs before the first pass, from synthetic hits or from a fixed model.
 #pragma once
 
 #include <vector>
@@ -9,30 +9,31 @@
 
 namespace wavecomb {
 
-/// A triangle that wears a material.
+/// Triangle with a certain material.
 struct CalibrationHit {
   uint32_t inst, mesh, geom, prim;
 };
 
-/// Synthetic hits of one material: `count` records over `distinct` triangles.
+/// Synthetic hits of one material: `count` records distributed over `distinct` triangles.
 struct CalibrationHits {
   static constexpr uint32_t kMost = 64;
   uint32_t material = 0;
   uint32_t count = 0;
   uint32_t distinct = 0;
-  float fill = 1;  ///< share of the lanes that packets fill, on average; at least one lane
+  float fill = 1;  ///< average fraction of active lanes in packets; at least one lane is active
   CalibrationHit hits[kMost];
 };
 
-/// Triangles of each material that some visible mesh wears, spread over its meshes; materials that
-/// nothing wears are left out.
+/// Returns triangles of each material that is bound to a visible mesh, distributed over its meshes.
+/// Leaves out materials without such a mesh.
 std::vector<CalibrationHits> find_calibration_hits(const Scene& scene);
 
-/// What policies may know of the scene's materials.
+/// Returns the properties of the scene's materials that policies may use.
 std::vector<MaterialTraits> material_traits(const Scene& scene);
 
-/// Fixed costs: a number for each program and one for each texture read, so that renders that
-/// depend on costs are reproducible. In the proportions measured at 16 lanes (docs/benchmarks.md).
+/// Returns modelled costs: a fixed cost for each program and for each texture lookup, so that
+/// renders that depend on costs are reproducible. The proportions were measured at 16 lanes
+/// (docs/benchmarks.md).
 CostSnapshot model_costs(const Scene& scene);
 
 }  // namespace wavecomb

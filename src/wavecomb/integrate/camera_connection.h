@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The camera as paths from the lights see it: where on the film a point shows, and with which
-/// density the camera's own paths find it.
+/// Connections of light paths to the camera: the film position of a point, and the density with
+/// which camera paths find it.
 ///
-/// With M the linear part of the camera's place, a point at depth s is p = o + s M d', where
-/// d' = (x, y, -1) and o is a point of the lens (of an orthographic camera of its plane). A pixel
-/// takes up A = step_x step_y of the window, and each has one camera path a sample, so that
-/// directions from o have the density |M d'|^3 / (|det M| A) over solid angle, and a surface at p
-/// which is seen under cos has G cos over its area, with
+/// With M the linear part of the camera-to-world transform, a point at depth s is p = o + s M d',
+/// where d' = (x, y, -1) and o is a point on the lens (for an orthographic camera, on its plane). A
+/// pixel covers the area A = step_x step_y of the window and has one camera path per sample.
+/// Directions from o thus have the density |M d'|^3 / (|det M| A) over solid angle, and a surface
+/// at p, viewed at an angle with cosine cos, has the density G cos over its area, with
 ///   G = |M d'| / (|det M| A s^2);   orthographic:   |M d'| / (|det M| A).
-/// The lens is sampled evenly from both ends, and its density cancels. A latlong camera's d' are
-/// unit vectors, of which a step of longitude and latitude holds cos(latitude) A, so
+/// Camera paths and light paths sample the lens uniformly, so its density cancels. For a latlong
+/// camera d' is a unit vector, and a pixel covers the solid angle cos(latitude) A, so
 ///   G = |M d'| / (|det M| A s^2 cos(latitude)).
 #pragma once
 
@@ -17,7 +17,7 @@
 
 namespace wavecomb {
 
-/// The place of a camera, and the way back: rows of the inverse times the determinant.
+/// Camera-to-world transform and the rows of its inverse, multiplied by the determinant.
 template <typename F>
 struct CameraSpace {
   MatrixLanes<F> m;
@@ -33,7 +33,7 @@ struct CameraSpace {
     z = cross(a, b);
     det = dot(c, z);
   }
-  /// A point in the camera's space, of its way from the camera.
+  /// Returns a point in camera space, given its offset from the camera's position in world space.
   Vec3<F> local(const Vec3<F>& from) const {
     const F inverse_det = 1.f / det;
     return {F(dot(x, from) * inverse_det), F(dot(y, from) * inverse_det),
@@ -41,14 +41,14 @@ struct CameraSpace {
   }
 };
 
-/// Distance of a point of the camera's space from the poles' axis.
+/// Returns the distance of a point in camera space from the axis through the poles.
 template <typename F>
 inline F from_axis(const Vec3<F>& q) {
   return sqrt(fma(q.x, q.x, F(q.z * q.z)));
 }
 
-/// G of a point at depth s whose distance from the lens is `stretch` s. `spread`: s, of a latlong
-/// camera its distance from the poles' axis.
+/// Returns G of a point at depth s whose distance from the lens is `stretch` * s. `spread` is s or,
+/// for a latlong camera, the distance of the point from the axis through the poles.
 template <typename F>
 inline F camera_density(const CameraSetup& camera, const F& det, const F& stretch, const F& s,
                         const F& spread) {
@@ -57,8 +57,8 @@ inline F camera_density(const CameraSetup& camera, const F& det, const F& stretc
   return camera.projection == Projection::kOrthographic ? density : F(density / F(s * spread));
 }
 
-/// 1 / G of the point p that the camera has met along the unit direction d; 0 where it is out of
-/// range.
+/// Returns 1 / G of the point p that a camera ray along the unit direction d hits, or 0 if it is
+/// out of range.
 template <typename F>
 inline F inverse_camera_density(const CameraSetup& camera, const F& time, const Vec3<F>& p,
                                 const Vec3<F>& d, const Mask<F>& active) {
@@ -76,24 +76,24 @@ inline F inverse_camera_density(const CameraSetup& camera, const F& time, const 
   return select(is_finite(inverse) & (s > 0.f) & (stretch > 0.f), inverse, F(0.f));
 }
 
-/// What PathState::ratio is at p, which a camera ray along d has met: N / G. `share`: 1 / N.
+/// Returns PathState::ratio at p, the hit of a camera ray along d: N / G. `share` is 1 / N.
 template <typename F>
 inline F first_ratio(const CameraSetup& camera, float share, const Vec3<F>& p, const Vec3<F>& d,
                      const F& time, const Mask<F>& active) {
   return inverse_camera_density<F>(camera, time, p, d, active) * (1.f / share);
 }
 
-/// A point as a point of the lens sees it.
+/// Connection of a point to the lens of the camera.
 template <typename F>
 struct CameraConnection {
-  Vec3<F> to;  ///< where the camera's ray to the point begins: on the lens, or beyond what it clips
-  F x, y;      ///< on the film, pixels from the upper left corner
+  Vec3<F> to;  ///< start of the camera ray to the point: on the lens, or on the near clipping plane
+  F x, y;      ///< film position in pixels from the upper left corner
   F density;   ///< G
   Mask<F> valid;
 };
 
-/// `u`, `v` choose the point of the lens. Where a latlong picture shows a point more than once,
-/// this is one of the places (SplatFilter has the others).
+/// Connects p to the camera. `u` and `v` in [0, 1) sample the point on the lens. If a latlong image
+/// shows a point several times, this returns one position, and SplatFilter adds the others.
 template <typename F>
 inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
                                              const F& u, const F& v, const F& time,
@@ -112,7 +112,8 @@ inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Ve
     lens = aperture_point<F>(camera, u, v);
     focus = 1.f / camera.focus_distance;
   }
-  // d' and o; what the window shows is d' + lens / focus_distance, or of o less the lens's share.
+  // d' and o. The window position is d' + lens / focus_distance or, for an orthographic camera, o
+  // minus the offset by the lens.
   detail::LocalRay<F> ray;
   F wx, wy, spread = s;
   if (is_all_round) [[unlikely]] {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Camera rays, and the pixel filter by importance sampling.
+/// Camera rays, and importance sampling of the pixel filter.
 #pragma once
 
 #include <array>
@@ -15,36 +15,39 @@
 
 namespace wavecomb {
 
-/// Width of a camera ray's cone in pixels. A pixel is the mean of many samples, each of which need
-/// not blur as much as the pixel does; Igehy's full pixel shows, beside renderers without cones.
+/// Width of a camera ray's cone in pixels. A pixel averages many samples, so that a sample may blur
+/// less than a whole pixel; the full pixel of Igehy's ray differentials looks blurred next to
+/// renderers without cones.
 inline constexpr float kConeShare = 0.25f;
 
-/// A camera with its window fitted to a picture of width x height pixels, overscan included. The
-/// lens of a latlong camera has no radius.
+/// Camera with its window fitted to an image of width x height pixels, including overscan. A
+/// latlong camera has no lens radius.
 struct CameraSetup : Camera {
-  std::vector<MatrixStep> places;  ///< over the shutter, where it moves
+  std::vector<MatrixStep> places;  ///< transforms over the shutter interval, if the camera moves
   Vec3<float> backward;            ///< unit vector along the camera's z axis
-  float x0, y1;                    ///< the window's upper left corner
+  float x0, y1;                    ///< upper left corner of the window
   float step_x, step_y;            ///< window size of a pixel
   const float* filter;             ///< FilterTable::offsets()
-  bool has_far;                    ///< something is cut off far away
-  LensTable distortion;            ///< empty where there is none
-  /// When a rolling shutter exposes pixel (x, y): a + b (x + 1/2) + c (y + 1/2) + duration t.
+  bool has_far;                    ///< whether a far plane or a clipping plane limits rays
+  LensTable distortion;            ///< empty without lens distortion
+  /// Time at which a rolling shutter exposes pixel (x, y):
+  ///   a + b (x + 1/2) + c (y + 1/2) + duration t.
   std::array<float, 3> rolling{};
 
-  /// `overscan`: pixels of each edge that lie beyond the window. Throws Error for what the camera
-  /// cannot show.
+  /// `overscan` is the number of pixels beyond the window at each edge. Throws Error if the camera
+  /// does not support it.
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table,
               uint32_t overscan = 0);
   bool moves() const { return !places.empty(); }
-  /// Whether all rays are narrow about one direction and meet in one point.
+  /// Returns whether all rays start in one point and stay close to one direction.
   bool is_pinhole() const {
     return projection == Projection::kPerspective && lens_radius == 0 && clip_planes.empty() &&
            !moves();
   }
 };
 
-/// When a path of pixel (x, y) sees the scene, of whose shutter `time` is the path's.
+/// Returns the shutter time at which a path of pixel (x, y) sees the scene, given the sampled
+/// `time` of the path in [0, 1).
 template <typename F>
 inline F camera_time(const CameraSetup& camera, const F& x, const F& y, const F& time) {
   if (camera.rolling_shutter == RollingShutter::kOff) return time;
@@ -53,7 +56,7 @@ inline F camera_time(const CameraSetup& camera, const F& x, const F& y, const F&
   return clamp(F(fma(time, F(camera.rolling_duration), begin)), F(0.f), F(0x1.fffffep-1f));
 }
 
-/// Where the camera is at a time of the shutter.
+/// Returns the camera-to-world transform at a shutter time.
 template <typename F>
 inline MatrixLanes<F> camera_place(const CameraSetup& camera, const F& time,
                                    const Mask<F>& active) {
@@ -65,8 +68,8 @@ inline MatrixLanes<F> camera_place(const CameraSetup& camera, const F& time,
       .matrix();
 }
 
-/// Distance of a point along the camera's axis, at a time of the shutter; from a latlong camera,
-/// which has no axis, the distance itself.
+/// Returns the depth of a point along the camera's axis at a shutter time or, for a latlong camera,
+/// its distance.
 template <typename F>
 inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                       const Mask<F>& active) {
@@ -78,7 +81,7 @@ inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time
   return -dot(Vec3<F>(p - m.t), normalize(Vec3<F>(m.row[0].z, m.row[1].z, m.row[2].z)));
 }
 
-/// Distance of a point from the camera's place, at a time of the shutter.
+/// Returns the distance of a point from the camera's position at a shutter time.
 template <typename F>
 inline F camera_distance(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                          const Mask<F>& active) {
@@ -88,11 +91,11 @@ inline F camera_distance(const CameraSetup& camera, const Vec3<F>& p, const F& t
 template <typename F>
 struct CameraRay {
   Vec3<F> o, d;
-  F width, spread;  ///< of the ray cone: at the origin, and its angle
+  F width, spread;  ///< ray cone: width at the origin in scene units, and angle in radians
   F tfar;           ///< distance to the far plane
 };
 
-/// Inverse CDF of the pixel filter at u, in pixels from the pixel's centre.
+/// Returns the inverse CDF of the pixel filter at u, in pixels from the pixel's centre.
 template <typename F>
 inline F filter_offset(const float* table, const F& u, const Mask<F>& active) {
   const F x = u * static_cast<float>(FilterTable::kBins);
@@ -102,7 +105,7 @@ inline F filter_offset(const float* table, const F& u, const Mask<F>& active) {
   return fma(F(b - a), F(x - F(bin)), a);
 }
 
-/// Squared distance of the sample from the pixel's centre, in pixels.
+/// Returns the squared distance of the sample from the pixel's centre, in pixels.
 template <typename F>
 inline F centre_distance2(const CameraSetup& camera, const Sample4<F>& r, const Mask<F>& active) {
   const F dx = filter_offset<F>(camera.filter, r.x, active);
@@ -112,14 +115,14 @@ inline F centre_distance2(const CameraSetup& camera, const Sample4<F>& r, const 
 
 namespace detail {
 
-/// A ray in the camera's space: points o + s d, from s = near to far.
+/// Ray in camera space: points o + s d for s from near to far.
 template <typename F>
 struct LocalRay {
   Vec3<F> o, d;
 };
 
-/// The ray through (x, y) of the window, from (u, v) of the lens; d.z = -1, or the length of d is 1
-/// for a latlong camera.
+/// Returns the ray through (x, y) of the window from the point of the lens at (u, v). Its d.z is
+/// -1; for a latlong camera, d has length 1.
 template <typename F>
 inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, const F& u,
                              const F& v) {
@@ -136,7 +139,7 @@ inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, 
   if (camera.lens_radius > 0) {
     const Vec2<F> lens = aperture_point<F>(camera, u, v);
     const Vec3<F> p{lens.x, lens.y, F(0.f)};
-    // Through the point in focus: d * focus_distance, seen from the lens, scaled back to z = -1.
+    // Towards the point in focus, d * focus_distance, from the lens, scaled back to z = -1.
     d = {fma(p.x, F(-1.f / camera.focus_distance), d.x),
          fma(p.y, F(-1.f / camera.focus_distance), d.y), F(-1.f)};
     o = is_parallel ? Vec3<F>{o.x + p.x, o.y + p.y, F(0.f)} : p;
@@ -144,8 +147,8 @@ inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, 
   return {o, d};
 }
 
-/// The part of a ray, from `near` to `far`, that no clipping plane cuts off; far = near where
-/// nothing is left.
+/// Reduces [near, far] to the part of the ray that no clipping plane cuts off; far = near if
+/// nothing remains.
 template <typename F>
 inline void clip(const CameraSetup& camera, const LocalRay<F>& ray, F& near, F& far) {
   for (const auto& [a, b, c, d] : camera.clip_planes) {
@@ -160,8 +163,8 @@ inline void clip(const CameraSetup& camera, const LocalRay<F>& ray, F& near, F& 
 
 }  // namespace detail
 
-/// The ray through a point of the picture, in pixels, y down from the top; `u`, `v` choose a point
-/// of the lens. `time`: of the shutter.
+/// Returns the ray through the image position (fx, fy) in pixels, with y down from the top. `u` and
+/// `v` sample the lens; `time` is the shutter time.
 template <typename F>
 inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F& fy, const F& u,
                                 const F& v, const F& time, const Mask<F>& active) {
@@ -189,7 +192,8 @@ inline CameraRay<F> ray_through(const CameraSetup& camera, const F& fx, const F&
   return ray;
 }
 
-/// The ray of pixel (x, y), y down from the top, for the numbers of the camera's set and a time.
+/// Returns the ray of pixel (x, y), with y down from the top, for the sample values `r` and a
+/// shutter time.
 template <typename F>
 inline CameraRay<F> camera_ray(const CameraSetup& camera, const F& x, const F& y,
                                const Sample4<F>& r, const Mask<F>& active, const F& time = F(0.f)) {

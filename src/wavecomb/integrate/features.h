@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What kernels of a vertex are compiled with or without (kernel_matrix.h): with everything, or
-/// plain, for scenes and settings that ask for nothing of it.
+/// Features that vertex kernels are compiled with (kernel_matrix.h): all of them, or, for plain
+/// kernels, only those that simple scenes need.
 #pragma once
 
 #include <cstdint>
@@ -8,15 +8,15 @@
 namespace wavecomb {
 
 enum Feature : uint32_t {
-  kMotion = 1,        ///< meshes or instances that move
+  kMotion = 1,        ///< moving meshes or instances
   kCurves = 2,        ///< curves and points
-  kLinks = 4,         ///< lights that are linked
-  kMeshLights = 8,    ///< mesh lights, and lights that bounces do not find
-  kNotes = 16,        ///< AOVs of vertices, histories of paths
+  kLinks = 4,         ///< light linking
+  kMeshLights = 8,    ///< mesh lights, and lights that only light sampling finds
+  kNotes = 16,        ///< AOVs of vertices, path histories
   kExperiments = 32,  ///< cosine sampling, Schlick's approximation
-  kBelow = 128,       ///< light that walks below surfaces
-  kInside = 256,      ///< paths that know what they are inside of
-  kJoined = 64,       ///< paths from the lights, which share in the weights of the camera's
+  kBelow = 128,       ///< subsurface scattering
+  kInside = 256,      ///< nested dielectrics
+  kJoined = 64,       ///< MIS between camera paths and light paths
 };
 inline constexpr uint32_t kPlain = kNotes, kEverything = 511;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What estimates the picture. A render owns one integrator; workers ask it for one wave after the
-/// other.
+/// Interface of integrators. A render owns one integrator, and each worker calls it for one task
+/// after the other.
 #pragma once
 
 #include <cstddef>
@@ -20,25 +20,28 @@ struct WaveTask {
   uint32_t pixel_count;
   uint32_t first_sample;
   uint32_t samples;
-  /// Paths start at lights: that of a pixel is one of as many, and says nothing of the pixel.
+  /// Whether to trace light paths. A pixel then only numbers a light path, which may contribute to
+  /// any pixel.
   bool from_lights = false;
   uint32_t path_count() const { return pixel_count * samples; }
 };
 
-/// What a worker has counted and learnt; null where it has nothing of the kind. Read while the
-/// worker stands still, but for `counts`, which its own thread may read at any time.
+/// Statistics and training data of a worker; null if the integrator has none. Read them only while
+/// the worker is idle, except `counts`, which its own thread may read at any time.
 struct WorkerView {
   const PhaseClock* clock = nullptr;
   const Counts* counts = nullptr;
   const CoherenceCounts* coherence = nullptr;
-  const Chooser* policies = nullptr;  ///< which policy it used how often
+  const Chooser* policies = nullptr;  ///< how often it used each policy
   CostTracker* costs = nullptr;
-  size_t bytes = 0;  ///< of its buffers
+  size_t bytes = 0;  ///< size of its buffers
 };
 
-/// Contract: begin_pass, end_pass: one thread, while no wave runs. run: one thread a worker at a
-/// time, workers side by side; writes the task's own pixels of the film, and adds a pixel's samples
-/// in the order of their numbers.
+/// Estimates the image by tracing the tasks that workers submit.
+///
+/// Contract: one thread calls begin_pass() and end_pass() while no wave runs. Workers call run()
+/// concurrently, each from one thread at a time. run() writes only the film pixels of its task, and
+/// adds the samples of a pixel in sample order. Light paths may contribute to any pixel.
 class Integrator {
  public:
   virtual ~Integrator() = default;
@@ -48,9 +51,9 @@ class Integrator {
   virtual void run(size_t worker, const WaveTask& task) = 0;
   virtual void end_pass() {}
 
-  /// Of worker `i`; all null before its first task.
+  /// Returns the statistics of worker `i`, all null before its first task.
   virtual WorkerView worker(size_t i) const = 0;
-  /// Lanes that it computes in.
+  /// Returns the number of SIMD lanes of the kernels.
   virtual uint32_t lanes() const = 0;
 };
 

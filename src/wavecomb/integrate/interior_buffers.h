@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Room for rays that pass from one medium inside of meshes to the next (medium/interiors.h).
+/// Buffers for rays that pass through several nested dielectrics (medium/interiors.h).
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,10 @@
 
 namespace wavecomb {
 
-/// Empty where a scene has nothing of the kind.
+/// Buffers of a worker; empty if the scene has no nested dielectrics.
 struct InteriorBuffers {
-  static constexpr size_t kWords = 32;    ///< of rows, for each ray
-  static constexpr size_t kColumns = 16;  ///< of the rays that are traced at a time
+  static constexpr size_t kWords = 32;    ///< 32-bit words per ray
+  static constexpr size_t kColumns = 16;  ///< 32-bit words per traced ray
 
   explicit InteriorBuffers(size_t capacity)
       : rows(capacity ? SoaBlock(1, capacity * kWords) : SoaBlock()),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The kernels of vertices that are compiled: which, in which lane widths, and what each gains.
-/// CMake reads the rows of this table, too.
+/// Table of the compiled vertex kernels, with their lane widths and gains. CMake also reads its
+/// rows.
 #pragma once
 
 #include <cstdint>
@@ -10,30 +10,32 @@
 
 namespace wavecomb {
 
-/// Rows X(kind, set, widths, reduced, gain). There is a compile unit for each member of the set and
-/// each width, made of integrate/<kind>.lanes.cpp.in; sanitized builds compile those of a program
-/// and a width together.
+/// Rows X(kind, set, widths, reduced, gain). Each member of the set has one compile unit for each
+/// width, generated from integrate/<kind>.lanes.cpp.in. Sanitized builds compile the units of a
+/// program and a width together.
 ///
-/// set: `programs` (WAVECOMB_PROGRAMS) or `variants` (all of kVariants that are of surfaces).
-/// widths: `every` width of the build and scalar lanes, `ends` (scalar and the widest lanes),
-/// `widest` (packets only), `scalar`.
-/// reduced: widths in builds with WAVECOMB_REDUCED_KERNELS, which sanitized builds are. `none`:
-/// they run `program` kernels in place of these. `first`: every width for the first program, scalar
-/// lanes for the others, whose scalar kernels also shade waves of packets. Such builds send waves
-/// through volumes in scalar lanes. gain: what scenes gain over the kernel that would
-/// run in place of these; `-` and the reason where there is no such kernel.
+/// `set` is `programs` (WAVECOMB_PROGRAMS) or `variants` (the members of kVariants for surfaces).
+/// `widths` is `every` (all widths of the build, and scalar lanes), `ends` (scalar and the widest
+/// lanes), `widest` (packets only) or `scalar`.
 ///
-/// The kernels of the table agree bit for bit: each knows of fewer features (features.h) or parts
-/// of a material than another one, and the scene or the material has none of those.
+/// `reduced` lists the widths in builds with WAVECOMB_REDUCED_KERNELS, such as sanitized builds.
+/// With `none`, such builds run `program` kernels instead. With `first`, the first program has
+/// kernels of every width and the others only scalar kernels, which also shade waves of packets.
+/// Such builds trace waves through volumes in scalar lanes. `gain` states the measured benefit over
+/// the kernel that would otherwise run, or `-` and a reason if there is no such kernel.
 ///
-/// Dropped, since one general kernel does: kernels for camera paths that are joined by light paths
-/// (`program` has them under a flag), and plain kernels and variants for paths from lights.
+/// All kernels give bit-identical results: a kernel that lacks a feature (features.h) or a part of
+/// a material runs only where the scene or the material does not use it.
+///
+/// The table has no separate kernels for camera paths that are combined with light paths (`program`
+/// handles them by a flag), and no plain kernels or variants for light paths, since one general
+/// kernel is enough.
 #define WAVECOMB_KERNELS(X)                                                                       \
   X(program, programs, every, first, "-: general, and those of the reference integrator")         \
   X(light, programs, ends, scalar, "-: paths from lights, and those of the reference integrator") \
   X(plain, variants, widest, none, "time of a record: 0.73 (openpbr) to 0.96 (diffuse)")
 
-/// Whether kernels of a kind are built in `lanes` lanes.
+/// Returns whether kernels of a kind are built in `lanes` lanes.
 constexpr bool has_kernels(std::string_view kind, size_t lanes) {
   constexpr size_t kMost = WAVECOMB_MAX_LANES;
   const auto is_of = [&](std::string_view widths) {
@@ -49,19 +51,19 @@ constexpr bool has_kernels(std::string_view kind, size_t lanes) {
   return false;
 }
 
-/// Whether the general kernels of program `program` are built in `lanes` lanes.
+/// Returns whether the general kernels of program `program` are built in `lanes` lanes.
 constexpr bool has_program_kernels(size_t program, size_t lanes) {
   return !WAVECOMB_REDUCED_KERNELS || lanes == 1 || program == 0;
 }
 
-/// Whether waves of packets go through volumes in packets.
+/// Whether waves of packets trace volumes in packets.
 inline constexpr bool kHasVolumePackets = !WAVECOMB_REDUCED_KERNELS;
 
-/// Whether there are plain kernels and least variants for packets of F.
+/// Whether plain kernels and reduced variants exist for packets of F.
 template <typename F>
 inline constexpr bool kHasPlain = has_kernels("plain", kWidth<F>);
 
-/// Lanes of the kernels of paths from lights, whatever those of the wave are.
+/// Lanes of the kernels for light paths, for any lane width of the wave.
 using LightLanes =
     Lanes<has_kernels("light", WAVECOMB_MAX_LANES) ? size_t{WAVECOMB_MAX_LANES} : size_t{1}>;
 

@@ -9,13 +9,13 @@
 namespace wavecomb {
 namespace {
 
-/// Nodes along an edge: of a picture of 4,096 pixels one in sixteen, where the error of a strong
-/// lens (k1 = 0.3) is a hundredth of a pixel.
+/// Number of nodes along an edge. In an image of 4,096 pixels they are sixteen pixels apart, and
+/// the error of a strong lens (k1 = 0.3) is a hundredth of a pixel.
 constexpr uint32_t kLensNodes = 257;
 
 using WindowPoint = std::array<double, 2>;
 
-/// Brown's model; y is down.
+/// Evaluates Brown's model, with y down.
 WindowPoint brown(const Camera& c, const WindowPoint& p) {
   const auto [x, y] = p;
   const double xx = x * x, yy = y * y, xy = x * y, r2 = xx + yy;
@@ -25,8 +25,8 @@ WindowPoint brown(const Camera& c, const WindowPoint& p) {
           y * radial + p1 * (r2 + 2 * yy) + 2 * p2 * xy};
 }
 
-/// What Brown's model leads to `to`, by Newton's method from `p`; false where there is nothing
-/// before the picture folds over.
+/// Inverts Brown's model at `to` by Newton's method, starting at `p`. Returns false if there is no
+/// solution before the image folds over.
 bool invert_brown(const Camera& c, const WindowPoint& to, WindowPoint& p) {
   constexpr double kStep = 1e-6, kGood = 1e-9;
   for (int i = 0; i < 50; ++i) {
@@ -44,8 +44,8 @@ bool invert_brown(const Camera& c, const WindowPoint& to, WindowPoint& p) {
   return false;
 }
 
-/// Solves from the middle of the picture outwards along each ray, so that the branch is the one
-/// that is 0 there.
+/// Inverts Brown's model from the centre of the image outwards along a line, so that the solution
+/// is on the branch that contains the centre.
 bool solve_outwards(const Camera& c, const WindowPoint& to, WindowPoint& p) {
   constexpr int kSteps = 8;
   p = {0, 0};

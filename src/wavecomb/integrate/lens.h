@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a lens does to a picture beside blurring it: distortion, and the shape of its aperture.
+/// Lens distortion, and the shape of the aperture.
 ///
-/// Distortion moves pixels about the picture. It is a table over the picture: where a ray through a
-/// place of the picture would go through it without distortion. Brown's model (D. C. Brown,
-/// "Close-Range Camera Calibration", Photogrammetric Engineering 37(8), 1971, as OpenCV writes it)
-/// says where a point (x, y) of the plane at distance 1 shows: with r^2 = x^2 + y^2, y down,
+/// Distortion moves points within the image. It is a table over the image, which holds the position
+/// at which the ray through an image point would cross the undistorted image. Brown's model (D. C.
+/// Brown, "Close-Range Camera Calibration", Photogrammetric Engineering 37(8), 1971, in OpenCV's
+/// notation) maps a point (x, y) of the plane at distance 1 to its image. With r^2 = x^2 + y^2 and
+/// y down,
 ///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
 ///   y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
-/// and the table holds its inverse.
+/// and the table holds the inverse.
 #pragma once
 
 #include <array>
@@ -20,24 +21,26 @@
 
 namespace wavecomb {
 
-/// Where the pixels of a picture lie in the camera's window: its upper left corner, and steps.
+/// Mapping from pixels to the camera's window: upper left corner and steps per pixel.
 struct PixelGrid {
   float x0, y1, step_x, step_y;
 };
 
-/// Nodes side by side over a picture, and below each other; between them values are bilinear.
+/// Table of undistorted positions, with the same number of nodes along both axes and bilinear
+/// interpolation between them.
 struct LensTable {
-  uint32_t across = 0;         ///< along each edge of the picture; 0: nothing is distorted
-  float per_x = 0, per_y = 0;  ///< cells a pixel
-  std::vector<float> nodes;    ///< of each (x, y), pixels of the undistorted picture, row by row
+  uint32_t across = 0;         ///< nodes along each edge of the image; 0 without distortion
+  float per_x = 0, per_y = 0;  ///< cells per pixel
+  /// (x, y) of each node, in pixels of the undistorted image, row by row.
+  std::vector<float> nodes;
 
   LensTable() = default;
-  /// Of a camera that distorts. Throws Error where no ray leads to some place of the picture.
+  /// Builds the table of a camera with distortion. Throws Error if some image point has no ray.
   LensTable(const Camera& camera, const PixelGrid& grid, uint32_t width, uint32_t height);
   bool empty() const { return across == 0; }
 };
 
-/// Where (x, y), in pixels from the upper left corner, is in the undistorted picture.
+/// Returns the undistorted position of (x, y), both in pixels from the upper left corner.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Vec2<F> undistorted(const LensTable& table, const F& x, const F& y,
                                                  const Mask<F>& active) {
@@ -59,8 +62,8 @@ template <typename F>
   return {mixed(0), mixed(1)};
 }
 
-/// A point of the regular polygon in the unit circle that has `blades` corners, one of them at
-/// `turn` of a full turn; even over its area.
+/// Samples the regular polygon with `blades` corners in the unit circle uniformly by area. One
+/// corner is at `turn` of a full turn.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Vec2<F> square_to_polygon(const F& u, const F& v, float blades,
                                                        float turn) {
@@ -74,7 +77,7 @@ template <typename F>
   return {fma(side, F(q.cos - p.cos), F(far * p.cos)), fma(side, F(q.sin - p.sin), F(far * p.sin))};
 }
 
-/// A point of the camera's aperture, scene units; even over its area.
+/// Samples the camera's aperture uniformly by area, in scene units.
 template <typename F>
 inline Vec2<F> aperture_point(const Camera& camera, const F& u, const F& v) {
   Vec2<F> p;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How a path from a light begins. A pass has as many of them as the picture has pixels, each
-/// numbered as a pixel: what is drawn depends on the number and the sample, and on no schedule.
+/// Start of light paths. Light paths are numbered like the pixels of the image, and a pass traces
+/// the same number of samples of each. Random numbers depend only on the path's number and the
+/// sample, not on the schedule.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -13,8 +14,8 @@
 
 namespace wavecomb {
 
-/// A path at its start. `eta_scale` is one over its largest flux, so that roulette, which
-/// multiplies the two, sees what share is left.
+/// Start of a light path. `eta_scale` is one over its largest flux, so that roulette, which
+/// multiplies the two, sees the remaining fraction of the flux.
 template <typename F>
 struct LightPath {
   SampleKey<F> key;
@@ -24,14 +25,15 @@ struct LightPath {
   F eta_scale;
 };
 
-/// The number of the path of a pixel of the whole picture, x | y << 16.
+/// Returns the number of the light path of a pixel (x | y << 16) of the whole image.
 template <typename U>
 inline U light_path_number(const Settings& settings, const U& pixel) {
   return (pixel >> 16) * settings.width + (pixel & 0xffffu);
 }
 
-/// Points of one sequence for all paths of a sample, so that they are spread over the lights and
-/// their directions together: by the number's low bits, as many as sequences have.
+/// Returns the sampler key of a light path. All light paths of a sample are points of one sequence,
+/// so that together they are well distributed over lights and directions. The low bits of the
+/// path's number are the index in the sequence.
 template <typename F>
 inline SampleKey<F> light_path_key(const Settings& settings, const UInt<F>& pixel,
                                    const UInt<F>& sample) {
@@ -61,23 +63,23 @@ inline LightPath<F> begin_light_path(const LightView& lights, const Settings& se
   return path;
 }
 
-/// What vertices of paths from lights are told of the picture.
+/// Parameters of the render that vertices of light paths need.
 struct LightPathSetup {
   const CameraSetup& camera;
   const SplatFilter& filter;
-  float share;           ///< 1 / N, N as many paths as the picture has pixels
-  float camera_squares;  ///< as WaveContext says
-  const Merger* merger;  ///< null where vertices are not merged
+  float share;           ///< 1 / N, where N is the number of light paths in the image per sample
+  float camera_squares;  ///< WaveContext::camera_squares
+  const Merger* merger;  ///< null without merging
 };
 
-/// Of a WaveContext.
+/// Returns the setup of a WaveContext.
 template <typename Context>
 inline LightPathSetup light_path_setup(const Context& context, const Merger* merger = nullptr) {
   return {*context.camera, *context.splat_filter, context.light_path_share(),
           context.camera_squares, context.lessons ? nullptr : merger};
 }
 
-/// What camera paths are shaded with, beside which paths from lights may be.
+/// Returns the settings for shading camera paths in a render that may have light paths.
 template <typename Context>
 inline ShadeSettings camera_shade_settings(const Context& context) {
   ShadeSettings s(*context.settings);
@@ -89,8 +91,8 @@ inline ShadeSettings camera_shade_settings(const Context& context) {
   return s;
 }
 
-/// The time of the path of a pixel and sample: that of the camera's path, where it is connected to
-/// that.
+/// Returns the shutter time of the light path of a pixel and sample. With connections it is the
+/// time of the camera path.
 template <typename F>
 inline F light_path_time(const Settings& settings, const SampleKey<F>& key, const UInt<F>& pixel,
                          const UInt<F>& sample) {
@@ -98,8 +100,8 @@ inline F light_path_time(const Settings& settings, const SampleKey<F>& key, cons
                       settings.connects() ? make_sample_key<F>(pixel, sample, settings.seed) : key);
 }
 
-/// What a path from a light carries to the end of its ray of length t. Textures are seen as the
-/// camera sees them: the cone is that of a ray from there.
+/// Returns the state of a light path at the end of its ray of length `t`. The ray cone is that of a
+/// camera ray to the hit, so that textures are filtered as the camera sees them.
 template <typename F>
 inline PathState<F> light_path_state(const CameraSetup& camera, const Vec3<F>& d,
                                      const Color<F>& flux, const F& weight, const F& eta_scale,
@@ -113,21 +115,21 @@ inline PathState<F> light_path_state(const CameraSetup& camera, const Vec3<F>& d
   return state;
 }
 
-/// Of the members of `v`, `direct` is what the pixels get, `next.pdf` is S and `next.ratio` p<- of
-/// the bounce.
+/// Result of shading a vertex of a light path. `v.direct` is the contribution to the pixels,
+/// `v.next.pdf` is S (light_vertex.h) and `v.next.ratio` is the density p<- of the bounce.
 template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;
-  F x, y;           ///< on the film, where a shadow ray is wanted
-  Vec3<F> p;        ///< where the vertex is
-  Mask<F> offered;  ///< vertices of camera paths may connect to it
+  F x, y;           ///< film position in pixels, if there is a shadow ray
+  Vec3<F> p;        ///< position of the vertex
+  Mask<F> offered;  ///< whether vertices of camera paths may connect to it
 };
 
-/// The vertices of camera paths that vertices from lights are shown to, in place of the camera.
+/// Vertices of camera paths to connect vertices of light paths to, instead of the camera.
 template <typename F>
 struct ConnectionTarget {
   ConnectionRow<F> row;
-  Mask<F> is_first;  ///< the vertex from the light is its path's first
+  Mask<F> is_first;  ///< whether the light path's vertex is the first of its path
 };
 
 }  // namespace wavecomb

@@ -6,9 +6,9 @@
 namespace wavecomb {
 namespace {
 
-/// What expressions get of a splat.
+/// Parts of a light splat, by light path expression.
 struct SplatParts {
-  uint32_t found = 0;  ///< a bit for each that gets any
+  uint32_t found = 0;  ///< bit mask of the expressions with a part
   std::array<Color<float>, PathAutomaton::kMostExpressions> light{};
 
   void add(uint32_t matched, uint32_t colour, float value) {
@@ -21,7 +21,8 @@ struct SplatParts {
   }
 };
 
-/// A path that ends at the camera, before which nothing scatters, in the states of `row`.
+/// Splits a light splat by expression. The light path, in the states of `row`, ends at the camera
+/// without further scattering.
 SplatParts split_splat(const BackwardAutomaton& automaton, const LightWayRow<float>& row,
                        const Color<float>& c) {
   SplatParts parts;

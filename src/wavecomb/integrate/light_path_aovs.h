@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What paths from the lights bring AOVs, and what they keep for it: the light that has sent them,
-/// which their rows have, how often they were scattered, and, for light path expressions, a state
-/// of BackwardAutomaton for each colour.
+/// AOV values of light paths, and the state that they need: the light that emitted the path (in its
+/// PathRow), the number of scatterings and, for light path expressions, a state of
+/// BackwardAutomaton for each colour.
 ///
-/// Lobes are told apart as camera paths do (path_expressions.h): a bounce goes on as diffuse with
-/// the probability of that share, each colour by one number of the vertex; what a vertex shows to
-/// who looks is split by the share itself. A connection is split at both of its vertices.
+/// Lobes are classified as on camera paths (path_expressions.h). A bounce continues as diffuse with
+/// a probability equal to the diffuse fraction; all colours use the same random number of the
+/// vertex. A contribution to the camera is split by the fraction itself. A connection is split at
+/// both vertices.
 ///
-///   begin   a path starts at a light
-///   shade   a vertex was shaded
-///   keep    it is the one of its path that camera paths connect to
-///   show    the camera sees it: the light goes to the film's sums
-///   offer, link, connect   a vertex of a camera path, one from the light, and the ray between
+///   begin     a path starts at a light
+///   shade     a vertex was shaded
+///   keep      camera paths connect to this vertex
+///   show      the camera sees the vertex: the contribution is added to the film
+///   offer     a vertex of a camera path offers a connection
+///   link      the vertex of the light path was shaded for the connection
+///   connect   the ray between the two is free
 #pragma once
 
 #include <bit>
@@ -28,18 +31,19 @@
 
 namespace wavecomb {
 
-/// How a path from a light has come.
+/// State of a light path for light path expressions.
 template <typename F>
 struct LightWayRow {
-  UInt<F> states;  ///< of the three colours, as ExpressionRow has them
-  // Of the vertex that was shaded: the states before it, and how it scatters towards who looks.
+  UInt<F> states;  ///< of the three colours, in the layout of ExpressionRow
+  // Vertex that was shaded last: the states before it, and its scattering towards the camera.
   UInt<F> shown_states, shown_event;
   Color<F> shown_diffuse;
   WAVECOMB_FIELDS(states, shown_states, shown_event, shown_diffuse)
 };
 
-/// Of a vertex from the light that is kept: the states before it, and how it scatters towards the
-/// vertex of the camera path; and of that its state before, and how it scatters.
+/// Connection of a stored vertex of a light path with a vertex of a camera path. Both have the
+/// states before the vertex and the classification of its scattering along the connection; fields
+/// of the camera path start with `seen`.
 template <typename F>
 struct LinkRow {
   UInt<F> states, event;
@@ -49,11 +53,13 @@ struct LinkRow {
   WAVECOMB_FIELDS(states, event, diffuse, seen_states, seen_event, seen_diffuse)
 };
 
-/// Contract: owned by one wave, or one reference integrator; slots below the capacity.
+/// AOV values of the light paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
 class LightPathAovs {
  public:
   LightPathAovs() = default;
-  /// `tables` may be null where nothing of `layout` needs them.
+  /// `tables` may be null if nothing in `layout` needs them.
   LightPathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables, bool connects)
       : places_(layout), tables_(tables) {
     if (layout.expressions == 0) return;
@@ -62,13 +68,13 @@ class LightPathAovs {
     if (connects) links_ = SlotRows(capacity, kRowWords<LinkRow>);
   }
 
-  /// Whether what they bring is wanted by layer.
+  /// Returns whether any AOV layer needs contributions of light paths.
   explicit operator bool() const { return places_.count > 0; }
-  /// Whether it is to be known how vertices scatter.
+  /// Returns whether vertices must classify their scatterings.
   bool wants_events() const { return backward_ != nullptr; }
   size_t bytes() const { return ways_.bytes() + links_.bytes(); }
 
-  /// Paths have left lights `light`.
+  /// Starts paths at lights `light`.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void begin(const UInt<F>& slot, const UInt<F>& light,
                                           const Mask<F>& active) const {
@@ -81,7 +87,7 @@ class LightPathAovs {
     store_row<LightWayRow, F>(ways_.rows, slot, {states, states, U(0u), Color<F>(F(0.f))}, active);
   }
 
-  /// A vertex was shaded: `v` says how it scatters.
+  /// Records a shaded vertex, whose scatterings `v` classifies.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void shade(uint32_t depth, const UInt<F>& slot,
                                           const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -95,14 +101,15 @@ class LightPathAovs {
                               active);
   }
 
-  /// The vertex that was shaded is the one to connect to.
+  /// Marks the vertex that was shaded last as the one to connect to.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void keep(const UInt<F>& slot, const Mask<F>& active) const {
     const UInt<F> states = load_row<LightWayRow, F>(ways_.rows, slot, active).shown_states;
     scatter_field<F>(links_.rows, &LinkRow<float>::states, slot, states, active);
   }
 
-  /// Vertices of camera paths, which were in `states` before, offer a connection.
+  /// Records the vertices of camera paths that offer a connection. `states` are their states before
+  /// the vertex.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void offer(const UInt<F>& slot, const UInt<F>& states,
                                           const ScatteringNote<F>& note,
@@ -114,7 +121,7 @@ class LightPathAovs {
     store_row<LinkRow, F>(links_.rows, slot, row, active);
   }
 
-  /// The vertices that were kept were shaded for it.
+  /// Records the scattering at the stored vertices of light paths, shaded for the connection.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void link(const UInt<F>& slot, const ScatteringNote<F>& note,
                                          const Mask<F>& active) const {
@@ -124,7 +131,7 @@ class LightPathAovs {
     store_row<LinkRow, F>(links_.rows, slot, row, active);
   }
 
-  /// The connection has brought the camera paths `c`.
+  /// Adds the contribution `c` of connections to the expressions of camera paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void connect(const PathExpressions& to, const UInt<F>& slot,
                                             const Color<F>& c, const Mask<F>& active) const {
@@ -152,15 +159,16 @@ class LightPathAovs {
     });
   }
 
-  /// The vertex at `depth` of the path in `slot`, which light `light` has sent, shows the camera
-  /// `c` at (x, y) of the film. Integers: the order does not matter.
+  /// Adds the contribution `c` of the vertex at `depth` of the path in `slot`, which started at
+  /// `light`, at position (x, y) of the film. The sums are integers, so that the order does not
+  /// matter.
   void show(Film& film, const SplatFilter& filter, uint32_t slot, uint32_t depth, uint32_t light,
             float x, float y, const Color<float>& c) const;
 
  private:
   SplatPlaces places_;
   const AovTables* tables_ = nullptr;
-  const BackwardAutomaton* backward_ = nullptr;  ///< null: there are no expressions
+  const BackwardAutomaton* backward_ = nullptr;  ///< null without expressions
   SlotRows ways_, links_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Paths from lights by the reference integrator: one after the other, in scalars.
+/// Light paths of the reference integrator, traced one after the other in scalar code.
 #pragma once
 
 #include "wavecomb/integrate/light_path.h"
@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Traces paths from lights one after the other and gives the film what they bring.
+/// Traces light paths one after the other and adds their contributions to the film.
 class LightTracer {
   using F = float;
 
@@ -28,7 +28,8 @@ class LightTracer {
         vertices_(worker.light_vertices),
         light_aovs_(worker.light_aovs) {}
 
-  /// `keeps`: one of the path's vertices, for the camera's path of the same pixel and sample.
+  /// Traces one light path. With `keeps`, stores one of its vertices for the camera path of the
+  /// same pixel and sample.
   void trace(uint32_t pixel, uint32_t sample, bool keeps = false) {
     if (keeps) vertices_.clear(1);
     const SceneView& scene = context_.scene;
@@ -121,14 +122,14 @@ class LightTracer {
   LightPathAovs& light_aovs_;
 };
 
-/// Gives the film what the paths of a task have brought.
+/// Adds the contributions of a task's light paths to the film.
 inline void end_light_task(const WaveContext& context, ReferenceWorker& worker,
                            const WaveTask& task) {
   if (!context.lessons) context.film->take(worker.splats);
   count_light_paths(context, task);
 }
 
-/// Traces the paths of a task.
+/// Traces the light paths of a task.
 inline void trace_light_task(const WaveContext& context, ReferenceWorker& worker,
                              const WaveTask& task) {
   LightTracer tracer(context, worker);

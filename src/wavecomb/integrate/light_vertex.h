@@ -1,32 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-/// One vertex of a path from a light. Both integrators run this and nothing else for such paths.
+/// Shading of one vertex of a light path. The wave and the reference integrator share it.
 ///
-/// The path carries flux. With the direction w to the camera and l to the light, g the geometric
-/// normal, and the BSDF as the camera's paths have it (f(w, l) |cos l|, radiance scaled by indices
-/// of refraction: evaluated from w's side), a bounce l -> w of density p<- makes
+/// A light path carries flux. Let w be the direction to the camera, l the direction to the light, g
+/// the geometric normal, and f the BSDF as on camera paths (f(w, l) |cos l|, evaluated from w's
+/// side, with radiance scaled by the indices of refraction). A bounce l -> w with density p<-
+/// changes the flux T by
 ///   T <- T f(w, l) |cos l| / p<-  |g w| / |g l|
 /// (E. Veach, "Robust Monte Carlo Methods", 1997, section 5.3: shading normals and refraction of
-/// adjoint BSDFs), and what a pixel gets of the vertex, seen with the density G
+/// adjoint BSDFs). The contribution of the vertex to a pixel, with the camera density G
 /// (camera_connection.h), is
 ///   T f(w, l) |cos l|  |g w| / |g l|  G  v,   v = 1 / (1 + S (p-> + p_light) |g w| / |g l| G / N).
-/// S is 1 / D at the light, and each vertex multiplies in
-///   S <- S p-> |g w| / (|g l| p<-);   the first one with p-> + p_light in place of p->:
-/// what the camera's techniques (steps/join.h) are as dense over this one.
+/// S is 1 / D at the light, and each vertex multiplies it:
+///   S <- S p-> |g w| / (|g l| p<-);   the first one with p-> + p_light in place of p->.
+/// S is the density of the camera's techniques (steps/join.h) relative to this one.
 ///
-/// Where vertices are connected, S is the sum over those and the connections that lie towards the
-/// light, and both have (S p-> + F) in place of S p->, with
-///   F = d^2 / p<-   of the bounce that led here over the distance d, 0 where that was a delta.
-/// Connected to a camera's vertex with throughput T', BSDF f', and R p<- |g l'| / |g w'| of its own
-/// towards this one (JointVertex::towards is r), which bounces would go to with the density p->',
-/// it brings the path
+/// With connections between vertices, S also sums over the connections closer to the light, and
+/// both formulas have (S p-> + F) in place of S p->, with
+///   F = d^2 / p<-   of the bounce that led here over the distance d, or 0 if it was a delta.
+/// A connection to a vertex of a camera path with throughput T', BSDF f' and density p->' of a
+/// bounce towards this vertex contributes
 ///   T' f' |cos|  T f(w, l) |cos l|  |g w| / |g l|  v / d^2,
-///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2).
+///   v = 1 / (1 + r p<- / d^2 + (S (p-> + p_light) + F) |g w| / |g l|  p->' / d^2),
+/// where r is JointVertex::towards of the camera path's vertex: R p<- |g l'| / |g w'|.
 ///
-/// How noisy camera paths would be that had to find a path's light alone is known without them:
-/// with c what it brings with its weight v = 1 / (1 + x), x is how dense they are over light paths,
-/// the whole of it is c (1 + x), and a camera path's sample has the second moment
-///   E[sum over light paths of (c (1 + x))^2 / x],   of which v is the part that is light paths'
-///   own: c^2 (1 + x) / x.
+/// Light paths also predict the noise of camera paths that would have to find the same light alone.
+/// Let c be the contribution of a light path with weight v = 1 / (1 + x), where x is the density of
+/// camera paths relative to light paths. Its unweighted contribution is c (1 + x), and the sample
+/// of a camera path has the second moment
+///   E[sum over light paths of (c (1 + x))^2 / x].
+/// The fraction v of it that belongs to light paths is c^2 (1 + x) / x.
 #pragma once
 
 #include <array>
@@ -42,29 +44,29 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Density of camera paths over light paths below which they are as good as none.
+/// Lower bound for the density of camera paths relative to light paths.
 inline constexpr float kLeastRatio = 1e-9f;
-/// Cosine between the normals of a point and of what ends there.
+/// Least cosine between the normals of a visible point and of a vertex that is merged with it.
 inline constexpr float kLeastAlike = 0.7f;
 
-/// What a path from a light finds at a vertex: the surface, and the light's side.
+/// Shading point of a light path, with the direction that the light arrives from.
 template <typename Bsdf, typename F, typename Interaction>
 struct LitPlace {
   const Interaction& at;
   Frame<F> frame;
-  Vec3<F> l;              ///< to the light, as connections go (steps/connection.h), local
-  F inverse_cos;          ///< 1 / |g l|
-  Color<F> flux;          ///< that arrives
-  F linked;               ///< F
-  F sampled;              ///< p_light, of the first vertex
-  Mask<F> by_light_only;  ///< bounces do not find the light
+  Vec3<F> l;      ///< local direction to the light, computed as a connection (steps/connection.h)
+  F inverse_cos;  ///< 1 / |g l|
+  Color<F> flux;  ///< flux that arrives
+  F linked;       ///< F, see above
+  F sampled;      ///< p_light at the first vertex, else 0
+  Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
   Mask<F> active;
 
-  /// |g w| / |g l| for a world direction.
+  /// Returns |g w| / |g l| for a world direction.
   F turn(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
-  /// p-> + p_light.
+  /// Returns p-> + p_light, where `bounce` is p->.
   F found(const F& bounce) const { return select(by_light_only, F(0.f), bounce) + sampled; }
-  /// S (p-> + p_light) + F, with S up to here.
+  /// Returns S (p-> + p_light) + F, where `s` is S before this vertex.
   F others(const F& s, const F& bounce) const { return s * found(bounce) + linked; }
 };
 
@@ -74,7 +76,7 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
                                                          const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
-  // Towards what sent the flux, as a camera path's bounce would meet it.
+  // Direction to the origin of the flux, as a bounce of a camera path would reach it.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
   const Mask<F> afar = is_first & Mask<F>(v.path.receiver < UInt<F>(v.scene.lights.infinite_count));
   c.o = select<F>(afar, at.origin(back), c.o);
@@ -97,7 +99,7 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
       receiver.normal = pack_normal<F>(select<F>(place.l.z < 0.f, -place.frame.n, place.frame.n));
     const LightReach<F> reach =
         light_reach<F>(v.scene.lights, v.path.receiver, receiver, c.d, distance, first);
-    // Where nothing but deltas is, no light is sampled.
+    // Vertices that have only delta lobes do not sample lights.
     place.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
     place.by_light_only = first & reach.is_delta;
   }
@@ -109,7 +111,8 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
   return place;
 }
 
-/// Who looks at a vertex from `to`: the direction there, and whether that is possible.
+/// Viewer of a vertex: the direction from the vertex to the viewer, and whether the vertex scatters
+/// towards it.
 template <typename F>
 struct Looker {
   Vec3<F> w, local;
@@ -132,7 +135,7 @@ WAVECOMB_INLINE Looker<F> looker_at(const Vertex<F, kFeatures>& v, const Place& 
   return out;
 }
 
-/// The shadow ray of `light` towards who looks from `to`.
+/// Sets up the shadow ray towards the viewer at `to`, which carries the contribution `light`.
 template <typename F, typename Place>
 WAVECOMB_INLINE void ask_whether_seen(const Place& place, const Looker<F>& looker,
                                       const Vec3<F>& to, const Color<F>& light,
@@ -147,7 +150,7 @@ WAVECOMB_INLINE void ask_whether_seen(const Place& place, const Looker<F>& looke
   out.shadow_tfar = size * kShadowReach;
 }
 
-/// Notes how light is scattered to who looks, where that is asked for.
+/// Classifies the scattering towards the viewer, if light path expressions need it.
 template <typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void note_shown(const Vertex<F, kFeatures>& v, const Place& place,
                                 const Looker<F>& looker) {
@@ -156,7 +159,9 @@ WAVECOMB_INLINE void note_shown(const Vertex<F, kFeatures>& v, const Place& plac
         place.at.bsdf, looker.local, place.l);
 }
 
-/// What a splat is of, of which camera paths are `others` times as dense.
+/// Returns the value of a light splat: its contribution `light` or, with camera_squares, the
+/// addition to the variance of camera paths. `others` is the density of camera paths relative to
+/// light paths.
 template <typename F>
 WAVECOMB_INLINE Color<F> shown_light(const LightPathSetup& setup, const Color<F>& light,
                                      const F& others) {
@@ -167,7 +172,7 @@ WAVECOMB_INLINE Color<F> shown_light(const LightPathSetup& setup, const Color<F>
   return Color<F>(F(y2 * F(F(1.f + others) / max(others, F(kLeastRatio)))));
 }
 
-/// Shows the vertex to the camera.
+/// Connects the vertex to the camera.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                                     const Place& place, const Sample4<F>& r,
@@ -193,8 +198,8 @@ WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPa
   note_shown<F>(v, place, looker);
 }
 
-/// Ends the path at what the camera sees in mirrors and through glass near by (visible_point.h).
-/// One point of each lane at a time.
+/// Merges the path with nearby points that the camera sees in mirrors and through glass
+/// (visible_point.h). Each lane handles one point at a time.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                            const Place& place) {
@@ -247,7 +252,7 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
   }
 }
 
-/// Shows the vertex to that of a camera path.
+/// Connects the vertex to a vertex of a camera path.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
                              const ConnectionRow<F>& target, VertexResult<F>& out) {
@@ -268,7 +273,7 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
   note_shown<F>(v, place, looker);
 }
 
-/// The bounce, and the ray that goes on.
+/// Samples the bounce and the next ray.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Place>
 WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& place,
                                   const Sample4<F>& r, VertexResult<F>& out) {
@@ -315,11 +320,12 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
 
 }  // namespace detail
 
-/// The steps of a vertex of the active lanes' paths from lights, with program `Bsdf`. `v.hit.time`
-/// is the path's, and `v.path.cone_width` the camera's. Of `v.aovs`, where they are there, they
-/// note `lit` (towards who looks) and `bounce`, where events are wanted.
-/// `target` null: it is shown to the camera and the path goes on; else to the vertices of camera
-/// paths there, and `v.depth` says nothing.
+/// Runs the steps of a vertex of the active lanes' light paths, with shading program `Bsdf`.
+/// `v.hit.time` is the shutter time of the path, and `v.path.cone_width` is the width of a camera
+/// ray's cone at the hit. If `v.aovs` wants events, classifies the scattering towards the viewer
+/// (`lit`) and of the bounce (`bounce`). With a null `target`, the vertex is connected to the
+/// camera and the path continues; otherwise it is connected to the camera path's vertices in
+/// `target`, and `v.depth` has no meaning.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>& v,
                                                       const LightPathSetup& setup,
@@ -351,7 +357,7 @@ WAVECOMB_INLINE LightVertexResult<F> take_light_steps(const Vertex<F, kFeatures>
   return out;
 }
 
-/// The same as a function of its own: the reference integrator's.
+/// Runs take_light_steps() without inlining, for the reference integrator.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 LightVertexResult<F> shade_light_vertex(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,
                                         const ConnectionTarget<F>* target) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The vertices of paths from lights that camera paths connect to (docs/light-paths.md).
+/// Vertices of light paths that camera paths connect to (docs/light-paths.md).
 ///
-/// With each camera path goes the path from a light that has the number of its pixel, and the same
-/// sample. Of that path's vertices one is kept, each as likely as the others, and every vertex of
-/// the camera path connects to it: what is connected depends on pixel and sample, and on no wave.
+/// Each camera path is paired with the light path of the same pixel number and sample. One vertex
+/// of the light path is stored, chosen uniformly, and every vertex of the camera path connects to
+/// it. The connections depend only on pixel and sample, not on the wave.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -14,31 +14,35 @@
 
 namespace wavecomb {
 
-/// The vertex that is kept, beside the PathRow that has led there and its ShadingRecord.
+/// Stored vertex of a light path, in addition to the PathRow that led there and its ShadingRecord.
 template <typename F>
 struct LightVertexRow {
   Vec3<F> p;
-  UInt<F> vertices;  ///< that the path had to choose from so far; 0: there is none
+  UInt<F> vertices;  ///< number of candidate vertices so far; 0 if there is none
   UInt<F> depth, material;
   WAVECOMB_FIELDS(p, vertices, depth, material)
 };
 
-/// What a vertex of a camera path offers to the vertex from the light: a row of its slot.
+/// Connection that a vertex of a camera path offers to the light path's vertex, one row for each
+/// slot.
 template <typename F>
 struct ConnectionRow {
-  Vec3<F> from;    ///< where its ray to that vertex begins
-  F pdf;           ///< density of its own bounce there, over solid angle
-  Color<F> light;  ///< what light of unit radiance from there would bring, times the number of
-                   ///< vertices to choose from; black: it is not connected
-  F ratio;         ///< JointVertex::towards
+  Vec3<F> from;  ///< origin of the ray to that vertex
+  F pdf;         ///< solid angle density of the camera path's bounce in that direction
+  /// Contribution for unit radiance from that vertex, times the number of candidate vertices; black
+  /// without a connection.
+  Color<F> light;
+  F ratio;  ///< JointVertex::towards
   WAVECOMB_FIELDS(from, pdf, light, ratio)
 };
 
-/// Contract: owned by one wave or one reference integrator, a row of each kind a slot.
+/// Stored vertices and connections of the paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Each slot has a row of each kind.
 class LightVertices {
  public:
   LightVertices() = default;
-  /// `capacity` 0: nothing is connected.
+  /// Allocates rows for `capacity` slots; 0 disables connections.
   explicit LightVertices(size_t capacity)
       : rows_(capacity > 0 ? SoaBlock(1, capacity * kWords) : SoaBlock()) {
     if (capacity == 0) return;
@@ -50,7 +54,7 @@ class LightVertices {
 
   explicit operator bool() const { return paths != nullptr; }
   size_t bytes() const { return rows_.bytes(); }
-  /// Forgets the vertices of slots below `slots`.
+  /// Clears the vertices of slots below `slots`.
   void clear(size_t slots) const {
     std::memset(chosen, 0, slots * kRowWords<LightVertexRow> * sizeof(float));
   }
@@ -66,8 +70,9 @@ class LightVertices {
   SoaBlock rows_;
 };
 
-/// Keeps, of the lanes in `offered`, the vertex at `p` where the path's number says so: with n
-/// vertices so far, the last one with probability 1 / n. Those whose vertex it now is.
+/// Stores the vertex at `p` in the lanes of `offered` that the path's hash selects: of n vertices
+/// so far, the last one replaces the stored one with probability 1 / n. Returns the lanes whose
+/// vertex was stored.
 template <typename F>
 inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth, const PathRow<F>& path,
                                  const ShadingRecord<F>& record, const UInt<F>& material,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What paths keep for AOVs until their light goes to the film: a row a path (path_aovs.h).
+/// Rows of AOV values that paths keep until they are added to the film (path_aovs.h).
 #pragma once
 
 #include <cstring>
@@ -10,34 +10,33 @@
 
 namespace wavecomb {
 
-/// What the camera's ray met, before it is shaded; kNothingHit where it did not.
+/// First hit of a camera ray, before shading. Indices are kNothingHit if there is none.
 template <typename F>
 struct FirstHitRow {
   Vec3<F> position;
   UInt<F> object, material, instance;
-  F depth, distance;  ///< along the camera's axis, and from where the camera is
+  F depth, distance;  ///< distance along the camera's axis, and from the camera's position
   WAVECOMB_FIELDS(position, object, material, instance, depth, distance)
 };
 
-/// What paths meet in a volume: its number, or, in a mesh, placed_geometry of the mesh; and the
-/// material.
+/// Volume event of a path: the index of the volume, or placed_geometry() of the mesh that the
+/// medium fills, and the material.
 template <typename F>
 struct VolumeSeen {
   UInt<F> volume, place, material;
   Mask<F> in_mesh;
 };
 
-/// How the camera's ray went.
+/// End of a camera ray.
 template <typename F>
 struct RayEndRow {
-  F depth;           ///< infinite where the camera's ray has met nothing
-  F in_volume;       ///< 1 where a volume has stopped it, else 0
-  Color<F> through;  ///< what volumes let through of what it has met, 0 where they have stopped it
+  F depth;           ///< infinite if the ray hits nothing
+  F in_volume;       ///< 1 if a volume stopped the ray, else 0
+  Color<F> through;  ///< transmittance of the volumes before the hit; 0 if they stopped the ray
   WAVECOMB_FIELDS(depth, in_volume, through)
 };
 
-/// Values that AOVs of the nearest sample have of it: a line for each such row whose source is
-/// kHit.
+/// Calls put(aov, value) for each AOV of the nearest sample whose source is kHit.
 template <typename Put>
 inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
   put(Aov::kPosition, hit.position);
@@ -47,24 +46,25 @@ inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
   put(Aov::kDistance, hit.distance);
 }
 
-/// Albedo and normal of the last vertex that guides a denoiser.
+/// Denoiser inputs of a path: albedo and normal of the first vertex that is not clear, or of the
+/// last vertex so far.
 template <typename F>
 struct GuideRow {
   Color<F> albedo;
   Vec3<F> normal;
-  F is_final;  ///< 1 once a vertex was not clear
+  F is_final;  ///< 1 after a vertex that is not clear
   WAVECOMB_FIELDS(albedo, normal, is_final)
 };
 
-/// Sums over the bounces of a path: of the probabilities with which the field chose their
-/// directions, and of those with which roulette let them go on.
+/// Sums over the bounces of a path: probabilities that the guiding field sampled the direction,
+/// survival probabilities of roulette, and number of bounces.
 template <typename F>
 struct BounceRow {
   F guided, survived, bounces;
   WAVECOMB_FIELDS(guided, survived, bounces)
 };
 
-/// Rows of some words a slot.
+/// Rows of `words` 32-bit words, one for each slot.
 struct SlotRows {
   SoaBlock owner;
   float* rows = nullptr;
@@ -80,7 +80,7 @@ struct SlotRows {
   size_t bytes() const { return owner.bytes(); }
 };
 
-/// The words of a value, one after another from word `at` on.
+/// Stores the words of `value` one after another, starting at word `at`.
 template <typename F>
 inline void scatter_words(float* rows, const F& value, const UInt<F>& at, const Mask<F>& active) {
   scatter<F>(rows, value, at, active);

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What paths find for AOVs, beside their radiance. Both integrators own one of these, a row a path
-/// slot, and tell it what happens to a path:
+/// AOV values of paths. Both integrators own a PathAovs with one row for each path slot and report
+/// the events of a path to it:
 ///
 ///   begin      a camera ray starts (path_first_hits.h)
-///   hit_light, hit_surface   what it met first
-///   vertex     a surface was shaded
-///   add        light reached the path
-///   end_depth  all light that scattering `depth` has met is in the radiance
-///   resolve    the path's sums go to the film
+///   hit_light, hit_surface   the camera ray has its first hit
+///   vertex     a vertex was shaded
+///   add        a light contributes to the path
+///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
+///   resolve    the path's values are added to the film
 ///
-/// Only what is asked for takes room and time. Radiance by parts costs shading nothing: it is
-/// copied once before the first scattering brings light, and once after.
+/// Rows exist only for the requested AOVs. Splitting the radiance into emission, direct and
+/// indirect light costs nothing in shading, since copies of it before the light samples of the
+/// first two vertices are enough.
 #pragma once
 
 #include <array>
@@ -30,8 +31,8 @@
 
 namespace wavecomb {
 
-/// Values that AOVs have of the first vertex, once it was shaded and where `path` has reached it: a
-/// line for each row whose source is kVertex. Runs put(aov, value), value of its channels.
+/// Calls put(aov, value) for each AOV of the first vertex whose source is kVertex. `value` has the
+/// channels of the AOV, and `path` is the state that arrived.
 template <typename F, typename Put>
 inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*path*/,
                                   const Put& put) {
@@ -40,11 +41,14 @@ inline void for_each_vertex_value(const VertexAovs<F>& v, const PathState<F>& /*
   put(Aov::kUv, v.uv);
 }
 
-/// Contract: owned by one wave, or one reference integrator; slots below the capacity.
+/// AOV rows of the paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
 class PathAovs : public PathFirstHits, public PathCostRows {
  public:
   PathAovs() = default;
-  /// `tables` may be null where nothing of `layout` needs them.
+  /// Allocates the rows that `layout` needs. `tables` may be null if nothing in `layout` needs
+  /// them.
   PathAovs(size_t capacity, const AovLayout& layout, const AovTables* tables)
       : PathFirstHits(capacity, layout.set, tables),
         PathCostRows(layout.set.has(Aov::kCost) ? capacity : 0, tables && tables->models_cost),
@@ -80,7 +84,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- before the first ray ---------------------------------------------------------------------
 
-  /// Forgets the paths in slots below `slots`.
+  /// Clears the slots below `slots`.
   void clear(size_t slots) {
     for (const Block* block :
          {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_links_})
@@ -92,7 +96,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- vertices ---------------------------------------------------------------------------------
 
-  /// What shading is to give at `depth`.
+  /// Returns the AOV values that shading has to provide at `depth`.
   template <typename F>
   VertexAovs<F> wanted(uint32_t depth) const {
     VertexAovs<F> v;
@@ -103,12 +107,12 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     v.uv = {F(0.f), F(0.f)};
     return v;
   }
-  /// Whether that is anything at all.
+  /// Returns whether shading has to provide any AOV value at `depth`.
   bool wants_vertex(uint32_t depth) const {
     return (depth == 0 && vertex_) || guides_ || wants_lights() || bounces_;
   }
 
-  /// A vertex was shaded, which `path` had reached.
+  /// Records a shaded vertex. `path` is the state that arrived there.
   template <typename F>
   void vertex(uint32_t depth, const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
               const Mask<F>& active) const {
@@ -122,47 +126,48 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (guides_) store_guides<F>(slot, v, path, active);
     if (bounces_) add_bounce<F>(slot, v, active);
   }
-  /// Roulette that is played where a bounce has led, of paths at `depth`, lets them go on with `q`.
+  /// Records the survival probability `q` of roulette before a vertex, for paths at `depth`.
   template <typename F>
   void survive(uint32_t depth, const UInt<F>& slot, const F& q, const Mask<F>& active) const {
     if (!bounces_ || depth == 0) return;
     BounceRow<F> row = load_row<BounceRow, F>(bounces_.rows, slot, active);
-    row.survived += q - 1.f;  // the bounce counts as one that went on
+    row.survived += q - 1.f;  // add_bounce() has counted the bounce with probability 1
     store_row<BounceRow, F>(bounces_.rows, slot, row, active);
   }
 
   // ---- light ------------------------------------------------------------------------------------
 
-  /// Whether it is to be known which light brings what.
+  /// Returns whether contributions must be reported by light.
   bool wants_lights() const { return groups_ || expressions_; }
-  /// Where the group of the lanes' lights is kept, or kNoGroup.
+  /// Returns the index of the stored light group of each lane's light, or kNoGroup.
   template <typename F>
   UInt<F> group_of(const UInt<F>& light, const Mask<F>& active) const {
     if (!groups_) return UInt<F>(kNoGroup);
     return kept_group<F>(tables_->kept_group.data(), light, active);
   }
   const PathExpressions& expressions() const { return expressions_; }
-  /// Light `light`, or kNoLight, has met the paths in the active lanes' slots, which are distinct.
+  /// Adds a contribution of `light`, or kNoLight, to the paths in the active lanes' slots, which
+  /// must be distinct.
   template <typename F>
   void add_light(const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
                  const Mask<F>& active) const {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (expressions_) expressions_.add<F>(slot, light, c, active);
   }
-  /// A volume that shines has.
+  /// Adds emission of volumes.
   template <typename F>
   void add_glow(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
     if (expressions_) expressions_.add_glow<F>(slot, c, active);
   }
-  /// The light samples of the last vertices have brought `c`, of a light of `group`.
+  /// Adds the contribution `c` of the light sample of the last vertex, from a light of `group`.
   template <typename F>
   void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
                   const Mask<F>& active) const {
     if (groups_) add<F>(slot, group, c, active);
     if (expressions_) expressions_.add_lit<F>(slot, c, active);
   }
-  /// The same for light of `group` and the groups alone.
+  /// Adds the contribution `c` to light group `group` only.
   template <typename F>
   void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
            const Mask<F>& active) const {
@@ -170,14 +175,15 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (any(kept)) add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, kept);
   }
   bool wants_light_samples() const { return bool(light_samples_); }
-  /// Light samples have brought the paths in the active lanes' slots, which are distinct, `c`.
+  /// Adds the contribution `c` of light samples to the paths in the active lanes' slots, which must
+  /// be distinct.
   template <typename F>
   void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
     add_radiance<F>(light_samples_.rows, slot, c, active);
   }
   bool wants_links() const { return early_links_ || wants_lights() || light_samples_; }
-  /// Connections of the vertices at `depth` to ones from lights `light` have brought `c`.
-  /// Expressions get theirs elsewhere (light_path_aovs.h).
+  /// Adds the contribution `c` of connections between vertices at `depth` and vertices of light
+  /// paths from `light`. light_path_aovs.h adds it to light path expressions.
   template <typename F>
   void add_link(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
                 const Mask<F>& active) const {
@@ -185,7 +191,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
     if (light_samples_) add_light_sample<F>(slot, c, active);
   }
-  /// The environment's light has reached the paths of the active lanes.
+  /// Adds the environment's light to the paths of the active lanes.
   template <typename F>
   void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
                        const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
@@ -197,20 +203,20 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         });
   }
 
-  /// Keeps the radiance of slots below `slots` as a part: it holds all light that scattering
-  /// `depth` has met, and none that it gathers.
+  /// Copies the radiance of slots below `slots`. It includes the emission at the vertex at `depth`,
+  /// but not its light sample.
   void end_depth(uint32_t depth, const float* radiance, size_t slots) const {
     if (depth < parts_.size() && parts_[depth])
       std::memcpy(parts_[depth].rows, radiance, slots * kRadianceWords * sizeof(float));
   }
-  /// The same for `depth` and all that follow, of paths that have ended.
+  /// Copies the radiance for `depth` and all later vertices, after the paths have ended.
   void end_path(uint32_t depth, const float* radiance, size_t slots) const {
     for (; depth < parts_.size(); ++depth) end_depth(depth, radiance, slots);
   }
 
   // ---- to the film ------------------------------------------------------------------------------
 
-  /// The camera's exposure: multiplies what is radiance.
+  /// Multiplies all radiance values by the camera's exposure.
   void expose(float exposure, size_t slots) const {
     const auto scale = [&](const Block& block, size_t words) {
       for (size_t i = 0; block && i < slots * words; ++i) block.rows[i] *= exposure;
@@ -221,7 +227,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     expressions_.scale(exposure, slots);
     scale(light_samples_, kRadianceWords);
   }
-  /// Adds what the paths in slots [begin, end) found to `pixel`, slot by slot. `radiance`: theirs.
+  /// Adds the values of the paths in slots [begin, end) to `pixel`, in the order of slots.
+  /// `radiance` holds the RadianceRow of each slot.
   void resolve(AovFilm& film, size_t pixel, size_t begin, size_t end, const float* radiance) const;
 
   // For tests: rows of light groups, or null.
@@ -235,7 +242,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
             &groups_, &guides_,   &light_samples_, &bounces_};
   }
 
-  /// In place of where an AOV's value is kept.
+  /// Marks an AOV without words in vertex_.
   static constexpr uint32_t kNotKept = 0xffffffffu;
   static constexpr std::array<uint32_t, kAovCount> nothing_kept() {
     std::array<uint32_t, kAovCount> at{};
@@ -243,7 +250,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return at;
   }
 
-  /// What guides a denoiser, of paths that have met clear surfaces only so far.
+  /// Stores the denoiser inputs of paths that have met only clear surfaces so far.
   template <typename F>
   void store_guides(const UInt<F>& slot, const VertexAovs<F>& v, const PathState<F>& path,
                     const Mask<F>& active) const {
@@ -255,7 +262,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
                            {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, seen);
   }
 
-  /// The bounce of a vertex, where there is one.
+  /// Adds the bounce of a vertex, if it has one.
   template <typename F>
   void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
     const Mask<F> there = active & (v.survival >= 0.f);
@@ -270,15 +277,16 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   AovLayout layout_;
   const AovTables* tables_ = nullptr;
   Block vertex_;
-  /// By an AOV's place: its words in a row of vertex_, or kNotKept.
+  /// First word of each AOV in a row of vertex_, or kNotKept.
   std::array<uint32_t, kAovCount> vertex_at_ = nothing_kept();
-  std::array<Block, 2> parts_;  ///< radiance as it was before scattering 0 and 1
-  /// Radiance that connections of first vertices brought: it is indirect, and scattering 0 has it.
+  std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
+  /// Contributions of connections at first vertices. They are indirect light, although they are
+  /// added between the two copies in parts_.
   Block early_links_;
-  Block groups_;  ///< radiance by light group, a slot's groups side by side
+  Block groups_;  ///< radiance by light group; the groups of a slot are adjacent
   Block guides_, bounces_;
   PathExpressions expressions_;
-  Block light_samples_;  ///< radiance that light samples brought
+  Block light_samples_;  ///< contributions of light samples
 };
 
 }  // namespace wavecomb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What paths cost, for the AOV of it: time, or what the model says (docs/aovs.md).
+/// Cost of paths for the cost AOV: measured time, or modelled cost (docs/aovs.md).
 #pragma once
 
 #include <chrono>
@@ -9,11 +9,13 @@
 
 namespace wavecomb {
 
-/// What the model of costs says of a ray, in nanoseconds: about what it takes among a million
-/// triangles.
+/// Modelled cost of a ray in nanoseconds, about the time to trace a ray among a million triangles.
 inline constexpr float kModelRayNs = 250;
 
-/// Contract: part of a PathAovs; slots below the capacity, which is 0 where nobody asks.
+/// Cost of each path.
+///
+/// Contract: used only as a base of PathAovs. Slots must be below the capacity, which is 0 without
+/// a cost AOV.
 class PathCostRows {
  public:
   PathCostRows() = default;
@@ -21,12 +23,13 @@ class PathCostRows {
       : cost_ns_(capacity > 0 ? SlotRows(capacity, 1) : SlotRows()), models_(models) {}
 
   bool wants_cost() const { return bool(cost_ns_); }
-  /// Costs are of the model: no time is taken.
+  /// Returns whether costs come from the model instead of being measured.
   bool models_cost() const { return wants_cost() && models_; }
   bool wants_time() const { return wants_cost() && !models_cost(); }
-  /// Adds a cost of the model, in nanoseconds. A path's come in the order of its vertices.
+  /// Adds a modelled cost in nanoseconds. Calls for one path come in the order of its vertices.
   void add_cost(size_t slot, float ns) const { cost_ns_.rows[slot] += ns; }
-  /// What the model says of a ray of each path in slots slot(0) ... slot(n - 1), where it is asked.
+  /// Adds the modelled cost of a ray to each path in slots slot(0) ... slot(n - 1), if costs are
+  /// modelled.
   template <typename Slot>
   void charge_rays(size_t n, const Slot& slot) const {
     for (size_t i = 0; models_cost() && i < n; ++i) add_cost(slot(i), kModelRayNs);
@@ -34,8 +37,8 @@ class PathCostRows {
   PhaseClock::Clock::time_point start_time() const {
     return wants_time() ? PhaseClock::Clock::now() : PhaseClock::Clock::time_point();
   }
-  /// Spreads the time since `start` evenly over the paths in slots slot(0) ... slot(n - 1), where
-  /// it is taken: a batch at a time, so a path's share is the mean of its batch.
+  /// Adds the time since `start` in equal parts to the paths in slots slot(0) ... slot(n - 1), if
+  /// times are measured. The time of a path is therefore the mean of its batch.
   template <typename Slot>
   void spread_time(size_t n, PhaseClock::Clock::time_point start, const Slot& slot) const {
     if (!wants_time() || n == 0) return;
@@ -49,7 +52,7 @@ class PathCostRows {
   size_t cost_bytes() const { return cost_ns_.bytes(); }
   void clear_costs(size_t slots) const { cost_ns_.zero(slots); }
 
-  SlotRows cost_ns_;  ///< a word a slot
+  SlotRows cost_ns_;  ///< one word for each slot
 
  private:
   bool models_ = false;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Radiance of paths by light path expressions (core/path_expression.h). Run only where there are
-/// any.
+/// Radiance of paths by light path expressions (core/path_expression.h). Runs only if the render
+/// has expressions.
 ///
-/// A path carries a state for each of its three colours. Where a scattering is partly diffuse, the
-/// share s of a colour, that colour goes on as diffuse with probability s, by one number of the
-/// vertex for all three, and else as glossy. Whatever light comes then is added whole to what the
-/// state says, so that the layers of a partition add up to the beauty, and each has the mean that
-/// its lobes bring. Light samples are split by s itself: they need no choice. So is what a bounce
-/// meets of a light that gives the two lobes other shares of itself.
+/// A path carries an automaton state for each of its three colours. At a scattering with diffuse
+/// fraction s of a colour, that colour continues as diffuse with probability s and as glossy
+/// otherwise; all three colours use the same random number. Later contributions are added as a
+/// whole to the expressions of the state, so that the layers of a partition add up to the beauty
+/// and each layer has the correct mean. Light samples are split by s directly, without a random
+/// choice. Emission that a bounce hits is also split directly if the light has different diffuse
+/// and specular multipliers.
 #pragma once
 
 #include <array>
@@ -22,23 +23,22 @@
 
 namespace wavecomb {
 
-/// What a path keeps of itself.
+/// State of a path for light path expressions.
 template <typename F>
 struct ExpressionRow {
   UInt<F> states;  ///< of the three colours, ten bits each
-  // Of the light sample under way: the states that it found, its event, its end, and the share of
-  // it that is diffuse.
+  // Current light sample: states before its scattering, event, path end, and diffuse fraction.
   UInt<F> lit_states, lit_event, lit_end;
   Color<F> lit_diffuse;
-  // Of the last bounce, for lights with multipliers: the states before it, 1 + its event, or 0 of a
-  // mirror and before the first, and the share of it that is diffuse.
+  // Last bounce, for lights with multipliers: states before it, its event plus 1 (0 for a specular
+  // bounce and before the first bounce), and its diffuse fraction.
   UInt<F> from_states, bounce;
   Color<F> bounce_diffuse;
   WAVECOMB_FIELDS(states, lit_states, lit_event, lit_end, lit_diffuse, from_states, bounce,
                   bounce_diffuse)
 };
 
-/// Runs each(number, value) for the three colours.
+/// Calls each(index, value) for the three colours.
 template <typename F, typename Each>
 inline void for_each_colour(const Color<F>& c, const Each& each) {
   each(0u, c.x);
@@ -46,7 +46,7 @@ inline void for_each_colour(const Color<F>& c, const Each& each) {
   each(2u, c.z);
 }
 
-/// States of an automaton for the three colours in one word, and how scatterings lead on from them.
+/// Automaton states of the three colours in one word, and their transitions.
 struct ColourStates {
   static constexpr uint32_t kBits = 10, kMask = 1023;
   static_assert(PathAutomaton::kMostStates <= kMask + 1);
@@ -55,8 +55,8 @@ struct ColourStates {
   static UInt<F> of(const UInt<F>& states, uint32_t colour) {
     return (states >> (kBits * colour)) & kMask;
   }
-  /// The state after a scattering, by an automaton's table `next`; those in volumes and below
-  /// surfaces have no lobes.
+  /// Returns the state after a scattering, by the automaton's table `next`. Scatterings in volumes
+  /// and subsurface bodies have no lobes.
   template <typename F>
   static UInt<F> next(const uint32_t* table, const UInt<F>& state, const UInt<F>& event,
                       const UInt<F>& lobe, const Mask<F>& active) {
@@ -66,7 +66,7 @@ struct ColourStates {
         state * PathAutomaton::kNextWords + event + select(Mask<U>(event < volume), lobe, U(0u));
     return gather<U>(table, at, Mask<U>(active));
   }
-  /// The states after a bounce, of whose lobes `u` in [0, 1) chooses one for each colour.
+  /// Returns the states after a bounce. `u` in [0, 1) chooses the lobe of each colour.
   template <typename F>
   static UInt<F> after(const uint32_t* table, const UInt<F>& states,
                        const ScatteringNote<F>& bounce, const F& u, const Mask<F>& active) {
@@ -81,13 +81,16 @@ struct ColourStates {
   }
 };
 
-/// Contract: owned by one PathAovs; slots below the capacity. Light in the active lanes' slots,
-/// which are distinct.
+/// Light path expression states and sums of the paths of a wave.
+///
+/// Contract: owned by one PathAovs. Slots must be below the capacity, and those of the active
+/// lanes distinct.
 class PathExpressions {
  public:
   PathExpressions() = default;
-  /// `end_of_light`: path_end of each light, and at the end those of what is no light: surfaces,
-  /// then volumes. `multipliers`: of each light, diffuse and specular; empty where all are 1.
+  /// `end_of_light` holds path_end of each light, followed by those of other surfaces and of
+  /// volumes. `multipliers` holds the diffuse and specular multiplier of each light; empty means
+  /// that all are 1.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
                   const std::vector<uint32_t>& end_of_light, const std::vector<float>& multipliers)
       : automaton_(&automaton),
@@ -100,10 +103,10 @@ class PathExpressions {
 
   explicit operator bool() const { return automaton_ != nullptr; }
   size_t bytes() const { return rows_.bytes() + sums_.bytes(); }
-  /// Radiance of a path in `slot`, rgb, expression by expression.
+  /// Returns the radiance of the path in `slot`: rgb for each expression.
   const float* sums(size_t slot) const { return sums_.floats(0) + slot * words_; }
 
-  /// Forgets the paths in slots below `slots`.
+  /// Clears the slots below `slots`.
   void clear(size_t slots) {
     if (!*this) return;
     std::memset(rows_.floats(0), 0, slots * kRowWords<ExpressionRow> * sizeof(float));
@@ -113,7 +116,7 @@ class PathExpressions {
     for (size_t i = 0; *this && i < slots * words_; ++i) sums_.floats(0)[i] *= factor;
   }
 
-  /// Light `light`, or kNoLight, has reached the paths.
+  /// Adds a contribution of `light`, or kNoLight, to the paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void add(const UInt<F>& slot, const UInt<F>& light,
                                         const Color<F>& c, const Mask<F>& active) const {
@@ -126,7 +129,7 @@ class PathExpressions {
     add_to<F>(slot, row.states, end, c, whole);
   }
 
-  /// Volumes that shine have.
+  /// Adds emission of volumes to the paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void add_glow(const UInt<F>& slot, const Color<F>& c,
                                              const Mask<F>& active) const {
@@ -135,8 +138,8 @@ class PathExpressions {
     add_to<F>(slot, states, UInt<F>(end_of_light_[lights_ + 1]), c, active);
   }
 
-  /// A vertex was shaded: `v` says how it scatters. `has_shadow`: where a light sample is under
-  /// way.
+  /// Records a shaded vertex, whose scatterings `v` classifies. `has_shadow` marks the lanes with a
+  /// light sample.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void scatter(uint32_t depth, const UInt<F>& slot,
                                             const SampleKey<F>& key, const VertexAovs<F>& v,
@@ -157,7 +160,7 @@ class PathExpressions {
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
 
-  /// The paths have walked through what scatters within a mesh.
+  /// Records a random walk through a medium inside a mesh.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void walk(const UInt<F>& slot, const Mask<F>& active) const {
     using U = UInt<F>;
@@ -168,7 +171,7 @@ class PathExpressions {
     store_row<ExpressionRow, F>(rows_.floats(0), slot, row, active);
   }
 
-  /// The light sample under way has brought `c`.
+  /// Adds the contribution `c` of the current light sample.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void add_lit(const UInt<F>& slot, const Color<F>& c,
                                             const Mask<F>& active) const {
@@ -184,18 +187,18 @@ class PathExpressions {
     add_part(kGlossyEvent, c - diffuse);
   }
 
-  /// The states of paths.
+  /// Returns the automaton states of the paths.
   template <typename F>
   UInt<F> states(const UInt<F>& slot, const Mask<F>& active) const {
     return load_row<ExpressionRow, F>(rows_.floats(0), slot, active).states;
   }
-  /// The state after a scattering.
+  /// Returns the state after a scattering.
   template <typename F>
   UInt<F> next(const UInt<F>& state, const UInt<F>& event, const UInt<F>& lobe,
                const Mask<F>& active) const {
     return ColourStates::next<F>(automaton_->next.data(), state, event, lobe, active);
   }
-  /// Adds light of a colour to the expressions in `matched`.
+  /// Adds light of one colour to the expressions whose bits are set in `matched`.
   template <typename F>
   void add_matched(const UInt<F>& slot, uint32_t colour, const UInt<F>& matched, const F& value,
                    const Mask<F>& active) const {
@@ -210,8 +213,9 @@ class PathExpressions {
   }
 
  private:
-  /// Adds what a bounce has met of lights with multipliers: each of its two lobes gets what that
-  /// light gives to it, so that they add up to `c`. Where it was so.
+  /// Adds the emission that a bounce hits, for lights whose two multipliers differ. Splits `c`
+  /// between the diffuse and glossy lobes of the bounce in proportion to their contributions.
+  /// Returns the lanes with such lights.
   template <typename F>
   [[gnu::noinline, gnu::cold]] Mask<F> add_by_parts(const UInt<F>& slot,
                                                     const ExpressionRow<F>& row,
@@ -238,7 +242,7 @@ class PathExpressions {
     add_part(kGlossyEvent, c - diffuse);
     return here;
   }
-  /// The same of the states of all colours.
+  /// Returns the states of all three colours after a scattering.
   template <typename F>
   UInt<F> next_of_all(const UInt<F>& states, const UInt<F>& event, const UInt<F>& lobe,
                       const Mask<F>& active) const {
@@ -254,7 +258,7 @@ class PathExpressions {
     return gather<U>(end_of_light_, select(Mask<U>(light == U(kNoLight)), U(lights_), light),
                      Mask<U>(active));
   }
-  /// Adds `c`, colour by colour, to the expressions that hold what ends so in such states.
+  /// Adds `c`, colour by colour, to the expressions that match the states and the path end `end`.
   template <typename F>
   void add_to(const UInt<F>& slot, const UInt<F>& states, const UInt<F>& end, const Color<F>& c,
               const Mask<F>& active) const {

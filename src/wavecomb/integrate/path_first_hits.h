@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What camera rays have met, for AOVs, before it is shaded.
+/// First hits of camera rays for AOVs, recorded before shading.
 #pragma once
 
 #include <limits>
@@ -10,11 +10,13 @@
 
 namespace wavecomb {
 
-/// Contract: part of a PathAovs; slots below the capacity.
+/// AOV rows of camera rays and their first hits.
+///
+/// Contract: used only as a base of PathAovs. Slots must be below the capacity.
 class PathFirstHits {
  public:
   PathFirstHits() = default;
-  /// `tables` may be null where nothing of `set` needs them.
+  /// Allocates the rows that `set` needs. `tables` may be null if nothing in `set` needs them.
   PathFirstHits(size_t capacity, const AovSet& set, const AovTables* tables)
       : names_(tables), transmits_(set.has(Aov::kTransmittance)) {
     const auto rows = [&](SlotRows& block, bool wanted, size_t words) {
@@ -28,7 +30,7 @@ class PathFirstHits {
     rows(alpha_, set.has(Aov::kAlpha), 1);
   }
 
-  /// The camera ray of numbers `r` starts.
+  /// Starts camera rays with the sample values `r`.
   template <typename F>
   void begin(const CameraSetup& camera, const Sample4<F>& r, const UInt<F>& slot,
              const Mask<F>& active) const {
@@ -37,13 +39,13 @@ class PathFirstHits {
 
   bool wants_hits() const { return hits_ || depth_ || end_; }
   bool wants_alpha() const { return bool(alpha_); }
-  /// The camera's rays of the active lanes have met something that covers what is behind.
+  /// Sets alpha to 1 for the active lanes' paths.
   template <typename F>
   void cover(const UInt<F>& slot, const Mask<F>& active) const {
     wavecomb::scatter<F>(alpha_.rows, F(1.f), slot, active);
   }
 
-  /// The camera's ray has met the shape of light `light` at `p`.
+  /// Records a camera ray that hits the shape of light `light` at `p`.
   template <typename F>
   void hit_light(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
                  const UInt<F>& light, const Mask<F>& active) const {
@@ -57,7 +59,7 @@ class PathFirstHits {
                               active);
   }
 
-  /// The camera's ray has met geometry `geom` of instance `inst` at `p`.
+  /// Records a camera ray that hits geometry `geom` of instance `inst` at `p`.
   template <typename F>
   void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
                    const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& material,
@@ -72,14 +74,14 @@ class PathFirstHits {
   }
 
   bool wants_motion() const { return bool(motion_); }
-  /// What the camera's ray has met moves so far about the picture (screen_motion.h).
+  /// Records the screen motion of the first hit, in pixels (screen_motion.h).
   template <typename F>
   void move(const UInt<F>& slot, const Vec2<F>& pixels, const Mask<F>& active) const {
     scatter_words<F>(motion_.rows, pixels, slot * 2u, active);
   }
 
-  /// A volume has stopped the camera's ray at `p`: `seen`. There is no surface whose place, depth
-  /// and instance could be told.
+  /// Records a camera ray that a volume stops at `p`. Volumes have no position, depth and instance
+  /// AOVs.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void hit_volume(const CameraSetup& camera, const UInt<F>& slot,
                                                const Vec3<F>& p, const F& time,
@@ -95,8 +97,7 @@ class PathFirstHits {
         active);
   }
   bool wants_transmittance() const { return transmits_; }
-  /// So much of what is behind comes through volumes along the camera's ray, if only what comes
-  /// through counts.
+  /// Records the transmittance `through` of volumes along the camera ray; 0 if the path scattered.
   template <typename F>
   void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
     scatter_words<F>(end_.rows, through, slot * uint32_t{kRowWords<RayEndRow>} + 2u, active);
@@ -109,7 +110,7 @@ class PathFirstHits {
       n += block->bytes();
     return n;
   }
-  /// Forgets the paths in slots below `slots`.
+  /// Clears the slots below `slots`.
   void clear_hits(size_t slots) const {
     alpha_.zero(slots);
     motion_.zero(slots);
@@ -124,19 +125,20 @@ class PathFirstHits {
   }
 
   SlotRows depth_, end_, hits_;
-  SlotRows motion_;  ///< pixels, x and y
-  SlotRows centre_;  ///< squared distance of the sample from the pixel's centre, pixels
-  SlotRows alpha_;   ///< 1 where the camera's ray has met something that covers
+  SlotRows motion_;  ///< in pixels, x and y
+  SlotRows centre_;  ///< squared distance of the sample from the pixel's centre, in pixels
+  SlotRows alpha_;   ///< 1 if the camera ray hit something opaque
 
  private:
-  /// How deep the camera's ray went, and whether a volume has stopped it: the head of RayEndRow.
+  /// Stores the depth of the ray's end, and whether a volume stopped it, in the first two words of
+  /// RayEndRow.
   template <typename F>
   void scatter_ray_end(const UInt<F>& slot, const F& depth, const F& in_volume,
                        const Mask<F>& active) const {
     const UInt<F> at = slot * uint32_t{kRowWords<RayEndRow>};
     scatter_words<F>(end_.rows, Vec2<F>{depth, in_volume}, at, active);
   }
-  /// Distance along the camera's axis, of a surface.
+  /// Stores the depth of a surface along the camera's axis.
   template <typename F>
   void store_depth(const UInt<F>& slot, const F& depth, const Mask<F>& active) const {
     if (depth_) scatter<F>(depth_.rows, depth, slot, active);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The vertices of paths, kept until a path ends: what learns from whole paths reads them, such as
-/// how much light came back along a bounce,
+/// Vertices of paths, stored until the path ends. Training reads them, for example to estimate the
+/// incident radiance along a bounce,
 ///   L_j = (R_end - R_j) / T_j
-/// where R_j is what the path had brought when it left vertex j, and T_j its throughput then.
+/// where R_j is the radiance of the path after the light sample of vertex j, and T_j the throughput
+/// after the bounce.
 ///
-/// Both integrators own one and tell it what happens to a path. Where nobody asks for vertices it
-/// is empty, and no path pays for it.
+/// Both integrators own a PathHistory and report vertices to it. It is empty and costs nothing if
+/// no HistoryReader is set.
 #pragma once
 
 #include <algorithm>
@@ -19,26 +20,28 @@
 
 namespace wavecomb {
 
-/// A vertex, and the bounce with which the path left it.
+/// Vertex of a path, and the bounce with which the path left it.
 template <typename F>
 struct HistoryRow {
   Vec3<F> p;
   Vec3<F> wi;           ///< direction of the bounce
-  Color<F> throughput;  ///< T_j; 0 where the path ended here
-  F pdf;                ///< of wi over solid angle; 0: delta
-  Color<F> radiance;    ///< R_j: with the light sample of this vertex
+  Color<F> throughput;  ///< T_j; 0 if the path ended here
+  F pdf;                ///< solid angle density of wi; 0 for a delta bounce
+  Color<F> radiance;    ///< R_j, including the light sample of this vertex
   UInt<F> material;
-  // Where bounces are guided, or to be (Vertex::guide):
+  // Only with a guiding field, or one in training (Vertex::guide):
   UInt<F> axis;  ///< guide_axis of the surface
-  F bsdf_pdf;    ///< of wi by the BSDF alone
+  F bsdf_pdf;    ///< solid angle density of wi by the BSDF alone
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
 
-/// Contract: owned by one wave, or one reference integrator; slots below the capacity.
+/// Stored vertices of the paths of a wave.
+///
+/// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
 class PathHistory {
  public:
   PathHistory() = default;
-  /// Room for the first `most` vertices of each path.
+  /// Allocates room for the first `most` vertices of each path.
   PathHistory(size_t capacity, uint32_t most)
       : most_(most),
         rows_(most ? SoaBlock(1, capacity * most * kRowWords<HistoryRow>) : SoaBlock()),
@@ -48,13 +51,14 @@ class PathHistory {
   uint32_t most() const { return most_; }
   size_t bytes() const { return rows_.bytes() + counts_.bytes(); }
 
-  /// Forgets the paths in slots below `slots`.
+  /// Clears the slots below `slots`.
   void clear(size_t slots) {
     if (most_ > 0) std::memset(counts_.uints(0), 0, slots * sizeof(uint32_t));
   }
 
-  /// A vertex was shaded: the path in each active lane's slot came as `path` over a length of `t`,
-  /// has brought what `radiance` (of the PathPool) says, and leaves as `v` says.
+  /// Stores a shaded vertex of the path in each active lane's slot. The path arrived as `path` with
+  /// a ray of length `t` and leaves as `v`; `radiance` holds the RadianceRow of each slot
+  /// (PathPool::radiance).
   template <typename F>
   [[gnu::noinline, gnu::cold]] void vertex(uint32_t depth, const UInt<F>& slot,
                                            const PathState<F>& path, const F& t,
@@ -72,7 +76,7 @@ class PathHistory {
     scatter<UInt<F>>(counts_.uints(0), UInt<F>(depth + 1), slot, Mask<UInt<F>>(active));
   }
 
-  /// The light sample of the vertex of `depth` has brought `c`.
+  /// Adds the contribution `c` of the light sample to the vertex at `depth`.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void light(uint32_t depth, const UInt<F>& slot, const Color<F>& c,
                                           const Mask<F>& active) {
@@ -83,9 +87,9 @@ class PathHistory {
     store_row<HistoryRow, F>(rows_.floats(0), row, r, active);
   }
 
-  /// Vertices kept of a path, at most `most`.
+  /// Returns the number of stored vertices of a path, at most `most`.
   uint32_t count(uint32_t slot) const { return counts_.uints(0)[slot]; }
-  /// Its vertex of `depth`, below count(slot).
+  /// Returns the vertex at `depth`, which must be below count(slot).
   HistoryRow<float> vertex(uint32_t slot, uint32_t depth) const {
     return load_row<HistoryRow, float>(rows_.floats(0), slot * most_ + depth, true);
   }
@@ -95,18 +99,19 @@ class PathHistory {
   SoaBlock rows_, counts_;
 };
 
-/// Gets the vertices of paths that have ended.
+/// Receiver of the vertices of finished paths.
 ///
-/// Contract: called by all workers at once, once a wave (by the reference integrator once a path);
-/// what is handed over holds only during the call. Sums that are the same for every schedule are
-/// sums of integers (core/fixed_point.h).
+/// Contract: all workers call it concurrently, once for each wave (the reference integrator once
+/// for each path). The arguments are valid only during the call. Sums must be integers to be equal
+/// for every schedule (core/fixed_point.h).
 class HistoryReader {
  public:
   virtual ~HistoryReader() = default;
-  /// Vertices wanted of each path.
+  /// Returns the number of vertices to store for each path.
   virtual uint32_t most() const = 0;
-  /// The paths of `task`: slot i is sample first_sample + i % samples of pixel i / samples of it.
-  /// `radiance`: RadianceRow of each, before the camera's exposure.
+  /// Receives the paths of `task`. Slot i holds sample first_sample + i % samples of the task's
+  /// pixel i / samples. `radiance` holds the RadianceRow of each slot, before the camera's
+  /// exposure.
   virtual void ended(const PathHistory& history, const float* radiance, const WaveTask& task) = 0;
 };
 

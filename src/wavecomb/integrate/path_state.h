@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What paths carry from vertex to vertex, and what the steps of a vertex (steps/) are given and
-/// give.
+/// State that a path carries from vertex to vertex, and the inputs and outputs of the steps of a
+/// vertex (steps/).
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -17,24 +17,24 @@
 
 namespace wavecomb {
 
-/// The settings that shading reads.
+/// Render settings that shading reads.
 struct ShadeSettings {
   SamplerKind sampler;
   uint32_t max_depth;
-  bool roulette;    ///< by throughput, after a vertex
-  bool cost_aware;  ///< by throughput and cost, before a vertex
-  bool efficient;   ///< by what is expected to come back, after a vertex, where that was learned
+  bool roulette;    ///< roulette by throughput, after a vertex
+  bool cost_aware;  ///< roulette by throughput and cost, before a vertex
+  bool efficient;   ///< roulette by learned expected contribution, after a vertex
   uint32_t roulette_depth;
-  float clamp_indirect;  ///< 0: off
+  float clamp_indirect;  ///< largest luminance of indirect contributions; 0 disables clamping
   bool schlick_fresnel;
   bool cosine_sampling;
   bool filters_textures_whole;
-  bool shows_sky;  ///< to the camera itself: domes and distant lights
-  bool connects;   ///< vertices of camera paths and of paths from lights, where those are joined
-  bool joins_light = false;  ///< paths from lights share in the weights of camera paths
-  /// Radius within which vertices are merged, over the width of a path's cone; 0: none are.
+  bool shows_sky;            ///< whether camera rays show domes and distant lights
+  bool connects;             ///< whether vertices of camera paths and light paths are connected
+  bool joins_light = false;  ///< whether MIS weights of camera paths include light paths
+  /// Merge radius divided by the width of the path's ray cone. 0 disables merging.
   float merge_scale = 0;
-  float light_paths = 0;  ///< that a sample has, where vertices are merged
+  float light_paths = 0;  ///< light paths in the image per sample, if merged
 
   explicit ShadeSettings(const Settings& s)
       : sampler(s.sampler),
@@ -50,10 +50,12 @@ struct ShadeSettings {
         shows_sky(!s.alpha),
         connects(s.connects()) {}
 
-  /// Whether paths that leave the scene after `depth` vertices see what is around it.
+  /// Returns whether a path that leaves the scene after `depth` vertices adds the environment's
+  /// light.
   bool sees_sky(uint32_t depth) const { return shows_sky || depth > 0; }
 
-  /// For paths from lights, whose every vertex the camera looks at.
+  /// Returns the settings for light paths, which filter textures at every vertex, since each vertex
+  /// is connected to the camera.
   ShadeSettings of_light_paths() const {
     ShadeSettings s = *this;
     s.filters_textures_whole = true;
@@ -61,30 +63,35 @@ struct ShadeSettings {
   }
 };
 
-/// What a path carries from vertex to vertex. `dir` is the ray that arrived; the cone is at the
-/// hit.
+/// State of a path at a vertex. `dir` is the direction of the ray that arrived, and the ray cone is
+/// given at the hit.
 template <typename F>
 struct PathState {
   Vec3<F> dir;
   Color<F> throughput;
-  F pdf;  ///< of the bounce before; 0: delta or camera; less: it led below a surface
+  /// Density of the previous bounce; 0 for a delta bounce or camera ray; negative if the bounce
+  /// entered a subsurface body.
+  F pdf;
   F eta_scale;
   F cone_width, cone_spread;
   Vec3<F> o;          ///< origin of the ray that arrived
-  UInt<F> receiver;   ///< LightReceiver::normal of the vertex before
-  UInt<F> link{0u};   ///< class of the surface that the ray left, where lights are linked
-  F importance{0.f};  ///< one over the brightness of the picture at the pixel; 0: not known
-  F ratio{0.f};       ///< steps/join.h; 0: no path from a light could be this one; less: only
-                      ///< deltas so far, which merging waits behind. Of a path from a light:
-                      ///< density of the bounce before, 0 where it was none to connect to
-  // Where paths know what they are inside of (InsideRow):
+  UInt<F> receiver;   ///< LightReceiver::normal of the previous vertex
+  UInt<F> link{0u};   ///< link class of the surface that the ray left, if lights are linked
+  F importance{0.f};  ///< one over the brightness of the image at the pixel; 0 if unknown
+  /// For camera paths, the ratio R of steps/join.h. It is 0 if no light path can produce this path,
+  /// and negative if all bounces so far were deltas and the path waits for a vertex to merge at.
+  /// For light paths, the density of the previous bounce, or 0 if the previous vertex cannot be
+  /// connected.
+  F ratio{0.f};
+  // Only for scenes with nested dielectrics (InsideRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
-  UInt<F> medium{0u};  ///< what collides, by material
-  F time{0.5f};        ///< of the shutter, where lights move
-  /// Share of what the bounce before scatters that is diffuse, where lights have multipliers.
+  UInt<F> medium{0u};  ///< material whose medium scatters here
+  F time{0.5f};        ///< shutter time, if lights move
+  /// Diffuse fraction of the previous bounce, by colour, if lights have diffuse and specular
+  /// multipliers.
   Color<F> diffuse{F(0.f)};
 
-  /// How dense paths from lights are over this one.
+  /// Returns the density of light paths relative to this camera path: max(R, 0) of steps/join.h.
   F joined() const { return max(ratio, F(0.f)); }
   LightReceiver<F> vertex_before() const {
     LightReceiver<F> from(o, receiver);
@@ -93,27 +100,27 @@ struct PathState {
   }
 };
 
-/// What shading a vertex gives. Lanes outside the masks hold anything.
+/// Output of shading one vertex. Values of lanes outside the masks are undefined.
 template <typename F>
 struct VertexResult {
-  Color<F> emitted;    ///< to add to the path's radiance, clamped
-  Mask<F> has_shadow;  ///< a shadow ray is wanted
+  Color<F> emitted;    ///< emission to add to the path's radiance, already clamped
+  Mask<F> has_shadow;  ///< whether the vertex casts a shadow ray
   Vec3<F> shadow_o, shadow_d;
   F shadow_tfar;
-  UInt<F> shadow_set;  ///< of shadow_set, 0 where nothing is linked
-  Color<F> direct;     ///< to add where the shadow ray is free, clamped
-  Color<F> shade;      ///< share of it to add where it is not, where shadows have a colour
-  Mask<F> alive;       ///< the path goes on
-  PathState<F> next;   ///< the next ray and what goes with it
-  // For who learns, where Vertex::guide is there: guide_axis of the surface, and the density of the
-  // bounce by the BSDF alone.
+  UInt<F> shadow_set;  ///< result of shadow_set(); 0 without light linking
+  Color<F> direct;     ///< contribution if the shadow ray is free, already clamped
+  Color<F> shade;     ///< fraction of `direct` that remains if the shadow ray is blocked, by colour
+  Mask<F> alive;      ///< whether the path continues
+  PathState<F> next;  ///< ray and state of the next path segment
+  // For training of the guiding field, if Vertex::guide is set: guide_axis of the surface, and
+  // density of the bounce by the BSDF alone.
   UInt<F> axis;
   F bsdf_pdf;
-  UInt<F> crossed;  ///< InsideRow::crossed, where paths know what they are inside of
+  UInt<F> crossed;  ///< InsideRow::crossed, if the scene has nested dielectrics
 };
 
-/// What a scattering does: its kind, a PathEvent, and what share of it is diffuse, by colour. What
-/// is not is glossy, or of a mirror.
+/// Classification of a scattering for light path expressions: its PathEvent, and its diffuse
+/// fraction by colour. The rest is glossy, or specular if `is_delta`.
 template <typename F>
 struct ScatteringNote {
   UInt<F> event{0u};
@@ -121,43 +128,44 @@ struct ScatteringNote {
   Mask<F> is_delta{false};
 };
 
-/// What AOVs take from a vertex. Written to at once rather than returned: most vertices have none,
-/// and values that live to the end of shading cost registers.
+/// AOV values of a vertex. The steps write them directly instead of returning them, since most
+/// vertices have none, and values that live until the end of shading would occupy registers.
 template <typename F>
 struct VertexAovs {
-  /// Asked for; the others are always given.
+  /// Requested values. All fields without a flag here are always written.
   bool wants_uv = false, wants_lights = false, wants_bounces = false;
-  bool wants_events = false;  ///< and what scatters; goes with wants_lights
+  bool wants_events = false;  ///< classifies scatterings; implies wants_lights
   Color<F> albedo;
   Vec3<F> normal;
-  Mask<F> is_clear;  ///< nothing but what is mirrored or refracted is seen here
+  Mask<F> is_clear;  ///< whether the surface has only delta lobes, such as a mirror or glass
   Vec2<F> uv;
-  UInt<F> emitter, lit_by;  ///< lights behind `emitted` and `direct`, or kNoLight
-  // With wants_lights: where a light was chosen for, and the MIS weight in `direct`; weight -1: no
-  // choice was made.
+  UInt<F> emitter, lit_by;  ///< lights that contribute `emitted` and `direct`, or kNoLight
+  // With wants_lights: the position from which a light was sampled, and the MIS weight that
+  // `direct` contains. A weight of -1 means that no light was sampled.
   Vec3<F> lit_at;
   F light_weight;
-  // With wants_events: of light from the light sample and along the bounce, how it is scattered
-  // here (steps/note_events.h).
+  // With wants_events: classification of the scattering of the light sample and of the bounce
+  // (steps/note_events.h).
   ScatteringNote<F> lit, bounce;
-  // With wants_bounces: with which probability the field chose the bounce's direction, and with
-  // which roulette lets it go on; survival -1: there was no bounce.
+  // With wants_bounces: the probability that the guiding field sampled the direction of the bounce,
+  // and the survival probability of roulette. A survival of -1 means that there was no bounce.
   F guided, survival;
 };
 
-/// What guides a denoiser.
+/// Auxiliary albedo and normal for a denoiser.
 template <typename F>
 struct Guides {
   Color<F> albedo;
   Vec3<F> normal;
 };
 
-/// That of a path that has reached a vertex: albedo, tinted by the mirrors and glass before it, and
-/// normal. Both are replaced by the next vertex where this one is clear.
+/// Returns the denoiser inputs at a vertex: albedo, tinted by the mirrors and glass before it, and
+/// normal. If the vertex is clear, the next vertex replaces both.
 template <typename F>
 inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
   const auto tinted = [&](const F& albedo, const F& throughput) {
-    // Without the scaling of radiance by indices of refraction; roulette may have made it larger.
+    // eta_scale removes the radiance scaling at refractions. The minimum is needed because roulette
+    // may have increased the throughput.
     return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
   };
   return {{tinted(v.albedo.x, path.throughput.x), tinted(v.albedo.y, path.throughput.y),
@@ -165,17 +173,19 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
           v.normal};
 }
 
-/// A vertex of a camera path that may connect to one of a path from a light.
+/// Connection that a vertex of a camera path offers to a vertex of a light path.
 template <typename F>
 struct ConnectionOffer {
-  Vec3<F> to;                ///< the vertex from the light
-  F vertices;                ///< LightVertexRow::vertices
-  Mask<F> wanted;            ///< there is one, and it is not too far from the camera
-  ConnectionRow<F> row;      ///< to be filled in; black where `wanted` is false
-  ScatteringNote<F> note{};  ///< likewise, where events are wanted
+  Vec3<F> to;      ///< position of the light path's vertex
+  F vertices;      ///< LightVertexRow::vertices
+  Mask<F> wanted;  ///< whether such a vertex exists and the path would not exceed the maximum depth
+  ConnectionRow<F> row;  ///< output; black where `wanted` is false
+  /// Output, if light path expressions are active; undefined where `wanted` is false.
+  ScatteringNote<F> note{};
 };
 
-/// The offer of the vertex at `depth` of paths in `slot` to the vertices kept there: black so far.
+/// Returns the offer of camera paths in `slot`, at `depth`, to the light path vertices chosen for
+/// these slots. Its contribution is still black.
 template <typename F>
 inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
                                     uint32_t max_depth, const Mask<F>& active) {
@@ -188,9 +198,10 @@ inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& sl
           {none, F(0.f), none, F(0.f)}};
 }
 
-/// What all steps of a vertex are told of it. `depth` 0 is the first one; `t` is the length of the
-/// ray that led there. `hit` and `geom` (geometry within the instance's group) are of a surface;
-/// where the vertex is on none, `hit.inst` is kNoSurface. `kFeatures` is what the kernel knows of.
+/// Input of all steps of a vertex. `depth` is 0 at the first vertex, and `t` is the length of the
+/// ray that arrived. `hit` and `geom` (the geometry within the instance's group) describe a
+/// surface; at a vertex in a volume `hit.inst` is kNoSurface. `kFeatures` is the set of features
+/// that the kernel is compiled for.
 template <typename F, uint32_t kFeatures = kEverything>
 struct Vertex {
   const SceneView& scene;
@@ -202,14 +213,14 @@ struct Vertex {
   const F& t;
   const UInt<F>& material;
   const PathState<F>& path;
-  VertexAovs<F>* aovs;  ///< null where none are wanted
+  VertexAovs<F>* aovs;  ///< null if no AOV needs the vertex
   const Mask<F>& active;
-  const GuideView* guide = nullptr;     ///< the field that guides bounces, or is to be learned
-  ConnectionOffer<F>* offer = nullptr;  ///< null where nothing is connected
-  VisibleOffer<F>* visible = nullptr;   ///< null where nothing is merged
+  const GuideView* guide = nullptr;     ///< guiding field that guides bounces or is in training
+  ConnectionOffer<F>* offer = nullptr;  ///< null without connections
+  VisibleOffer<F>* visible = nullptr;   ///< null without merging
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
-  /// What AOVs are to be given; null where nothing is.
+  /// Returns the AOV values to write, or null.
   VertexAovs<F>* notes() const { return has(kNotes) ? aovs : nullptr; }
   bool joins_light() const { return has(kJoined) && settings.joins_light; }
   bool wants_lights() const { return notes() && aovs->wants_lights; }
@@ -219,11 +230,12 @@ struct Vertex {
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 
-/// A shadow ray ends at this share of the way to the light, and so before its surface.
+/// Length of a shadow ray as a fraction of the distance to the light, so that the ray ends before
+/// the light's surface.
 inline constexpr float kShadowReach = 0.9999f;
 
-/// c scaled down so that its luminance is at most `limit`; unchanged for limit 0 (off) and
-/// NaN-free: a contribution that is not finite is dropped.
+/// Returns `c`, scaled down to a luminance of at most `limit` (0 means no limit). Returns black if
+/// `c` is not finite.
 template <typename F>
 inline Color<F> clean(const Color<F>& c, float limit) {
   const Mask<F> ok = is_finite(c.x) & is_finite(c.y) & is_finite(c.z);
@@ -235,22 +247,22 @@ inline Color<F> clean(const Color<F>& c, float limit) {
   return r;
 }
 
-/// The limit for a contribution that light brings after `bounces` scatterings: direct light is
-/// free.
+/// Returns the luminance limit of a contribution after `bounces` scatterings. Direct light has
+/// none.
 inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
   return bounces > 1 ? s.clamp_indirect : 0.f;
 }
 
-/// Where geometry `geom` of instance `inst` is in the arrays that have an entry for each of an
-/// instance's geometries.
+/// Returns the index of geometry `geom` of instance `inst` in arrays that have one entry for each
+/// geometry of each instance.
 template <typename F>
 inline UInt<F> placed_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                                const Mask<F>& active) {
   return gather_member<F>(scene.instances, &InstanceRecord::emissive, inst, active) + geom;
 }
 
-/// Lanes whose camera ray ends at geometry `geom` of instance `inst` and brings nothing, where
-/// visibility is told.
+/// Returns the lanes whose camera ray hits a holdout, which is black and has alpha 0. Requires
+/// scene.visibility.
 template <typename F>
 inline Mask<F> held_out(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                         const Mask<F>& active) {
@@ -260,7 +272,7 @@ inline Mask<F> held_out(const SceneView& scene, const UInt<F>& inst, const UInt<
   return active & Mask<F>((seen & static_cast<uint32_t>(kHeldOut)) != U(0u));
 }
 
-/// The class that linking knows geometry `geom` of instance `inst` by.
+/// Returns the link class of geometry `geom` of instance `inst`.
 template <typename F>
 inline UInt<F> link_class(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                           const Mask<F>& active) {

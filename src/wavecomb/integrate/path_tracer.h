@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Path tracing by the reference integrator: one path after the other, in scalars.
+/// Scalar path tracer of the reference integrator, which traces one path after the other.
 #pragma once
 
 #include <utility>
@@ -22,7 +22,8 @@
 
 namespace wavecomb {
 
-/// Traces paths one after the other, each depth first, through what lies between surfaces.
+/// Traces camera paths one at a time and depth first. `Media` samples the volumes, media and
+/// subsurface random walks between mesh surfaces (integrate/media.h).
 template <typename Media>
 class PathTracer {
   using F = float;
@@ -41,8 +42,8 @@ class PathTracer {
         vertices_(worker.light_vertices),
         visible_(worker.visible) {}
 
-  /// Radiance of the path of a task of one, as the camera's exposure shows it; what else it found
-  /// is in the AOVs' slot 0.
+  /// Traces the path of `task`, which has one pixel and one sample, and returns its radiance times
+  /// the camera's exposure. Slot 0 of the worker's AOVs then holds the AOVs of the path.
   Color<F> exposed_path(const WaveTask& task) {
     aovs_.clear(1);
     history_.clear(1);
@@ -58,7 +59,7 @@ class PathTracer {
     }
     return radiance_.sum;
   }
-  /// Traces a path of which nothing is wanted but choices of lights.
+  /// Traces a path only to record the lights that its vertices sample, as path `path` of `out`.
   void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
     probes_ = {out.probes.data() + path * out.most, out.most};
     probe_count_ = 0;
@@ -71,7 +72,8 @@ class PathTracer {
   const float* radiance() const { return reinterpret_cast<const float*>(&radiance_); }
 
  private:
-  /// Gives the first depth whose light is not yet a part of its own.
+  /// Traces one camera path. Returns the first depth for which end_depth() has not stored the
+  /// radiance.
   uint32_t trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, context_.settings->seed);
@@ -201,8 +203,9 @@ class PathTracer {
     }
   }
 
-  /// Walks on from a ray that led below a surface; false: nothing comes of it. What meets no
-  /// surface of the object that it left goes on as it was.
+  /// Continues a ray that has entered a subsurface body (negative `path.pdf`) as a random walk. A
+  /// ray that hits no surface of that body continues unchanged. Sets `came_out` if the walk has
+  /// left the body. Returns false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& came_out) {
     path.pdf = -path.pdf;
@@ -215,7 +218,7 @@ class PathTracer {
     return true;
   }
 
-  /// What becomes of a path on its way to `hit`.
+  /// Samples the free flight of a path along its ray segment to `hit`.
   Flight<F> fly(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
     if constexpr (Media::kStreams)
       if (context_.knows_inside())
@@ -235,25 +238,27 @@ class PathTracer {
                                v.next.receiver};
   }
 
-  /// Light `light`, or kNoLight, has brought `c`.
+  /// Adds the contribution `c` of `light` to the radiance. `light` is kNoLight for emission of
+  /// other surfaces.
   void add(uint32_t light, const Color<F>& c) {
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_light<F>(kSlot, light, c, true);
   }
 
-  /// A volume that shines has.
+  /// Adds the emission `c` of volumes to the radiance.
   void add_glow(const Color<F>& c) {
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_glow<F>(kSlot, c, true);
   }
-  /// Tells AOVs how the path, whose throughput is now `throughput`, has come.
+  /// Records the ray segment for AOVs. `throughput` is the throughput of the path after the flight.
   void note_way(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
     const bool straight = !flight.stopped && !flight.walked;
     if (depth == 0 && aovs_.wants_transmittance())
       aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
     if (aovs_.expressions() && flight.walked) aovs_.expressions().walk<F>(kSlot, true);
   }
-  /// What has stopped the path.
+  /// Returns the volume, or the mesh filled with a medium, whose event `material` has stopped the
+  /// path.
   VolumeSeen<F> volume_seen(uint32_t material) const {
     const SceneView& scene = context_.scene;
     if (context_.knows_inside() && material == scene.interiors.event_material)
@@ -261,8 +266,9 @@ class PathTracer {
     return {material - scene.volumes.first_material, 0, material, false};
   }
 
-  /// What the shadow ray of `v` brings, of a light of `group`: as much as comes through volumes,
-  /// if it is free and through what fills meshes, else as the shadow's colour leaves of that.
+  /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate it, and
+  /// media inside meshes do if the shadow ray is free. If an object blocks the ray, only the
+  /// fraction v.shade (the shadow colour of the light) remains.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;
@@ -300,7 +306,7 @@ class PathTracer {
     return v;
   }
 
-  /// Connects the vertex at `depth` to that of the path from the light.
+  /// Connects the vertex at `depth` of the camera path to the chosen vertex of the light path.
   void connect(uint32_t depth) {
     clock_.enter(Phase::kShade);
     const SceneView& scene = context_.scene;
@@ -345,12 +351,12 @@ class PathTracer {
   PathAovs& aovs_;
   PathHistory& history_;
   LightPathAovs& light_aovs_;
-  LightVertices& vertices_;     ///< that of the path from the light, where it is connected
-  const VisibleRows& visible_;  ///< the point that the path leaves
-  ConnectionOffer<F> offer_;    ///< of the vertex, with it
+  LightVertices& vertices_;     ///< vertices of the light path; empty without connections
+  const VisibleRows& visible_;  ///< point where light paths may be merged
+  ConnectionOffer<F> offer_;    ///< connection that the current vertex offers
   RadianceRow<F> radiance_;
-  InsideRow<F> inside_{};         ///< where paths know what they are inside of
-  std::span<LightProbe> probes_;  ///< of the path; empty: none are wanted
+  InsideRow<F> inside_{};         ///< medium stack of the path, if the scene has nested dielectrics
+  std::span<LightProbe> probes_;  ///< sampled lights of the path; empty if unused
   uint32_t probe_count_ = 0;
 };
 

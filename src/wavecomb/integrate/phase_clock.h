@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where a worker's time goes.
+/// Time that a worker spends in each phase.
 #pragma once
 
 #include <array>
@@ -18,15 +18,15 @@ enum class Phase : uint8_t {
   kShade,
   kShadow,
   kResolve,
-  kMetrics,  ///< looking at what the others did; part of no picture
+  kMetrics,  ///< measuring the other phases; not part of rendering
 };
 inline constexpr size_t kPhaseCount = 10;
 inline constexpr const char* kPhaseNames[kPhaseCount] = {
     "generate",    "order_rays", "trace",  "keys",    "sort",
     "materialize", "shade",      "shadow", "resolve", "metrics"};
 
-/// Exclusive phases: entering one ends the one before, so that phases add up to the time between
-/// start() and stop(). Read per batch of work, never per ray.
+/// Clock of exclusive phases: entering a phase ends the previous one, so that all phases add up to
+/// the time between start() and stop(). Used once per batch of work, never per ray.
 class PhaseClock {
  public:
   using Clock = std::chrono::steady_clock;

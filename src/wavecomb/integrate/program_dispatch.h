@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The kernels of all programs by the program's id. Each is compiled in a separate unit
-/// (kernel_matrix.h); here they are known by name alone.
+/// Tables of the kernels of all programs, by program id. Each kernel is compiled in a separate unit
+/// (kernel_matrix.h); this header only declares them.
 #pragma once
 
 #include <array>
@@ -14,13 +14,13 @@
 
 namespace wavecomb {
 
-// In stages/shade_batch.h and vertex.h.
+// Defined in stages/shade_batch.h and vertex.h.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end);
 template <typename Bsdf, typename F, uint32_t kFeatures>
 VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v);
-// In stages/shade_light_batch.h and light_vertex.h.
+// Defined in stages/shade_light_batch.h and light_vertex.h.
 struct LightPathSetup;
 template <typename F>
 struct LightVertexResult;
@@ -38,14 +38,14 @@ template <typename F>
 using BatchKernels =
     std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything>), kVariantCount>;
 
-/// All variants of a program are the program.
+/// Uses the kernel of a program for all its variants.
 template <typename Kernels>
 constexpr Kernels for_variants(Kernels kernels) {
   for (uint32_t v = kProgramCount; v < kVariantCount; ++v)
     kernels[v] = kernels[static_cast<size_t>(program_of(v))];
   return kernels;
 }
-// Whatever lies between surfaces is not plain.
+// Programs of volume events have no plain kernels.
 template <size_t kVariant>
 inline constexpr bool kIsOfSurface =
     static_cast<size_t>(program_of(kVariant)) < kSurfaceProgramCount;
@@ -95,18 +95,18 @@ constexpr auto light_vertex_kernels(ProgramList<Bsdf...>) {
 }
 }  // namespace detail
 
-/// The kernels of the programs of a list: shade_batch, for the wave, by variant (all of a program
-/// are the program), and shade_vertex, for the reference, by ProgramId.
+/// Kernels of the programs of a list: shade_batch for waves, by variant (all variants of a program
+/// use its kernel), and shade_vertex for the reference integrator, by ProgramId.
 template <typename F, typename List>
 inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
 template <typename F, typename List>
 inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
-/// The same for paths from lights, for waves of any lanes.
+/// Kernels for light paths, for waves of any lane width.
 inline constexpr auto kShadeLightBatch =
     detail::light_batch_kernels<LightLanes>(Programs<LightLanes>{});
 template <typename F>
 inline constexpr auto kShadeLightVertex = detail::light_vertex_kernels<F>(Programs<F>{});
-/// Plain kernels by variant; only where kHasPlain.
+/// Plain kernels by variant. Only available if kHasPlain.
 template <typename F>
 inline constexpr auto kShadePlain =
     detail::plain_batch_kernels<F>(std::make_index_sequence<kVariantCount>());

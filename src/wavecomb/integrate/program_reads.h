@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What programs read of their materials: what readers of stages have to know of them.
+/// Material inputs that each shading program reads, for importers of USD stages.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 namespace wavecomb {
 
 struct ProgramReads {
-  uint32_t inputs = 0;  ///< bit i: Input i
+  uint32_t inputs = 0;  ///< bit i is set if the program reads Input i
   bool ior = false;
-  /// It has a class of parameters of its own, and is told more than UsdPreviewSurface can say.
+  /// Whether the program has parameters beyond those of UsdPreviewSurface.
   bool has_more = false;
 };
 
-/// As the unit of the program has it (program.lanes.cpp.in), so that a change in one program
-/// compiles no others.
+/// Defined in the program's compile unit (program.lanes.cpp.in), so that a change to one program
+/// recompiles no others.
 template <typename Bsdf>
 ProgramReads program_reads();
 

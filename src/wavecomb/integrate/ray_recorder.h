@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Where a render may leave the rays that it traces.
+/// Interface to record the rays that a render traces.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 
 namespace wavecomb {
 
-/// Gets the rays of every wave as they go to the accelerator: stage by stage, in traversal order.
+/// Receives the rays of every wave as they are traced: one call per wave stage, in traversal order.
 ///
-/// Contract: called by all workers at once, but by one at a time for a given `wave`, which is the
-/// address of the worker's buffers. The arrays hold only during the call. Called once a stage,
-/// never a ray; may allocate and throw, since it is there only while something is measured. The
-/// reference integrator, which traces rays one by one, does not call it.
+/// Contract: all workers call it concurrently, but calls with the same `wave`, the address of the
+/// worker's buffers, never overlap. The arrays are valid only during the call. It is called once
+/// per stage, not per ray, and may allocate and throw, since it serves measurements only. The
+/// reference integrator, which traces single rays, does not call it.
 class RayRecorder {
  public:
   virtual ~RayRecorder() = default;
-  /// Rays whose closest hits are asked for; depth 0, the camera's, begins a wave. `coherent`: as
-  /// EmbreeAccelerator is told.
+  /// Receives rays before their closest hits are found. Depth 0, the camera rays, starts a wave.
+  /// `coherent` is the hint for EmbreeAccelerator.
   virtual void closest(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) = 0;
-  /// Shadow rays from the hits of `depth`.
+  /// Receives the shadow rays from the hits at `depth`.
   virtual void occluded(const void* wave, const RaySpan& rays, uint32_t depth, bool coherent) = 0;
 };
 

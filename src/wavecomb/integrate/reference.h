@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The scalar integrator: one path after the other, depth first, without queues. It gives the same
-/// bits as the waves do, and is what they are held to.
+/// Scalar reference integrator: traces one path after the other, depth first and without queues.
+/// Waves must match its image bit for bit.
 #pragma once
 
 #include <memory>
@@ -27,27 +27,27 @@ class ReferenceIntegrator final : public Integrator {
   std::vector<std::unique_ptr<ReferenceWorker>> workers_;
 };
 
-/// What came of choosing a light for a vertex.
+/// Result of sampling a light at a vertex.
 struct LightProbe {
-  uint32_t light;  ///< kNoLight: the tree found none
-  /// Luminance that its sample brought the path, where nothing was in the way, and its MIS weight.
+  uint32_t light;  ///< kNoLight if the light tree selected none
+  /// Luminance of the contribution of an unblocked light sample, 0 if blocked, and its MIS weight.
   float value, weight;
-  float at[3];  ///< LightReceiver
+  float at[3];  ///< position of the LightReceiver
   uint32_t normal;
 };
 
-/// Choices of a light along paths, at most `most` a path.
+/// Lights that paths have sampled, at most `most` for each path.
 struct LightProbes {
   LightProbes(size_t paths, uint32_t most_)
       : most(most_), probes(paths * most_), counts(paths, 0), luminance(paths, 0.f) {}
 
   uint32_t most;
-  std::vector<LightProbe> probes;  ///< of path i from i * most on
+  std::vector<LightProbe> probes;  ///< those of path i start at i * most
   std::vector<uint32_t> counts;
-  std::vector<float> luminance;  ///< that a path brought
+  std::vector<float> luminance;  ///< luminance of each path's radiance
 };
 
-/// Traces paths `first` to `first + count` - 1: path i is sample i of pixel pixels[i].
+/// Traces paths `first` to `first + count` - 1. Path i is sample i of pixel pixels[i].
 void run_light_probes(const WaveContext& context, std::span<const uint32_t> pixels, size_t first,
                       size_t count, LightProbes& out);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a worker of the reference integrator has of its own.
+/// Buffers of a worker of the reference integrator.
 #pragma once
 
 #include "wavecomb/integrate/reference.h"
@@ -8,7 +8,7 @@ namespace wavecomb {
 
 /// Buffers of a worker of the reference integrator.
 ///
-/// Contract: one thread at a time.
+/// Contract: used by one thread at a time.
 struct ReferenceWorker {
   explicit ReferenceWorker(const WaveContext& context)
       : aovs(1, context.film->aovs().layout(), context.aovs),
@@ -23,14 +23,14 @@ struct ReferenceWorker {
         interiors(context.knows_inside() ? 1 : 0) {}
   PhaseClock clock;
   Counts counts;
-  // Of the path that is traced, in slot 0.
+  // State of the traced path, in slot 0.
   PathAovs aovs;
   PathHistory history;
-  SplatList splats;  ///< of paths from lights
+  SplatList splats;  ///< of light paths
   LightVertices light_vertices;
   VisibleRows visible;
   LightPathAovs light_aovs;
-  SoaBlock walks;  ///< below surfaces
+  SoaBlock walks;  ///< of subsurface random walks
   InteriorBuffers interiors;
 };
 

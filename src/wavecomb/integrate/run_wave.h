@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The loop of a wave, stage by stage.
+/// Loop over the stages of a wave.
 #pragma once
 
 #include "wavecomb/integrate/stages/collect.h"
@@ -15,18 +15,19 @@
 
 namespace wavecomb {
 
-/// The stages of paths from the camera, through what lies between surfaces.
+/// Wave stages of camera paths, through the volumes and media of `Media`.
 template <typename F, typename Media>
 struct CameraPaths {
   const Media& media;
-  const float* tfar = nullptr;  ///< of the first rays
+  const float* tfar = nullptr;  ///< far-plane distances of the camera rays
 
   void generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
     tfar = wavecomb::generate<F>(wave, context, task);
     wave.counts.samples += task.path_count();
   }
-  /// Camera rays of a pinhole are coherent as they come, and from one point packets give the same
-  /// hits as rays alone; from several, and on edges, they would not (canonical-hits.md).
+  /// Returns whether to trace the camera rays as coherent packets. Rays of a pinhole camera start
+  /// in one point, where packets give the same hits as single rays. Rays from several points would
+  /// differ at edges (canonical-hits.md).
   static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
   static ShadeSettings settings(const WaveContext& context) {
     return camera_shade_settings(context);
@@ -57,7 +58,7 @@ struct CameraPaths {
   }
 };
 
-/// The stages of paths from lights.
+/// Wave stages of light paths.
 template <typename F>
 struct LightPaths {
   static constexpr const float* tfar = nullptr;
@@ -151,7 +152,7 @@ void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Pa
   clock.stop();
 }
 
-/// Paths from lights whose vertices those of the camera's paths of the task connect to.
+/// Traces the light paths whose vertices the camera paths of the task connect to.
 template <typename F>
 void run_connected_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
   wave.light_vertices.clear(task.path_count());
@@ -160,7 +161,7 @@ void run_connected_light(Wave& wave, const WaveContext& context, const WaveTask&
   wave.light_use = Wave::LightUse::kShow;
 }
 
-/// Paths from the camera, in lanes of type F.
+/// Runs a wave of camera paths in lanes of type F.
 template <typename F, typename Media>
 void run_wave_through(Wave& wave, const WaveContext& context, const WaveTask& task,
                       const Media& media) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How far what a camera ray has met moves about the picture while the shutter is open.
+/// Motion of the camera ray's hit across the image while the shutter is open.
 #pragma once
 
 #include "wavecomb/integrate/camera_connection.h"
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Where a point shows at a time of the shutter, pixels from the upper left corner, by the middle
-/// of a lens that does not distort. Not of latlong cameras.
+/// Returns the image position of a point at a shutter time, in pixels from the upper left corner,
+/// seen through the centre of a lens without distortion. Not for latlong cameras.
 template <typename F>
 inline Vec2<F> place_in_picture(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                                 const Mask<F>& active) {
@@ -25,8 +25,9 @@ inline Vec2<F> place_in_picture(const CameraSetup& camera, const Vec3<F>& p, con
   return {F(x - camera.x0) * (1.f / camera.step_x), F(camera.y1 - y) * (1.f / camera.step_y)};
 }
 
-/// From where `first` shows when the shutter opens to where `last` does when it closes, in pixels,
-/// x to the right and y up; 0 where one of them does not show.
+/// Returns the motion from the image position of `first` at shutter open to that of `last` at
+/// shutter close, in pixels, x to the right and y up. Returns 0 if one of them has no image
+/// position.
 template <typename F>
 inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, const Vec3<F>& last,
                              const Mask<F>& active) {
@@ -37,7 +38,7 @@ inline Vec2<F> screen_motion(const CameraSetup& camera, const Vec3<F>& first, co
   return {select(good, x, F(0.f)), select(good, y, F(0.f))};
 }
 
-/// The same of place `p` on lights `light` at `time`.
+/// Returns the motion of the point that is at `p` on lights `light` at `time`.
 template <typename F>
 inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup& camera,
                                       const UInt<F>& light, const Vec3<F>& p, const F& time,
@@ -50,7 +51,7 @@ inline Vec2<F> screen_motion_of_light(const LightView& lights, const CameraSetup
   return screen_motion<F>(camera, at(0.f), at(1.f), active);
 }
 
-/// The same of the surface of a hit.
+/// Returns the motion of the surface point of a hit.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Vec2<F> screen_motion_of_hit(const SceneView& scene,
                                                           const CameraSetup& camera, MeshHit<F> hit,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What waits for shading.
+/// Record of a hit or volume event that waits for shading.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -7,32 +7,31 @@
 
 namespace wavecomb {
 
-/// Instance of a record that is no hit; neither kNoHit nor kLightShape, of which there are no
+/// Instance of a record that is not a hit. Differs from kNoHit and kLightShape, which have no
 /// records.
 inline constexpr uint32_t kNoSurface = 0xfffffffdu;
 static_assert(kNoSurface < kLightShape && kLightShape < kNoHit);
 
-/// What a path has met: what a row of the ShadingQueue holds. The program that shades it, which is
-/// in a column of the queue, says what kind of event that is: the hit of a surface, or, where its
-/// kOnSurface is false, an event on the way, of which there is `t` and `slot`; its instance is
-/// kNoSurface and the other words are 0.
+/// Hit or volume event of a path: a row of the ShadingQueue. The program in the queue's program
+/// column determines which one it is. If the program's kOnSurface is false, the record is a volume
+/// event, which has only `t` and `slot`; its instance is kNoSurface and the other words are 0.
 template <typename F>
 struct ShadingRecord {
   F t;     ///< length of the ray
-  F u, v;  ///< where on the primitive: MeshHit
+  F u, v;  ///< position on the primitive, as in MeshHit
   UInt<F> prim, inst, mesh;
   UInt<F> geom;  ///< geometry within the instance's group
-  UInt<F> slot;  ///< of the path
+  UInt<F> slot;  ///< slot of the path
   WAVECOMB_FIELDS(t, u, v, prim, inst, mesh, geom, slot)
 
-  /// The record of an event on the way.
+  /// Returns the record of a volume event.
   static ShadingRecord event(const F& t, const UInt<F>& slot) {
     const UInt<F> none(0u);
     return {t, F(0.f), F(0.f), none, UInt<F>(kNoSurface), none, none, slot};
   }
 };
 
-/// `a` where `m`, else `b`.
+/// Returns `a` in the lanes of `m`, else `b`.
 template <typename F>
 inline ShadingRecord<F> select_record(const Mask<F>& m, const ShadingRecord<F>& a,
                                       const ShadingRecord<F>& b) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Functions that the kernels of all programs call and none inlines: light sampling, guiding,
-/// textures, curves, motion, value graphs. They are compiled once for each width, in
-/// shared.lanes.cpp, which includes the files *.inl with their bodies.
+/// Functions that the kernels of all programs call without inlining: light sampling, guiding,
+/// textures, curves, motion and value graphs. They are compiled once for each width in
+/// shared.lanes.cpp, which includes their bodies from the *.inl files.
 #pragma once
 
 #include "wavecomb/graph/hit_point.h"
@@ -13,7 +13,7 @@
 #include "wavecomb/surface/surface.h"
 #include "wavecomb/texture/lookup.h"
 
-/// Each of them, with `KEYWORD` (extern, or nothing) before it.
+/// Instantiates or declares all of them. `KEYWORD` is empty or `extern`.
 #define WAVECOMB_SHARED_KERNELS(KEYWORD, F)                                                        \
   KEYWORD template LightSample<F> sample_light<F>(const LightView&, const LightReceiver<F>&,       \
                                                   const F&, const F&, const F&, const Mask<F>&);   \

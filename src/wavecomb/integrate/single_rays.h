@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The rays of the reference integrator, one at a time.
+/// Ray tracing of the reference integrator, one ray at a time.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -10,28 +10,28 @@
 
 namespace wavecomb {
 
-/// The slot of the path that is traced.
+/// Slot of the path that is traced.
 inline constexpr uint32_t kOnlySlot = 0;
 
 struct SingleHit {
   float t, u, v;
   uint32_t prim, geom, inst;
-  uint32_t event_material;  ///< where inst is kNoSurface
+  uint32_t event_material;  ///< if inst is kNoSurface
 };
 
-/// Rays of one path after the other.
+/// Traces the rays of one path after the other.
 class SingleRays {
  public:
   SingleRays(const WaveContext& context, Counts& counts, PathAovs& aovs)
       : context_(context), counts_(counts), aovs_(aovs) {}
 
-  /// Rays are of the path of `key`, which must live as long, at `time` of the shutter, from now on.
+  /// Starts a path with `key`, which must outlive its rays, at shutter time `time`.
   void begin(const SampleKey<float>& key, float time) {
     keys_ = {&key.pixel_hash, &key.sample, 1, 0};
     time_ = time;
   }
   float time() const { return time_; }
-  /// Of the last ray that was traced.
+  /// Returns the keys of the last ray.
   const PresenceKeys& keys() const { return keys_; }
 
   SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth) {
@@ -46,7 +46,7 @@ class SingleRays {
     return h;
   }
 
-  /// `shadow_set`: VertexResult's.
+  /// Returns whether a shadow ray is blocked. `shadow_set` is VertexResult::shadow_set, or null.
   bool occluded(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth,
                 const uint32_t* shadow_set) {
     uint32_t blocked = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What is counted while rendering.
+/// Counters of a render.
 #pragma once
 
 #include <array>
@@ -8,14 +8,14 @@
 
 namespace wavecomb {
 
-/// Depths that are counted one by one; deeper ones are added to the last.
+/// Number of depths with a separate counter. Deeper ones are added to the last.
 inline constexpr uint32_t kCountedDepths = 32;
 
-/// What ways through volumes took.
+/// Counters of ray segments in volumes.
 struct VolumeCounts {
-  uint64_t steps = 0;       ///< cells that paths and shadow rays went through, and collisions there
-  uint64_t collisions = 0;  ///< of those, collisions with the majorant, real ones and others
-  uint64_t lanes = 0;       ///< lanes that took part, busy or not
+  uint64_t steps = 0;       ///< grid cells visited by paths and shadow rays, plus collisions
+  uint64_t collisions = 0;  ///< collisions with the majorant among the steps, real or null
+  uint64_t lanes = 0;       ///< lanes of the packets, active or not
 
   void add(const VolumeCounts& o) {
     steps += o.steps;
@@ -24,7 +24,7 @@ struct VolumeCounts {
   }
 };
 
-/// Counts of one worker, added up at the end.
+/// Counters of one worker, added up at the end of the render.
 struct Counts {
   uint64_t samples = 0;  ///< paths started
   uint64_t rays = 0;     ///< camera and bounce rays traced
@@ -33,10 +33,10 @@ struct Counts {
   uint64_t packets = 0;       ///< shading packets run
   uint64_t packet_lanes = 0;  ///< lanes of those packets, full or not
   VolumeCounts volumes;
-  uint64_t walks = 0;       ///< ways below surfaces
-  uint64_t walk_steps = 0;  ///< rays traced there, which `rays` does not count
-  uint64_t walk_lanes = 0;  ///< lanes that took part, busy or not
-  /// Rays, shadow rays and records of each depth (0: camera rays and what they hit).
+  uint64_t walks = 0;       ///< subsurface random walks
+  uint64_t walk_steps = 0;  ///< rays traced in these walks, not included in `rays`
+  uint64_t walk_lanes = 0;  ///< lanes of the packets, active or not
+  /// Rays, shadow rays and records at each depth. Depth 0 has the camera rays and their hits.
   std::array<uint64_t, kCountedDepths> rays_at{}, shadow_rays_at{}, records_at{};
 
   static uint32_t bucket(uint32_t depth) {

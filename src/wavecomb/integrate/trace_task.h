@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A task by the reference integrator: its pixels, sample by sample.
+/// Tracing of a task by the reference integrator: pixel by pixel, and sample by sample.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// Traces the paths of a task into the film, a pixel's samples in the order of their numbers.
+/// Traces the paths of a task into the film, the samples of a pixel in sample order.
 template <typename Media>
 void trace_task(const WaveContext& context, ReferenceWorker& worker, const WaveTask& task,
                 const Media& media) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// One vertex of a path, in steps. Both integrators, wave and reference, run this and nothing else.
+/// Shading of one path vertex as a sequence of steps. The wave and the reference integrator share
+/// it.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -15,7 +16,7 @@
 
 namespace wavecomb {
 
-/// InsideRow::crossed of a vertex whose bounce and shadow ray are known.
+/// Returns InsideRow::crossed of a vertex whose bounce and shadow ray are in `out`.
 template <typename F, uint32_t kFeatures>
 inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, const Vec3<F>& wo,
                           const VertexResult<F>& out) {
@@ -29,7 +30,7 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
          bit(out.has_shadow & crosses(out.shadow_d), kShadowCrosses);
 }
 
-/// The steps of a vertex of the active lanes' paths, with program `Bsdf`.
+/// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   using U = UInt<F>;
@@ -90,7 +91,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   return out;
 }
 
-/// The same as a function of its own: the reference integrator's.
+/// Runs take_steps() without inlining, for the reference integrator.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 VertexResult<F> shade_vertex(const Vertex<F, kFeatures>& v) {
   return take_steps<Bsdf, F>(v);

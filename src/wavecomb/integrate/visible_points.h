@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The points that the camera sees in mirrors and through glass (visible_point.h), by place, for
-/// paths from lights that end near them.
+/// Spatial index of the points that the camera sees in mirrors and through glass (visible_point.h),
+/// for merging with light paths.
 #pragma once
 
 #include <cstdint>
@@ -14,22 +14,22 @@ namespace wavecomb {
 
 static_assert(kVisibleWords == Film::kVisibleWords);
 
-/// The points of a film by place: each is in the cells, of a size that goes by its radius, that the
-/// sphere around it meets.
+/// Hash grid of visible points. Each point is stored in the cells that the sphere of its radius
+/// overlaps. The cell size depends on the radius.
 ///
-/// Contract: build() while nobody looks.
+/// Contract: build() must not run during searches.
 class VisibleGrid {
  public:
-  /// `points`: rows by pixel, which stay where they are.
+  /// Builds the grid. `points` holds one row for each pixel and must outlive the grid.
   void build(std::span<const float> points);
   const float* points() const { return points_; }
 
-  /// Goes through the points that a place lies within the radius of.
+  /// Iterates over the points within whose radius a position lies.
   class Search {
    public:
     Search() = default;
     Search(const VisibleGrid& grid, float x, float y, float z) : grid_(&grid), at_{x, y, z} {}
-    /// The next one's pixel; false: there is none any more.
+    /// Advances to the next point and returns its pixel in `pixel`. Returns false at the end.
     bool next(uint32_t& pixel);
 
    private:
@@ -44,13 +44,13 @@ class VisibleGrid {
   uint32_t bucket(int exponent, const int32_t (&cell)[3]) const;
 
   const float* points_ = nullptr;
-  std::vector<int> levels_;  ///< exponents of radii that there are
+  std::vector<int> levels_;  ///< exponents of the radii that occur
   std::vector<uint32_t> starts_, entries_;
 };
 
-/// Where vertices of paths from lights are merged with points.
+/// Targets of merging light paths with visible points.
 struct Merger {
-  const VisibleGrid* grid;  ///< null: there are none
+  const VisibleGrid* grid;  ///< null if there are no points
   SplatList* splats;
   Film* film;
 };

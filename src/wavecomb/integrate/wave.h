@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A wave: the paths of one batch of pixels and samples, run to the end by one worker on its own
-/// buffers.
+/// Wave: the paths of a batch of pixels and samples. One worker traces them to their end, using
+/// only its own buffers.
 #pragma once
 
 #include <memory>
@@ -39,70 +39,73 @@ namespace wavecomb {
 
 class AimLessons;
 
-/// What all waves of a render read.
+/// Data that all waves of a render read.
 struct WaveContext {
   SceneView scene;
   const EmbreeAccelerator* accel;
   const Settings* settings;
   const CameraSetup* camera;
-  /// The policy; where there are several, each worker chooses among them, queue by queue.
+  /// Scheduling policies. With several, each worker chooses one for each queue.
   std::span<const SchedulingPolicy* const> policies;
   std::span<const MaterialTraits> traits;
-  const CostSnapshot* costs;           ///< for the order of shading
+  const CostSnapshot* costs;           ///< for scheduling policies
   const CostSnapshot* roulette_costs;  ///< for cost-aware roulette
   OrderGrid grid;                      ///< for ray orders and hit positions
-  Film* film;                          ///< each wave writes its own pixels only
+  Film* film;                          ///< each wave writes only its own pixels
   uint32_t traversal_width;
-  bool wants_position;                 ///< some policy reads position keys
-  bool measures_costs;                 ///< batches are timed
-  RayRecorder* recorder;               ///< gets the rays; null in any render that is not measured
-  const AovTables* aovs = nullptr;     ///< what indices mean to AOVs; null where none asks
-  HistoryReader* histories = nullptr;  ///< gets vertices of paths; null where none are kept
-  const GuideView* guide = nullptr;    ///< guides bounces, or is to be learned; null: neither
-  bool discards = false;               ///< paths are for `histories` alone, and the film gets none
-  const SplatFilter* splat_filter = nullptr;  ///< of paths from lights; null: there are none
-  AimLessons* lessons = nullptr;  ///< gets what paths from lights bring, in the film's place
-  float light_paths = 1;  ///< that start there for each of a pixel's, over the picture's pixels
-  /// Brightness over which splats bring, in place of their light, what it would add to the variance
-  /// of a pixel's samples were it left to camera paths (light_vertex.h); 0: they bring light.
+  bool wants_position;                 ///< whether some policy reads position keys
+  bool measures_costs;                 ///< whether batches are timed
+  RayRecorder* recorder;               ///< receives the rays of benchmarks, otherwise null
+  const AovTables* aovs = nullptr;     ///< object names and groups for AOVs; null if unused
+  HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
+  const GuideView* guide = nullptr;    ///< guides bounces, or is in training; null without guiding
+  bool discards = false;  ///< if true, paths serve `histories` only, and the film gets none
+  const SplatFilter* splat_filter = nullptr;  ///< filter of light paths; null without light paths
+  AimLessons* lessons = nullptr;  ///< receives the contributions of light paths instead of the film
+  float light_paths = 1;          ///< light paths per camera path, averaged over the image
+  /// Not 0 in some pilot renders: light splats then carry, instead of light, the variance that this
+  /// light would add to a sample of a pixel if camera paths had to find it, divided by this
+  /// brightness (light_vertex.h). 0 means that splats carry light.
   float camera_squares = 0;
 
-  const VisibleGrid* visible = nullptr;  ///< whom paths from lights are merged with; null: nobody
+  /// Points of camera paths to merge light paths with; null without merging.
+  const VisibleGrid* visible = nullptr;
 
-  /// Whether they are.
+  /// Returns whether light paths are merged with points of camera paths.
   bool merges() const { return visible != nullptr; }
-  /// Whether paths start at lights, too.
+  /// Returns whether the render has light paths.
   bool joins_light() const { return splat_filter != nullptr; }
-  /// Whether vertices of camera paths connect to theirs.
+  /// Returns whether vertices of camera paths connect to vertices of light paths.
   bool connects() const { return joins_light() && settings->connects(); }
-  /// One over how many start there for each of a pixel's.
+  /// Returns one over the number of light paths in the whole image for each sample of a pixel.
   float light_path_share() const {
     return 1.f / (static_cast<float>(settings->width) * static_cast<float>(settings->height) *
                   light_paths);
   }
 
-  /// Whether something lies between surfaces, or light walks below them.
+  /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.
   bool has_media() const {
     return scene.volumes.count > 0 || scene.walks.media != nullptr || knows_inside();
   }
-  /// Whether paths know which meshes they are inside of.
+  /// Returns whether paths keep a medium stack.
   bool knows_inside() const { return scene.interiors.media != nullptr; }
-  /// Whether paths need a time.
+  /// Returns whether paths need a shutter time.
   bool moves() const { return scene.has_motion || camera->moves(); }
-  /// Whether paths keep the class of the surface that they left, where lights are linked.
+  /// Returns whether paths keep the link class of the surface that they left.
   bool links() const { return scene.lights.links.members != nullptr; }
-  /// Whether paths keep how much their pixel needs light.
+  /// Returns whether paths keep the importance of their pixel.
   bool weighs_pixels() const { return guide && guide->tiles; }
-  /// Vertices that each path keeps.
+  /// Returns the number of vertices to keep for each path.
   uint32_t kept_vertices() const { return histories ? histories->most() : 0; }
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
   }
 };
 
-/// A worker's buffers.
+/// Buffers of one worker.
 ///
-/// Contract: one thread at a time; everything is allocated here, nothing while a wave runs.
+/// Contract: used by one thread at a time. The constructor allocates everything; a running wave
+/// allocates nothing.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.weighs_pixels(),
@@ -134,36 +137,37 @@ struct Wave {
                                                          context.aovs, context.connects())
                                          : LightPathAovs()) {}
   static constexpr size_t kWayColumns = 14, kWalkColumns = 36;
-  static constexpr size_t kSplats = 4096;  ///< that are collected before they are added
-  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant, direction
+  static constexpr size_t kSplats = 4096;  ///< size of the buffer of light splats
+  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant and direction
 
   PathPool pool;
   PathAovs aovs;
-  PathHistory history;  ///< empty where nobody asks for vertices
+  PathHistory history;  ///< empty if unused
   RayQueue rays;
   HitBuffer hits;
   ShadingQueue shading;
   ShadowQueue shadows;
-  SoaBlock columns;           ///< of ShadingQueueView: throughput, position key, texture key
-  SoaBlock times;             ///< of the rays that are traced, where the scene moves
-  SoaBlock walks;             ///< paths below surfaces (medium/walkers.h), where there are any
-  SoaBlock ways;              ///< what rays find in volumes (medium/volumes.h), where there are any
-  InteriorBuffers interiors;  ///< of medium/interiors.h
+  SoaBlock columns;  ///< columns of ShadingQueueView: throughput, position key, texture key
+  SoaBlock times;    ///< shutter times of the traced rays, if the scene has motion
+  SoaBlock walks;    ///< subsurface random walks (medium/walkers.h)
+  SoaBlock ways;     ///< free flights in volumes (medium/volumes.h)
+  InteriorBuffers interiors;  ///< buffers of the medium stack (medium/interiors.h)
   RadixSorter sorter, ray_sorter;
-  std::vector<uint32_t> ray_indices;  ///< with room for a packet past the end
-  std::vector<float> scratch;         ///< one a material, for policies
+  std::vector<uint32_t> ray_indices;  ///< padded by one packet
+  std::vector<float> scratch;         ///< one value for each material, for policies
   CostTracker costs;
   SplatList splats;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
-  uint32_t queues = 0;  ///< shading queues so far; coherence is measured on some
+  /// Number of shading queues so far, of which some are measured for coherence.
+  uint32_t queues = 0;
   PhaseClock clock;
   Counts counts;
   LightVertices light_vertices;
   VisibleRows visible;
-  LightPathAovs light_aovs;  ///< of paths from lights
-  /// What vertices of paths from lights are shaded for: the camera; that and to be kept; or to be
-  /// connected to the vertices of camera paths in their slots.
+  LightPathAovs light_aovs;  ///< AOVs of light paths
+  /// Purpose of shading the vertices of light paths: connect them to the camera; connect them to
+  /// the camera and store them; or connect them to the camera path in the same slot.
   enum class LightUse : uint8_t { kShow, kKeep, kConnect } light_use = LightUse::kShow;
 
   size_t bytes() const {
@@ -175,15 +179,15 @@ struct Wave {
 };
 
 /// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* ->
-/// resolve. Of paths from lights, where the task is of such.
+/// resolve. task.from_lights selects light paths.
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
 
-/// The same through the volumes of the scene, where it has any (medium/).
+/// Runs a wave through the volumes of the scene (medium/).
 template <size_t W>
 void run_wave_in_volumes(Wave& wave, const WaveContext& context, const WaveTask& task);
 
-/// Shades synthetic hits of one material with kernels of `W` lanes and returns the time, in
+/// Shades synthetic hits of one material with kernels of `W` lanes. Returns the time in
 /// nanoseconds.
 template <size_t W>
 double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits);

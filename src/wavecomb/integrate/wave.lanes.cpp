@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once per lane width, with WAVECOMB_LANES set to it.
+// Compiled once for each lane width, with WAVECOMB_LANES set to it.
 #include <bit>
 #include <cstring>
 
@@ -17,8 +17,8 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   run_wave_through<Lanes<W>>(wave, context, task, NoMedia());
 }
 
-/// Shades `records` synthetic hits of one material, to learn what it costs before the first pass.
-/// Leaves nothing behind but the time, in nanoseconds.
+/// Shades `records` synthetic hits of one material to measure its cost before the first pass. Has
+/// no effect other than the returned time in nanoseconds.
 template <size_t W>
 double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits) {
   using F = Lanes<W>;
@@ -28,7 +28,8 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
   queue.clear();
   queue.size = hits.count;
   for (uint32_t i = 0; i < hits.count; ++i) {
-    // Directions and places spread by the golden ratio; paths as after a first bounce.
+    // Directions and positions are spread by the golden ratio. The paths look like paths after one
+    // bounce.
     const float a = 0.61803399f * static_cast<float>(i), b = 0.75487767f * static_cast<float>(i);
     const float u = a - std::floor(a), v = b - std::floor(b);
     const Vec3<float> d = square_to_sphere(u, v);
@@ -51,7 +52,7 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
   const auto& kernels = kernels_for<F, NoMedia>(context, settings);
   const auto start = PhaseClock::Clock::now();
   for (size_t begin = 0, batch = 1; begin < queue.size; ++batch) {
-    // Packets that are to be filled in part only are batches of their own.
+    // Partly filled packets are batches of one packet.
     const size_t end =
         hits.fill < 1.f
             ? std::min(queue.size,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The wave integrator: each worker runs its waves on buffers of its own, with the kernels of one
-/// lane width.
+/// Wave integrator: each worker runs waves on its own buffers, with the kernels of one lane width.
 #pragma once
 
 #include <memory>
@@ -14,7 +13,7 @@ class WaveIntegrator final : public Integrator {
  public:
   using RunWave = void (*)(Wave&, const WaveContext&, const WaveTask&);
 
-  /// `run_wave`: of `lanes` lanes. Waves have `wave_size` paths at most.
+  /// `run_wave` is the wave function for `lanes` lanes. A wave has at most `wave_size` paths.
   WaveIntegrator(const WaveContext& context, RunWave run_wave, uint32_t lanes, uint32_t threads,
                  uint32_t wave_size);
 
@@ -26,7 +25,7 @@ class WaveIntegrator final : public Integrator {
   const WaveContext& context_;
   RunWave run_wave_;
   uint32_t lanes_, wave_size_;
-  std::vector<std::unique_ptr<Wave>> waves_;  ///< by worker, made by its own thread
+  std::vector<std::unique_ptr<Wave>> waves_;  ///< by worker; each is allocated by its own thread
 };
 
 }  // namespace wavecomb

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Paths from lights that are aimed at spheres (scene/light_aim.h; docs/light-paths.md).
+/// Aiming of light paths at spheres (scene/light_aim.h; docs/light-paths.md).
 ///
-/// A light's own density of emission, D, becomes D g. With a_0 of the paths as the light sends them
-/// and a_k through sphere k of radius r_k:
-///   from afar   g = a_0 + sum a_k [the line meets sphere k] R^2 / r_k^2
-///   from near   g = a_0 + sum a_k [d meets sphere k] / (W_k p(d)),
-/// R the radius of the sphere around the scene, W_k the solid angle of sphere k from the place on
-/// the light (from within it all of them), p the light's own density of directions. Both ends of a
-/// path can tell g, so that it goes into all weights.
+/// Aiming changes a light's emission density D to D g. Let a_0 be the fraction of paths that the
+/// light emits by its own distribution, and a_k the fraction aimed at sphere k of radius r_k:
+///   infinite lights   g = a_0 + sum a_k [the line hits sphere k] R^2 / r_k^2
+///   finite lights     g = a_0 + sum a_k [d hits sphere k] / (W_k p(d)),
+/// where R is the radius of the sphere around the scene, W_k the solid angle of sphere k as seen
+/// from the point on the light (4 pi inside the sphere), and p the light's own density of
+/// directions. Both ends of a path can compute g, so it is part of all MIS weights.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -17,8 +17,8 @@
 
 namespace wavecomb::detail {
 
-/// 1 - cos of the half angle of a sphere of radius r whose centre is at the square of distance
-/// `distance2`; 2 from within.
+/// Returns 1 - cos of the half angle of a sphere of radius r whose centre is at the squared
+/// distance `distance2`; 2 inside the sphere.
 template <typename F>
 inline F sphere_one_minus_cos(const F& radius, const F& distance2) {
   const F radius2 = radius * radius;
@@ -28,7 +28,7 @@ inline F sphere_one_minus_cos(const F& radius, const F& distance2) {
   return select(outside, F(sin2 / F(1.f + sqrt(rest))), F(2.f));
 }
 
-/// g for lines through `p` along +-d.
+/// Returns g for lines through `p` along +-d, from infinite lights.
 template <typename F>
 [[gnu::noinline]] F aim_from_afar(const LightView& view, const Vec3<F>& p, const Vec3<F>& d) {
   const LightAim& aim = *view.aim;
@@ -43,7 +43,8 @@ template <typename F>
   return g;
 }
 
-/// g for paths from `p` on a light along d, which it takes with density `own` by itself.
+/// Returns g for paths from the point `p` on a finite light along d. `own` is the light's own
+/// density of that direction.
 template <typename F>
 [[gnu::noinline]] F aim_from_near(const LightView& view, const Vec3<F>& p, const Vec3<F>& d,
                                   const F& own) {
@@ -60,8 +61,8 @@ template <typename F>
   return F(met * kInv2Pi) / select(own > 0.f, own, F(1.f)) + aim.even;
 }
 
-/// Density of directions over solid angle by which light `light` of a kind with a place sends paths
-/// along d from `p` by itself.
+/// Returns the solid angle density with which the finite light `light`, without aiming, emits paths
+/// from `p` along d.
 template <typename F>
 inline F own_direction_density(LightKind kind, const LightReader<F>& light, const Vec3<F>& p,
                                const Vec3<F>& d) {
@@ -83,7 +84,7 @@ inline bool is_infinite(LightKind kind) {
   return kind == LightKind::kDistant || kind == LightKind::kDome;
 }
 
-/// g for paths from `light` that would have come along the ray from + t dir, backwards.
+/// Returns g for paths from `light` that arrive at `from` along -dir over the distance t.
 template <typename F>
 inline F aim_of_kind(const LightView& view, LightKind kind, const LightReader<F>& light,
                      const Vec3<F>& from, const Vec3<F>& dir, const F& t) {
@@ -92,10 +93,10 @@ inline F aim_of_kind(const LightView& view, LightKind kind, const LightReader<F>
   return aim_from_near<F>(view, p, -dir, own_direction_density<F>(kind, light, p, -dir));
 }
 
-/// The spheres that lanes have chosen by a number in [0, 1).
+/// Spheres that the lanes select with a random number in [0, 1).
 template <typename F>
 struct AimChoice {
-  Mask<F> aims;  ///< others leave it to their lights
+  Mask<F> aims;  ///< aimed lanes; the others use the light's own distribution
   Vec3<F> centre;
   F radius;
 
@@ -111,7 +112,7 @@ struct AimChoice {
   }
 };
 
-/// Aims paths from an infinite light, whose places come of (u, v).
+/// Aims paths from infinite lights: replaces their origins. (u, v) is the sample for the origin.
 template <typename F>
 [[gnu::noinline]] void aim_places(const LightView& view, const F& number, const F& u, const F& v,
                                   KindEmission<F>& e, const Mask<F>& lanes) {
@@ -126,8 +127,8 @@ template <typename F>
   e.density = e.density * aim_from_afar<F>(view, e.p, e.d);
 }
 
-/// Aims paths from a light with a place, whose directions come of (s, t). `sides`: 1, or 2 where it
-/// shines to both.
+/// Aims paths from finite lights: replaces their directions. (s, t) is the sample for the
+/// direction. `sides` is 1, or 2 if the light emits on both sides.
 template <typename F>
 [[gnu::noinline]] void aim_directions(const LightView& view, const F& number, const F& s,
                                       const F& t, float sides, KindEmission<F>& e,

@@ -8,7 +8,8 @@ namespace {
 
 using namespace making;
 
-/// A round cylinder of as much volume as the transformed one has, about its transformed axis.
+/// Makes the record of a circular cylinder about the transformed axis, with the volume of the
+/// transformed cylinder.
 void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
   const Affine& m = light.to_world;
   const Double3 x = to_double(m.axis(0)), y = to_double(m.axis(1)), z = to_double(m.axis(2));
@@ -21,7 +22,7 @@ void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
   finish_area(made, light, 2 * kPiD * radius * length(axis));
 }
 
-/// The end of the axis, which begins at p.
+/// Returns the end of the axis, which starts at p.
 Vec3<float> axis_end(const LightRecord& light) {
   return {light.p[0] + light.u[0], light.p[1] + light.u[1], light.p[2] + light.u[2]};
 }
@@ -31,7 +32,7 @@ void bound(LightCluster& cluster, const LightRecord& light, double power) {
   include(cluster, {end.x, end.y, end.z});
   widen(cluster, {light.radius, light.radius, light.radius});
   bound_round(cluster);
-  cluster.intensity = power / (kPiD * kPiD);  // seen from the side
+  cluster.intensity = power / (kPiD * kPiD);  // as seen from the side
 }
 
 LightShape shape(const LightRecord& /*light*/) {
@@ -43,7 +44,8 @@ Bounds box(const LightRecord& light) {
   return box_around(light.p, {end.x, end.y, end.z}, {light.radius, light.radius, light.radius});
 }
 
-/// The nearer point ahead of the open cylinder of axis u from 0 on.
+/// Returns the nearest positive hit distance with the open cylinder whose axis u starts at the
+/// origin, or 0.
 double intersect(const LightRecord& light, const double* o, const double* d) {
   const double u[3] = {light.u[0], light.u[1], light.u[2]};
   const auto dot3 = [](const double* a, const double* b) {

@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cylinder lights: open at both ends, shining outwards.
+/// Cylinder lights, which are open at both ends and emit outwards.
 #pragma once
 
 #include "wavecomb/light/record.h"
 
 namespace wavecomb::detail {
 
-/// The cylinder as a point outside of it sees it, in the frame of its axis a and of the unit
-/// vectors e, across towards the axis, and f. A direction
+/// Cylinder as seen from a point outside, in the frame of its axis a, the unit vector e
+/// perpendicular to a towards the axis, and f. A direction
 ///   cos(gamma) (cos(alpha) e + sin(alpha) f) + sin(gamma) a
-/// meets the endless cylinder at the distance s(alpha) across, on the near side. What of the real
-/// one is seen at alpha is an interval of sin(gamma), and so directions uniform in alpha and, given
-/// that, in sin(gamma) have the density 1 / (2 alpha_most (sin(gamma_1) - sin(gamma_0))): that of
-/// the solid angle of all that is seen, but for the share that each alpha has of it.
+/// hits the near side of the infinite cylinder at the perpendicular distance s(alpha). The visible
+/// part of the finite cylinder at alpha is an interval of sin(gamma). Directions that are uniform
+/// in alpha and, for a given alpha, uniform in sin(gamma) therefore have the density 1 / (2
+/// alpha_max (sin(gamma_1) - sin(gamma_0))). It would be uniform over the visible solid angle if
+/// that interval had the same size for all alpha.
 template <typename F>
 struct CylinderFrame {
   Vec3<F> a, e, f;
-  F distance;        ///< across, to the axis
+  F distance;        ///< perpendicular distance to the axis
   F radius, length;  ///< of the cylinder
-  F begin;           ///< of the cylinder along a, as seen from the point
-  F alpha;           ///< the most that is seen, radians
+  F begin;           ///< start of the cylinder along a, relative to the point
+  F alpha;           ///< largest visible alpha, in radians
   Mask<F> outside;
 };
 
@@ -42,7 +43,7 @@ inline CylinderFrame<F> make_cylinder_frame(const LightReader<F>& light, const V
   return c;
 }
 
-/// s(alpha): d cos(alpha) - sqrt(r^2 - d^2 sin^2(alpha)).
+/// Returns s(alpha) = d cos(alpha) - sqrt(r^2 - d^2 sin^2(alpha)).
 template <typename F>
 inline F cylinder_across(const CylinderFrame<F>& c, const F& sin_alpha, const F& cos_alpha) {
   const F off = c.distance * sin_alpha;
@@ -50,16 +51,17 @@ inline F cylinder_across(const CylinderFrame<F>& c, const F& sin_alpha, const F&
   return max(fma(c.distance, cos_alpha, F(-half_chord)), F(0.f));
 }
 
-/// The sine of gamma, z / h with h = sqrt(z^2 + s^2), over what is seen at distance s across.
+/// Visible interval of sin(gamma) = z / h, with h = sqrt(z^2 + s^2), at the perpendicular distance
+/// s.
 template <typename F>
 struct CylinderSpan {
-  F begin, size;     ///< z_0 / h_0; z_1 / h_1 less that
+  F begin, size;     ///< z_0 / h_0, and z_1 / h_1 - z_0 / h_0
   F rest;            ///< 1 - |begin|
-  Mask<F> one_side;  ///< both ends are before the point, or both behind it
+  Mask<F> one_side;  ///< whether both ends are ahead of the point, or both behind it
 };
-/// No difference of near equals: where both ends are on one side, the numerator of the size,
-/// z_1 h_0 - z_0 h_1, is s^2 (z_1^2 - z_0^2) / (z_1 h_0 + z_0 h_1), and the rest is
-/// s^2 / (h_0 (h_0 + |z_0|)).
+/// Computes the visible interval without differences of nearly equal numbers. If both ends are on
+/// one side, the numerator of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 +
+/// z_0 h_1), and the rest is s^2 / (h_0 (h_0 + |z_0|)).
 template <typename F>
 inline CylinderSpan<F> cylinder_span(const CylinderFrame<F>& c, const F& s) {
   const F z0 = c.begin, z1 = c.begin + c.length;
@@ -80,8 +82,9 @@ template <typename F>
 struct CylinderSlope {
   F sin_gamma, cos_gamma;
 };
-/// Where a share v of the span ends. Far along a line of the surface all sines are 1 but for a
-/// millionth: what they lack of 1 is told apart instead, since the distance comes from the cosine.
+/// Returns gamma at the fraction v of the span. Far along the cylinder all sines are within a
+/// millionth of 1. Their difference from 1 is therefore computed separately, since the distance
+/// depends on the cosine.
 template <typename F>
 inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) {
   const F step = v * span.size;
@@ -92,8 +95,8 @@ inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) 
   return {select(span.one_side, F(sign * F(1.f - lack)), sine), safe_sqrt(F(rest * F(2.f - rest)))};
 }
 
-/// Density over solid angle of any direction that meets the near side at an angle whose span is
-/// `size`.
+/// Returns the solid angle density of a direction that hits the near side, where the span at its
+/// alpha has the size `size`.
 template <typename F>
 inline F cylinder_pdf(const CylinderFrame<F>& c, const F& size) {
   const F area = 2.f * c.alpha * size;
@@ -118,7 +121,8 @@ inline KindSample<F> sample_cylinder(const LightReader<F>& light, const Vec3<F>&
           select(good, cylinder_pdf<F>(c, span.size), F(0.f)), Mask<F>(false)};
 }
 
-/// What a ray from `origin` gets that met the cylinder at distance t; its inside is dark.
+/// Returns radiance and density for a ray from `origin` that hit the cylinder at distance t. The
+/// inside is dark.
 template <typename F>
 inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origin,
                                const Vec3<F>& dir, const F& t) {
@@ -127,7 +131,7 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
   const F flat2 = fma(x, x, F(y * y));
   const Mask<F> good = c.outside & (flat2 > 0.f);
   const F inverse = 1.f / sqrt(select(good, flat2, F(1.f)));
-  // The near side is met before the ray is abreast of the axis.
+  // The near side is hit before the ray reaches its closest point to the axis.
   const Mask<F> front = good & (F(t * flat2) <= F(c.distance * x));
   const F s = cylinder_across<F>(c, F(y * inverse), F(x * inverse));
   const F size = cylinder_span<F>(c, s).size;
@@ -135,7 +139,7 @@ inline KindHit<F> hit_cylinder(const LightReader<F>& light, const Vec3<F>& origi
           select(front, cylinder_pdf<F>(c, size), F(0.f))};
 }
 
-/// A path from a point uniform over the outside.
+/// Samples a path from a point uniform over the outer surface.
 template <typename F>
 inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
@@ -151,7 +155,7 @@ inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+/// Kind of cylinder lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct CylinderKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

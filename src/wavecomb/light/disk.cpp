@@ -15,7 +15,7 @@ void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
   finish_flat(made, light, to_double(m.axis(0)) * radius, to_double(m.axis(1)) * radius, kPiD);
 }
 
-/// Of half an axis-parallel box around the ellipse.
+/// Computes the half extents of the axis-aligned box around the ellipse.
 void half_box(const LightRecord& light, float (&half)[3]) {
   for (size_t k = 0; k < 3; ++k) half[k] = std::hypot(light.u[k], light.v[k]);
 }
@@ -37,7 +37,7 @@ Bounds box(const LightRecord& light) {
   return box_around(light.p, light.p, half);
 }
 
-/// o + t d = x u + y v with x^2 + y^2 <= 1.
+/// Solves o + t d = x u + y v with x^2 + y^2 <= 1. Returns t, or 0 without a hit.
 double intersect(const LightRecord& light, const double* o, const double* d) {
   const Double3 u = to_double(light.u), v = to_double(light.v);
   const Double3 from{o[0], o[1], o[2]}, along{d[0], d[1], d[2]};

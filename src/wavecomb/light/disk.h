@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Disk lights (ellipses, where their transform stretches): uniform over the area.
+/// Disk lights, or ellipses under a non-uniform scale, sampled uniformly by area.
 #pragma once
 
 #include "wavecomb/light/record.h"
 
 namespace wavecomb::detail {
 
-/// A point p + a u + b v with (a, b) uniform in the unit disk, so of density 1 / area; towards n
-/// only.
+/// Samples the point p + a u + b v with (a, b) uniform in the unit disk, so its density is 1 /
+/// area. The disk emits only towards n.
 template <typename F>
 inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& from, const F& u,
                                  const F& v) {
@@ -19,7 +19,7 @@ inline KindSample<F> sample_disk(const LightReader<F>& light, const Vec3<F>& fro
           area_to_solid_angle<F>(d.length2, cos_light, light.area()), Mask<F>(false)};
 }
 
-/// What a ray gets from the disk at distance t.
+/// Returns radiance and density for a ray that hits the disk at distance t.
 template <typename F>
 inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, const F& t) {
   const F cos_light = -dot(dir, light.n());
@@ -28,7 +28,7 @@ inline KindHit<F> hit_disk(const LightReader<F>& light, const Vec3<F>& dir, cons
           area_to_solid_angle<F>(F(t * t), cos_light, light.area())};
 }
 
-/// A path from a point uniform over the disk.
+/// Samples a path from a point uniform over the disk.
 template <typename F>
 inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
@@ -41,7 +41,7 @@ inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+/// Kind of disk lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct DiskKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Distant lights: a cone of directions, or a single one.
+/// Distant lights, which emit from a cone of directions or from a single direction.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -7,14 +7,15 @@
 
 namespace wavecomb::detail {
 
-/// 1 / (2 pi (1 - cos)): uniform over the cone.
+/// Returns the uniform density 1 / (2 pi (1 - cos)) over the cone.
 template <typename F>
 inline F distant_pdf(const F& one_minus_cos) {
   const F pdf = kInv2Pi / select(one_minus_cos > 0.f, one_minus_cos, F(1.f));
   return select((one_minus_cos > 0.f) & is_finite(pdf), pdf, F(0.f));
 }
 
-/// A direction in the cone around -n; of angle 0: -n, and `radiance` is the irradiance.
+/// Samples a direction in the cone around -n. If the angle is 0, the direction is -n and `radiance`
+/// is the irradiance.
 template <typename F>
 inline KindSample<F> sample_distant(const LightReader<F>& light, const F& u, const F& v) {
   const Vec3<F> axis = -light.n();
@@ -25,8 +26,8 @@ inline KindSample<F> sample_distant(const LightReader<F>& light, const F& u, con
           select(is_delta, F(1.f), distant_pdf<F>(one_minus_cos)), is_delta};
 }
 
-/// What a ray that left the scene gets. With both unit, 1 - cos(angle) = |dir - axis|^2 / 2, which
-/// is exact for small angles, where 1 - dot(dir, axis) is not.
+/// Returns radiance and density for a ray that left the scene. For unit vectors 1 - cos(angle) =
+/// |dir - axis|^2 / 2, which is accurate for small angles, unlike 1 - dot(dir, axis).
 template <typename F>
 inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
   const F one_minus_cos = light.one_minus_cos();
@@ -37,7 +38,7 @@ inline KindHit<F> hit_distant(const LightReader<F>& light, const Vec3<F>& dir) {
           select(inside, distant_pdf<F>(one_minus_cos), F(0.f))};
 }
 
-/// KindEmission::density of paths that come along -dir: see hit_distant.
+/// Returns KindEmission::density of paths along -dir. See hit_distant().
 template <typename F>
 inline F distant_emission_density(const LightView& view, const LightReader<F>& light,
                                   const Vec3<F>& dir) {
@@ -46,7 +47,7 @@ inline F distant_emission_density(const LightView& view, const LightReader<F>& l
   return density_from_afar<F>(view, direction_pdf);
 }
 
-/// A path in a direction of the cone.
+/// Samples a path in a direction of the cone.
 template <typename F>
 inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
   const KindSample<F> way = sample_distant<F>(q.light, q.s, q.t);
@@ -57,7 +58,7 @@ inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
 
 namespace wavecomb {
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+/// Kind of distant lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct DistantKind : NoShape {
   static LightKindInfo describe();
   template <typename F>

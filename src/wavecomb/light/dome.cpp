@@ -8,7 +8,7 @@ namespace {
 
 using namespace making;
 
-/// The world axes of the dome: turned and mirrored, never stretched, the pole first.
+/// Sets the world axes of the dome: rotation and mirroring, without scale. The pole has priority.
 void put_axes(LightRecord& record, const Affine& m) {
   const Double3 y = unit(to_double(m.axis(1)));
   Double3 z = to_double(m.axis(2));
@@ -24,7 +24,7 @@ void put_axes(LightRecord& record, const Affine& m) {
   put(record.n, z);
 }
 
-/// The density by the image; the mean of its luminance.
+/// Adds the sampling distribution of the image. Returns the mean luminance of the image.
 double add_image(LightRecord& record, LightMaking& making) {
   Distribution2D d = density_of(record, making, &build_dome_distribution);
   const double mean = d.mean_luminance;
@@ -38,7 +38,7 @@ double add_image(LightRecord& record, LightMaking& making) {
   return mean;
 }
 
-/// Each is a rect.
+/// Adds the portals of a dome, each as the record of a rectangle.
 void add_portals(LightRecord& record, const std::vector<Affine>& portals, LightSet& set) {
   record.portals = static_cast<uint32_t>(set.portal_groups.size());
   const auto first = static_cast<uint32_t>(set.portals.size());

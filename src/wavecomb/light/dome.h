@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Dome lights: an environment all around, with or without a latlong image.
+/// Dome lights: an environment with or without a latlong image.
 ///
-/// UsdLuxDomeLight takes OpenEXR's convention for latitude-longitude images. In the dome's own
-/// space,
+/// UsdLuxDomeLight uses OpenEXR's convention for latitude-longitude images. In dome space,
 ///     direction = (cos(lat) sin(lon), sin(lat), cos(lat) cos(lon)),
 ///     s = 1/2 - lon / (2 pi),   t = 1/2 + lat / pi   (t up),
-/// so that the top row is +y, the image's centre looks at +z, and s falls towards +x: the quarter
-/// of the image at s = 1/4 looks at +x. From outside the sphere the image would be mirrored; from
-/// inside it is not.
+/// so that the top row is +y, the image's centre is in direction +z, and s decreases towards +x:
+/// the column at s = 1/4 is in direction +x. The image is not mirrored as seen from inside the
+/// sphere.
 #pragma once
 
 #include <bit>
@@ -19,10 +18,10 @@
 
 namespace wavecomb::detail {
 
-/// 2 pi^2: solid angle of a piece of the image is 2 pi^2 sin(polar angle) ds dt.
+/// 2 pi^2. A part ds dt of the image covers the solid angle 2 pi^2 sin(polar angle) ds dt.
 inline constexpr float kTwoPiSquared = 19.739208802178716f;
 
-/// The dome's own coordinates of a world direction, and back.
+/// Converts directions from world space to dome space, and back.
 template <typename F>
 inline Vec3<F> to_dome(const LightReader<F>& light, const Vec3<F>& w) {
   return {dot(w, light.u()), dot(w, light.v()), dot(w, light.n())};
@@ -32,8 +31,8 @@ inline Vec3<F> from_dome(const LightReader<F>& light, const Vec3<F>& d) {
   return fma(light.u(), d.x, fma(light.v(), d.y, Vec3<F>(light.n() * d.z)));
 }
 
-/// Radiance at image coordinates s and t, finest level. Taps do not cross the poles, however the
-/// texture wraps; in s the texture's own wrap mode holds (which should be kRepeat).
+/// Returns the radiance at image coordinates s and t, at the finest level. Lookups do not cross the
+/// poles in any wrap mode; in s, the texture's wrap mode applies (it should be kRepeat).
 template <typename F>
 inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& texture, const F& s,
                               const F& t, const Mask<F>& active) {
@@ -43,8 +42,8 @@ inline Color<F> dome_radiance(const LightReader<F>& light, const TextureView& te
   return light.radiance() * not_negative(Color<F>(texel.r, texel.g, texel.b));
 }
 
-/// Density over solid angle of a direction whose density over the image is `density`: a piece of
-/// the image is 2 pi^2 sin(polar angle) times as large on the sphere.
+/// Returns the solid angle density of a direction with the density `density` over the image. A part
+/// of the image is 2 pi^2 sin(polar angle) times as large on the sphere.
 template <typename F>
 inline F dome_pdf(const F& density, const F& sin_theta) {
   const F measure = sin_theta * kTwoPiSquared;
@@ -53,7 +52,7 @@ inline F dome_pdf(const F& density, const F& sin_theta) {
   return select(good & is_finite(pdf), pdf, F(0.f));
 }
 
-/// A direction by the density of the image.
+/// Samples a direction by the distribution of the image.
 template <typename F>
 inline KindSample<F> sample_dome_image(const LightReader<F>& light, const TextureView& texture,
                                        const Distribution2D& d, const F& u, const F& v,
@@ -67,13 +66,13 @@ inline KindSample<F> sample_dome_image(const LightReader<F>& light, const Textur
           dome_pdf<F>(at.pdf, sin_theta), Mask<F>(false)};
 }
 
-/// A dome without an image: uniform over the sphere.
+/// Samples a dome without an image uniformly over the sphere.
 template <typename F>
 inline KindSample<F> sample_dome_constant(const LightReader<F>& light, const F& u, const F& v) {
   return {square_to_sphere(u, v), F(kFarAway), light.radiance(), F(kInv4Pi), Mask<F>(false)};
 }
 
-/// One kind of dome light after the other among the active lanes: each image once.
+/// Samples domes of all lanes, one image after the other.
 template <typename F>
 inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<F>& light,
                                        const F& u, const F& v, const Mask<F>& active) {
@@ -94,18 +93,18 @@ inline KindSample<F> sample_dome_light(const LightView& view, const LightReader<
   return result;
 }
 
-/// Where in the image a direction of the dome's own coordinates is.
+/// Image position of a direction in dome space.
 template <typename F>
 struct ImageDirection {
   F sin_theta;
-  F s, down;  ///< from the left, and from the top
+  F s, down;  ///< from the left and from the top
   explicit ImageDirection(const Vec3<F>& w)
       : sin_theta(sqrt(fma(w.x, w.x, F(w.z * w.z)))),
         s(fnma(atan2(w.x, w.z), F(kInv2Pi), F(0.5f))),
         down(atan2(sin_theta, w.y) * kInvPi) {}
 };
 
-/// What a ray that left the scene along `dir` gets from the dome `record`.
+/// Returns radiance and density of the dome `record` for a ray that leaves the scene along `dir`.
 template <typename F>
 inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, const Vec3<F>& dir,
                            const Mask<F>& active) {
@@ -118,7 +117,7 @@ inline KindHit<F> hit_dome(const LightView& view, const LightRecord& record, con
           dome_pdf<F>(image_pdf_at<F>(d, at.s, at.down, active), at.sin_theta)};
 }
 
-/// hit_dome, with the density as seen from `from`.
+/// Returns the result of hit_dome(), with the density as seen from `from`.
 template <typename F>
 inline KindHit<F> hit_dome_from(const LightView& view, const LightRecord& record,
                                 const Vec3<F>& from, const Vec3<F>& dir, const Mask<F>& active) {
@@ -166,7 +165,7 @@ template <typename F>
   return result;
 }
 
-/// A direction to domes `lights`, whose records `light` reads, from `from`.
+/// Samples a direction from `from` to domes `lights`, whose records `light` reads.
 template <typename F>
 inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
                                  const LightReader<F>& light, const Vec3<F>& from, const F& u,
@@ -176,14 +175,15 @@ inline KindSample<F> sample_dome(const LightView& view, const UInt<F>& lights,
   return sample_dome_light<F>(view, light, u, v, active);
 }
 
-/// A path in a direction by the density of the image, whatever portals there are.
+/// Samples a path in a direction by the distribution of the image. Does not use portals.
 template <typename F>
 inline KindEmission<F> emit_dome(const EmissionQuery<F>& q) {
   const KindSample<F> way = sample_dome_light<F>(q.view, q.light, q.s, q.t, q.lanes);
   return emit_from_afar<F>(q.view, -way.wi, q.u, q.v, way.radiance, way.pdf);
 }
 
-/// KindEmission::density of emit_dome for paths that come along -dir: each image once.
+/// Returns KindEmission::density of emit_dome() for paths along -dir. Evaluates one image after the
+/// other.
 template <typename F>
 inline F dome_emission_density(const LightMeeting<F>& m) {
   F pdf(kInv4Pi);
@@ -205,7 +205,7 @@ inline F dome_emission_density(const LightMeeting<F>& m) {
 
 namespace wavecomb {
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+/// Kind of dome lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct DomeKind : NoShape {
   static LightKindInfo describe();
   template <typename F>

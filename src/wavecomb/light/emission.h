@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Paths that start at lights: a light, a place on it and a direction; and the densities that both
-/// ends of a path need of it for multiple importance sampling (docs/light-paths.md).
+/// Light paths: sampling of a light, a point on it and a direction, and the densities that both
+/// ends of a path need for multiple importance sampling (docs/light-paths.md).
 ///
-/// Lights of which a path would have to know what it meets (LightRecord::camera_only) and mesh
-/// lights, whose glow looks otherwise than what it lights, send no paths: the camera's find all of
-/// their light. Bodies are in emission.inl.
+/// Two kinds of lights emit no light paths, and only camera paths find them: lights with properties
+/// that light paths do not support, such as links, multipliers, decay or motion
+/// (LightRecord::camera_only), and mesh lights, whose visible emission differs from the light they
+/// cast. Bodies are in emission.inl.
 #pragma once
 
 #include "wavecomb/light/light.h"
 
 namespace wavecomb {
 
-/// A path from a light. The flux that it carries is `flux`; 1 / `density` is what goes into the
-/// weights: KindEmission::density times the probability of the light's choice.
+/// Start of a light path. `flux` is the flux that the path carries. `density` is
+/// KindEmission::density times the probability of selecting the light; MIS weights use 1 /
+/// `density`.
 template <typename F>
 struct Emission {
   Vec3<F> o, d;
@@ -22,36 +24,37 @@ struct Emission {
   Mask<F> valid;
 };
 
-/// Numbers in [0, 1): the light's (a multiple of 2^-24), the place's, the direction's, and what it
-/// is aimed at.
+/// Random numbers in [0, 1): for the light (a multiple of 2^-24), the point on it, the direction,
+/// and the sphere it is aimed at.
 template <typename F>
 struct EmissionNumbers {
   F pick, u, v, s, t, aim;
 };
 
-/// How the camera's paths find a light at the first surface that a path from it meets: with
-/// `density` over solid angle by a light sample; of a point, density is per square of the distance
-/// (1 / d^2 is its solid angle), of a light without an angle the probability of its choice.
+/// Density with which camera paths find a light from the first surface that a light path hits.
+/// `density` is the solid angle density of a light sample. For a point light it is the probability
+/// of selecting the light times the squared distance d^2, since 1 / d^2 takes the place of its
+/// solid angle. For a distant light without an angle it is the probability of selecting the light.
 template <typename F>
 struct LightReach {
   F density;
-  Mask<F> is_delta;  ///< and by no bounce
+  Mask<F> is_delta;  ///< whether no bounce can hit the light
 };
 
-/// Chooses a light by its share and a path from it. Where paths start they are clear of the light's
-/// own shape.
+/// Samples a light by its weight, and a path from it. The origin is offset from the light's own
+/// shape.
 template <typename F>
 Emission<F> sample_emission(const LightView& view, const EmissionNumbers<F>& r,
                             const Mask<F>& wanted);
 
-/// Emission::density of a path from `light` that would have come along the ray from.p + t dir,
-/// backwards; 0 where the light sends none.
+/// Returns Emission::density of a path from `light` that arrives at `from` along -dir over the
+/// distance t. Returns 0 if the light emits no paths.
 template <typename F>
 F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& from,
                    const Vec3<F>& dir, const F& t, const Mask<F>& wanted);
 
-/// How light samples and bounces at `from` find `light`, which a path came from over a distance t
-/// along -dir.
+/// Returns how light samples and bounces at `from` find `light`, which emitted a path that arrived
+/// along -dir over the distance t.
 template <typename F>
 LightReach<F> light_reach(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                           const Vec3<F>& dir, const F& t, const Mask<F>& active);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of paths from lights (emission.h), for the units that instantiate them.
+/// Bodies of emission.h, for the compile units that instantiate them.
 #pragma once
 
 #include "wavecomb/light/aim.h"
@@ -11,7 +11,7 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Lanes whose light sends paths.
+/// Returns the lanes whose light emits light paths.
 template <typename F>
 inline Mask<F> sends_paths(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -28,21 +28,23 @@ inline Mask<F> sends_paths(const LightView& view, const UInt<F>& light, const Ma
   return sends;
 }
 
-/// Probability with which sample_emission chooses a light whose record or row says `recorded`.
+/// Returns the probability with which sample_emission() selects a light. `recorded` is the pick_pdf
+/// in its record or row.
 template <typename F>
 inline F emission_pick_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
                            const Mask<F>& active) {
   return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
 }
 
-/// Size of the terms that a place on a light is made of.
+/// Returns the magnitude of the terms that a point on a light is computed from.
 template <typename F>
 inline F size_of_terms(const Vec3<F>& p, const Vec3<F>& u, const Vec3<F>& v) {
   const auto most = [](const Vec3<F>& a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); };
   return F(most(p) + most(u)) + most(v);
 }
 
-/// Lights that are a direction or a place: no bounce meets them.
+/// Returns the lanes with point lights and distant lights without an angle, which no bounce can
+/// hit.
 template <typename F>
 inline Mask<F> is_delta_light(const LightReader<F>& light) {
   const UInt<F> kind = light[&LightRecord::kind];
@@ -68,7 +70,7 @@ template <typename F>
     const F density = e.density * detail::emission_pick_pdf<F>(view, light, recorded, lanes);
     const Mask<F> valid = lanes & (density > 0.f) & is_finite(density) & not_(is_black(e.radiance));
     const F inverse = 1.f / select(valid, density, F(1.f));
-    // Clear of the light: what its place is rounded by, and more.
+    // Offsets the origin from the light by more than its rounding error.
     out.o = select<F>(valid, fma(e.n, F(size * 0x1p-20f), e.p), out.o);
     out.d = select<F>(valid, e.d, out.d);
     out.flux = select<F>(valid, e.radiance * inverse, out.flux);

@@ -12,8 +12,8 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Emission::density (light/emission.h) of a path from infinite light `light` that came along -dir
-/// to `from`.
+/// Returns Emission::density (light/emission.h) of a path from infinite light `light` that arrives
+/// at `from` along -dir.
 template <typename F>
 inline F infinite_emission_density(const LightView& view, uint32_t light, const Vec3<F>& from,
                                    const Vec3<F>& dir, const Mask<F>& active) {
@@ -66,8 +66,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
 
 /// Returns the sum over all infinite lights of radiance times MIS weight for a ray from `from`
 /// along `dir` that leaves the scene. The weight is the balance heuristic of `bsdf_pdf` and the pdf
-/// of light sampling, or 1 for delta bounces and camera rays. `share`: diffuse fraction of the
-/// bounce by color. `ratio`: PathState::ratio; if lights send paths, these take part in the weight.
+/// of light sampling, or 1 for delta bounces and camera rays. `share` is the diffuse fraction of
+/// the bounce, by colour. `ratio` is PathState::ratio; it adds light paths to the weight if the
+/// render has any.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
                                  const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,

@@ -10,8 +10,8 @@ namespace wavecomb {
 namespace making {
 namespace {
 
-/// The map from the world to where `to_world` leads from, rows and what is added; all 0 of what has
-/// no inverse.
+/// Stores the inverse of `to_world`: its rows and its translation. All are 0 if `to_world` is
+/// singular.
 void put_inverse(FilterRecord& r, const Affine& to_world) {
   const Double3 axes[3] = {to_double(to_world.axis(0)), to_double(to_world.axis(1)),
                            to_double(to_world.axis(2))};
@@ -36,7 +36,7 @@ ShadowLookRecord make_shadow(const ShadowLook& look) {
   ShadowLookRecord r{};
   put(r.color, to_double(look.color));
   r.distance = look.distance < 0 ? kFarAway : look.distance;
-  // The zone ends at the surface itself.
+  // The falloff zone ends at the surface at the latest.
   r.falloff = look.distance < 0 ? 0.f : std::clamp(look.falloff, 0.f, look.distance);
   r.inverse_gamma = 1 / std::max(look.gamma, 1e-3f);
   return r;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Filters of lights: what stands before a light and changes what goes through it.
+/// Light filters, which attenuate and tint the light that passes through them.
 ///
-/// Light leaves a place x of the light along e. In the filter's own space it crosses the window,
+/// Light leaves a point x on the light in direction e. In the filter's space it crosses the window,
 /// the plane z = -distance, at w = x + e (distance + x_z) / -e_z, and
 ///   doors     product over four sides of smoothstep(a w_x + b w_y + c)
 ///   picture   texel at (u . (w_x, w_y, 1), v . (w_x, w_y, 1))
-///   decay     of the distance to what is lit: near (d - near_start) / (near_end - near_start),
-///             far 1 - (d - far_start) / (far_end - far_start), both within 0 and 1
-/// multiply the radiance. Light that does not go through the window, as it starts beyond it or goes
-/// the other way, is dark. A filter of density k lets 1 - k of the light by as it is.
+///   decay     clamped functions of the distance d to the illuminated point:
+///             near (d - near_start) / (near_end - near_start),
+///             far 1 - (d - far_start) / (far_end - far_start)
+/// multiply the radiance. Light that starts beyond the window or travels away from it is blocked. A
+/// filter of density k passes the fraction 1 - k of the light unchanged.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -17,20 +18,21 @@
 
 namespace wavecomb::detail {
 
-/// Place and direction of light that leaves a light, in the world, and how far it goes.
+/// Light that leaves a light: position and direction in world space, and distance to the
+/// illuminated point.
 template <typename F>
 struct Leaving {
   Vec3<F> place, along;
   F distance;
 };
 
-/// What one filter lets through.
+/// Transmittance of a single filter.
 template <typename F>
 struct FilterReader : RecordReader<F> {
   FilterReader(const LightView& view, const UInt<F>& filter, const Mask<F>& lanes)
       : RecordReader<F>(make_reader<FilterRecord, F>(view.filters, filter, lanes)) {}
 
-  /// Of window (x, y), where light meets it; picture: what it shows there.
+  /// Returns the transmittance at (x, y) of the window, including the picture.
   Color<F> at_window(const TextureView* textures, const F& x, const F& y,
                      const Mask<F>& lanes) const {
     using R = FilterRecord;
@@ -82,7 +84,8 @@ struct FilterReader : RecordReader<F> {
   }
 };
 
-/// Radiance as filter `filter` and those that go with it let it through; as it is for kNoFilter.
+/// Returns the radiance after filter `filter` and all filters chained to it. kNoFilter leaves it
+/// unchanged.
 template <typename F>
 [[gnu::noinline]] Color<F> filtered(const LightView& view, const UInt<F>& filter,
                                     const Leaving<F>& light, const Color<F>& radiance,

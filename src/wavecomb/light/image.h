@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Points of an image by a Distribution2D, and their density: of any light that has a picture and a
-/// map from the unit square to itself.
+/// Sampling of image points by a Distribution2D, and their density, for all lights with an image
+/// that maps to the unit square.
 ///
-/// x is s, to the right; y is down from the top row, 1 - t.
+/// x is s, to the right; y points down from the top row, so it is 1 - t.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +12,13 @@
 
 namespace wavecomb::detail {
 
-/// Where interval `index` of a row starts, and how many of the row's 65536 counts it has.
+/// Interval `index` of a row: its start, and its number of counts out of the row's 65536.
 template <typename F>
 struct Interval {
   UInt<F> index, begin, count;
 };
 
-/// The values of interval `index` of a row of n. Two values are read as one word.
+/// Returns interval `index` of a row of n intervals. Reads two adjacent values as one word.
 template <typename F>
 inline Interval<F> interval_at(const Distribution2D& d, const UInt<F>& row, uint32_t n,
                                const UInt<F>& index, const Mask<F>& active) {
@@ -34,15 +34,15 @@ inline Interval<F> interval_at(const Distribution2D& d, const UInt<F>& row, uint
   return {index, begin, end - begin};
 }
 
-/// The last of `n` ascending values of a line that is at most x; the first one is. All are
-/// compared, in a register or two.
+/// Returns the index of the last of `n` ascending values of a line that is at most x. The first
+/// value must be at most x. The loop compares all values, which takes one or two registers.
 inline uint32_t last_at_most(const Distribution2D::Line& line, uint32_t n, uint16_t x) {
   uint16_t at_most = 0;
   for (const uint16_t value : line.value) at_most = static_cast<uint16_t>(at_most + (value <= x));
   return std::min<uint32_t>(at_most, n) - 1;
 }
 
-/// The interval that holds count x in [0, kCounts) of a row of n intervals.
+/// Returns the interval that contains count x in [0, kCounts) of a row of n intervals.
 template <typename F>
 inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, uint32_t n,
                                  const UInt<F>& x, const Mask<F>& active) {
@@ -65,8 +65,8 @@ inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, ui
   return {load<U>(index.value), load<U>(begin.value), load<U>(count.value)};
 }
 
-/// Density over the unit square in a cell whose row and column have the given counts: the product
-/// of counts / 65536 * intervals.
+/// Returns the density over the unit square in a cell whose row and column have the given counts:
+/// the product of counts / 65536 * intervals of both.
 template <typename F>
 inline F image_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt<F>& column_count) {
   const float scale = static_cast<float>(d.width) * static_cast<float>(d.height) * 0x1p-32f;
@@ -79,9 +79,9 @@ struct ImagePoint {
   F pdf;  ///< over the unit square
 };
 
-/// A point of the image by its density: the row by the marginal, then the column, each by
-/// inversion. u, v are multiples of 2^-24, or of 2^-20 over a number up to 16: the counts that they
-/// fall on are exact.
+/// Samples an image point: first the row by the marginal distribution, then the column, both by
+/// inversion. u and v are multiples of 2^-24, or of 2^-20 / n with n up to 16, so that their counts
+/// are exact.
 template <typename F>
 inline ImagePoint<F> sample_image(const Distribution2D& d, const F& u, const F& v,
                                   const Mask<F>& active) {
@@ -99,8 +99,8 @@ inline ImagePoint<F> sample_image(const Distribution2D& d, const F& u, const F& 
           image_pdf<F>(d, y.count, x.count)};
 }
 
-/// The density that sample_image has at (x, y) of the unit square; what is beside it is taken for
-/// the nearest cell.
+/// Returns the density of sample_image() at (x, y) of the unit square. Points outside use the
+/// nearest cell.
 template <typename F>
 inline F image_pdf_at(const Distribution2D& d, const F& x, const F& y, const Mask<F>& active) {
   const auto cell = [](const F& at, uint32_t size) {

@@ -14,8 +14,8 @@ std::span<const LightKindInfo> light_kinds() {
 
 namespace {
 
-/// Whether a filter, or one that goes with it, asks how far light goes, which paths from the light
-/// do not know.
+/// Returns whether a filter, or one chained to it, depends on the distance that light travels,
+/// which light paths do not know.
 bool fades(std::span<const LightFilter> filters, uint32_t filter) {
   for (; filter != kNoFilter; filter = filters[filter].next)
     if (filters[filter].fades()) return true;

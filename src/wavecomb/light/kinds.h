@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// All kinds of lights. A new kind is a pair of files beside this one, their header here, and an
-/// entry at the end of the list.
+/// List of all kinds of lights. To add a kind, add a pair of files to this folder, include its
+/// header here, and append an entry to the list.
 ///
 /// A kind is a struct <Name>Kind with
-///   describe()   what the scene and the accelerator ask of it (scene/light_kind.h),
-///   sample       a direction from a point to the light, radiance and density,
-///   hit          radiance and density for a ray that met its shape, and
-///   escape       for a ray that left the scene;
-///   emit         where a path from the light starts, and where it goes, and
-///   emission_density    with which it would have come along a ray that met the light.
-/// Of hit and escape NoShape and NoEscape say nothing.
+///   describe()   the properties that the scene and the accelerator need (scene/light_kind.h),
+///   sample       samples a direction from a point to the light, with radiance and density,
+///   hit          returns radiance and density for a ray that hits its shape,
+///   escape       returns both for a ray that leaves the scene,
+///   emit         samples the origin and direction of a light path, and
+///   emission_density    returns the density of such a path for a ray that hits the light.
+/// NoShape and NoEscape provide hit and escape for kinds that do not need them.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 #include "wavecomb/light/rect.h"
 #include "wavecomb/light/sphere.h"
 
-/// X(name), in the order of the numbers that records and fingerprints hold.
+/// X(name), in the order of the kind numbers in records and fingerprints.
 #define WAVECOMB_LIGHT_KINDS(X) X(Rect) X(Disk) X(Sphere) X(Cylinder) X(Distant) X(Dome) X(Triangle)
 
 namespace wavecomb {

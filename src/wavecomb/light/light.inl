@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies of light sampling (light.h), for the units that instantiate them.
+/// Bodies of light.h, for the compile units that instantiate them.
 #pragma once
 
 #include "wavecomb/light/filter.h"
@@ -14,8 +14,8 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Index of a light out of the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)), as PickTable
-/// says: integers all the way, so that pick_pdf is exact.
+/// Returns a light by the 24 bits of u_pick (a multiple of 2^-24 in [0, 1)) and the PickTable. All
+/// arithmetic is in integers, so that pick_pdf is exact.
 template <typename F>
 inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>& active) {
   using U = UInt<F>;
@@ -33,12 +33,12 @@ inline UInt<F> pick_light(const LightView& view, const F& u_pick, const Mask<F>&
   return select(rest < threshold, bin, other) + select(triangle, U(view.first_triangle), U(0u));
 }
 
-/// A choice, by tree or by shares.
+/// Selection of a light, by the light tree or by light weights.
 template <typename F>
 struct LightPick {
   UInt<F> light;
-  F probability;   ///< where it is not what the light's record says
-  Mask<F> active;  ///< lanes that have a light
+  F probability;   ///< selection probability, if it is not in the light's record
+  Mask<F> active;  ///< lanes with a light
   bool of_record;
 
   LightPick(const LightView& view, const LightReceiver<F>& to, const F& u_pick,
@@ -57,7 +57,8 @@ struct LightPick {
   F pdf(const F& recorded) const { return of_record ? recorded : probability; }
 };
 
-/// Probability with which sample_light chooses finite light `light`, whose record says `recorded`.
+/// Returns the probability with which sample_light() selects finite light `light`, whose record has
+/// the pick_pdf `recorded`.
 template <typename F>
 inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& recorded,
                          const LightReceiver<F>& to, const Mask<F>& active) {
@@ -65,7 +66,7 @@ inline F finite_pick_pdf(const LightView& view, const UInt<F>& light, const F& r
   return view.pick_pdf ? gather<F>(view.pick_pdf, light, active) : recorded;
 }
 
-/// Runs `one(kind, lanes)` for each kind of light among the active lanes.
+/// Calls `one(kind, lanes)` for each kind of light in the active lanes.
 template <typename F, typename Function>
 inline void for_each_kind(const UInt<F>& kind, const Mask<F>& active, const Function& one) {
   for (Mask<F> pending = active; any(pending);) {
@@ -127,8 +128,7 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
   const detail::LightReader<F> any_light(view.lights, index, others);
   detail::for_each_kind<F>(
       any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
-        // Often there is one light of a kind, whose record is the same in all
-        // its lanes.
+        // Often a kind has only one light, so that all its lanes share a record.
         const detail::LightReader<F> light(view.lights, index, lanes);
         Vec3<F> from = p;
         if (view.motions) [[unlikely]]

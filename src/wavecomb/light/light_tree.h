@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Choosing a light by tree, for the point that it is to shine on.
+/// Selection of a light by a light tree, depending on the illuminated point.
 ///
 /// A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree
-/// Splitting", 2018, section 5: from the root down, a child is chosen by its importance
+/// Splitting", 2018, section 5: the traversal starts at the root and selects a child by its
+/// importance
 ///
 ///   I = intensity max(cos t_l, 0) max(cos t_r, 0) / max(d^2, r^2 / 2)
 ///
-/// with d the distance from the point to the centre of the child's bounding sphere of radius r, and
-/// t_l, t_r the least angles that its lights' normals, and the receiver's, can make with the way
-/// between the point and any place in the sphere. I is 0 only where no light below can contribute.
-/// A light's probability is the product over its way, which its trail gives: both halves of MIS run
-/// the same steps.
+/// where d is the distance from the point to the centre of the child's bounding sphere of radius r,
+/// and t_l and t_r are the least angles that the normals of its lights and the receiver's normal
+/// can make with the line between the point and any position in the sphere. I is 0 only if none of
+/// the child's lights can contribute. The probability of a light is the product over the path from
+/// the root, which the light's trail stores. Both MIS techniques run the same steps.
 #pragma once
 
 #include "wavecomb/core/hash.h"
@@ -22,7 +23,7 @@
 
 namespace wavecomb {
 
-/// A light and the probability of its choice. pdf 0: no light.
+/// Selected light and its probability. A pdf of 0 means no light.
 template <typename F>
 struct LightChoice {
   UInt<F> light;
@@ -31,15 +32,15 @@ struct LightChoice {
 
 namespace detail {
 
-/// What cosines may be off by: rounding, and the steps of a packed normal.
+/// Tolerance of cosines, for rounding and for the quantisation of packed normals.
 inline constexpr float kCosineSlack = 4e-3f;
-/// How near the lights of a cluster are taken to be at the least: the square, in those of its
-/// radius. The published 1 takes all lights around a point for far; on the street of
-/// benchmarks/light_selection.py 0.5 has a quarter less error with 1,000 lights, a third with
-/// 10,000, and as much with 100. Less than 0.25 is worse again.
+/// Lower bound of the squared distance to a cluster, in units of its squared radius. The published
+/// value is 1, which treats all lights around a point as distant. On the street of
+/// benchmarks/light_selection.py, 0.5 has a quarter less error with 1,000 lights, a third less with
+/// 10,000, and the same with 100. Values below 0.25 are worse again.
 inline constexpr float kNearest = 0.5f;
 
-/// Cosine and sine of max(0, a - b), for angles from 0 to pi.
+/// Cosine and sine of an angle from 0 to pi.
 template <typename F>
 struct Angle {
   F cos, sin;
@@ -56,7 +57,7 @@ inline Angle<F> angle_of_cosine(const F& cosine) {
   return {c, safe_sqrt(fma(F(-c), c, F(1.f)))};
 }
 
-/// I of the child whose 8 words are at r.
+/// Returns I of the child whose 8 words start at r.
 template <typename F>
 inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
                           const Mask<F>& any_side) {
@@ -93,8 +94,8 @@ inline F light_importance(const F* r, const Vec3<F>& p, const Vec3<F>& normal,
   return select(shines, max(importance, F(1e-37f)), F(0.f));
 }
 
-/// Follows the children that `goes_right(probability of the left one, lanes)` chooses from the root
-/// to a light.
+/// Descends from the root to a light. `goes_right(probability of the left child, lanes)` selects
+/// the children.
 template <typename F, typename Choose>
 inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>& to,
                               const Mask<F>& active, const Choose& goes_right) {
@@ -110,7 +111,7 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
     const F right = light_importance<F>(r.data() + 8, to.p, normal, any_side);
     const F sum = left + right;
     F p_left = left / select(sum > 0.f, sum, F(1.f));
-    // Whatever can shine is chosen now and then.
+    // Every child that can contribute keeps a minimum probability.
     const Mask<F> both = (left > 0.f) & (right > 0.f);
     p_left = select(both, clamp(p_left, F(0x1p-12f), F(1.f - 0x1p-12f)), p_left);
     const Mask<F> take_right = goes_right(p_left, going);
@@ -124,9 +125,10 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
   return {select(Mask<U>(found), U(at & ~kTreeLeaf), U(kNoLight)), select(found, pdf, F(0.f))};
 }
 
-/// The light that u (a multiple of 2^-24 in [0, 1)) chooses for `to`. Where u chooses the tree, its
-/// place among those numbers goes on to the first node, and what a choice has left of it to the
-/// next; bits that run out below are made up from `to.seed`.
+/// Returns the light that u_pick (a multiple of 2^-24 in [0, 1)) selects for `to`. Infinite lights
+/// have fixed intervals of u_pick. Within the interval of the tree, the position is rescaled to [0,
+/// 1) for the first node, and what each choice leaves is rescaled for the next one. Bits below the
+/// precision of u_pick are generated from `to.seed`.
 template <typename F>
 [[gnu::noinline]] LightChoice<F> choose_by_tree(const LightView& view, const LightReceiver<F>& to,
                                                 const F& u_pick, const Mask<F>& active) {
@@ -160,7 +162,7 @@ template <typename F>
   return choice;
 }
 
-/// Probability with which choose_by_tree chooses finite light `light` for `to`.
+/// Returns the probability with which choose_by_tree() selects finite light `light` for `to`.
 template <typename F>
 [[gnu::noinline]] F tree_pdf(const LightView& view, const UInt<F>& light,
                              const LightReceiver<F>& to, const Mask<F>& active) {

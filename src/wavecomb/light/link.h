@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Which surfaces a light shines on, and which stand in its way.
+/// Light linking: the surfaces that a light illuminates, and the objects that cast its shadows.
 #pragma once
 
 #include "wavecomb/light/record.h"
 
 namespace wavecomb {
 
-/// Lanes where a surface of class `link` (0: none, as a camera has) is in set `set` of geometry
-/// (kNoSet: in all).
+/// Returns the lanes in which surfaces of class `link` (0 without a surface, as for cameras) belong
+/// to geometry set `set` (kNoSet contains all).
 template <typename F>
 inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<F>& set,
                          const Mask<F>& active) {
@@ -18,7 +18,8 @@ inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<
   return not_(asked) | Mask<F>(((word >> (set & 31u)) & 1u) != U(0u));
 }
 
-/// Lanes where light `light` shines on surfaces of class `link`; what merely glows shines on all.
+/// Returns the lanes in which light `light` illuminates surfaces of class `link`. Emissive
+/// triangles without a light record illuminate all surfaces.
 template <typename F>
 inline Mask<F> shines_on(const LightView& view, const UInt<F>& link, const UInt<F>& light,
                          const Mask<F>& active) {
@@ -30,7 +31,8 @@ inline Mask<F> shines_on(const LightView& view, const UInt<F>& link, const UInt<
   return not_(known) | is_linked<F>(view.links, link, set, known);
 }
 
-/// For shadow rays to light `light`: 1 + the set of what stands in their way, 0: everything.
+/// Returns, for shadow rays to light `light`, 1 + the set of geometry that blocks them, or 0 if all
+/// geometry does.
 template <typename F>
 inline UInt<F> shadow_set(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;

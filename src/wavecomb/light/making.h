@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What the rooms of light kinds share where records are made, in double precision.
+/// Shared functions of the light kinds that build light records, in double precision.
 #pragma once
 
 #include <algorithm>
@@ -11,9 +11,9 @@ namespace wavecomb::making {
 
 inline constexpr double kPiD = 3.14159265358979323846;
 
-/// Areas below are too small to be told from 0 in float: such lights are dark.
+/// Smaller areas are indistinguishable from 0 in float. Such lights are dark.
 inline constexpr double kLeastArea = 1e-36;
-/// Largest radiance; beyond it products overflow.
+/// Largest radiance. Products of larger values overflow.
 inline constexpr double kMostRadiance = 1e30;
 
 struct Double3 {
@@ -38,7 +38,7 @@ inline double dot(const Double3& a, const Double3& b) {
 inline double length(const Double3& a) {
   return std::sqrt(dot(a, a));
 }
-/// a / |a|; +z for the zero vector.
+/// Returns a / |a|, or +z for the zero vector.
 inline Double3 unit(const Double3& a) {
   const double n = length(a);
   return n > 0 ? a * (1 / n) : Double3{0, 0, 1};
@@ -57,7 +57,7 @@ inline void put_radiance(LightRecord& record, const Double3& v) {
       {std::min(v.x, kMostRadiance), std::min(v.y, kMostRadiance), std::min(v.z, kMostRadiance)});
 }
 
-/// Light::color without what is negative, and its luminance.
+/// Light::color without negative components, and its luminance.
 struct LightColour {
   Double3 rgb;
   double mean;
@@ -68,27 +68,27 @@ struct LightColour {
         mean(luminance(rgb.x, rgb.y, rgb.z)) {}
 };
 
-/// Radiance and power of a light whose surface has that area; dark where there is none.
+/// Sets radiance and power of a light with the given surface area. A light without area is dark.
 void finish_area(MadeLight& made, const Light& light, double area);
 
-/// Area, directions of emission, radiance and power of a light in the plane with the given edges or
+/// Sets area, emission directions, radiance and power of a planar light with the given edges or
 /// half axes, whose area is `area_factor` |u x v|.
 void finish_flat(MadeLight& made, const Light& light, const Double3& u, const Double3& v,
                  double area_factor);
 
-/// The density of a light with that texture and radiance: one of before where it is there, else
-/// what `build` makes.
+/// Returns the sampling distribution of a light with this texture and radiance: the one in
+/// making.before if it exists, else the result of `build`.
 Distribution2D density_of(const LightRecord& light, const LightMaking& making,
                           Distribution2D (*build)(const TextureView&, const Vec3<float>&));
 
-/// Gives a light its shaping, and takes off what share of its power that lets out: each part by its
-/// mean over all directions, as if they had nothing to do with one another.
+/// Adds the shaping to a light, and scales its power by the fraction of light that the shaping
+/// passes. Each attribute contributes its mean over all directions, as if they were independent.
 void add_shaping(MadeLight& made, const Light& light, LightMaking& making);
 
-/// What a light's shadows are like, as lanes read it.
+/// Returns the packed shadow attributes of a light.
 ShadowLookRecord make_shadow(const ShadowLook& look);
 
-/// A box from the point `a` to the point `b`, `half` larger, and a little more for rounding.
+/// Returns a box from point `a` to point `b`, extended by `half` and a tolerance for rounding.
 Bounds box_around(const float (&a)[3], const float (&b)[3], const float (&half)[3]);
 
 }  // namespace wavecomb::making

@@ -27,7 +27,7 @@ LightRecord make_mesh_light(const PlacedMeshLight& placed, LightMaking& making) 
                to_double(light.color) * (!there ? 0 : (light.normalize ? 1 / placed.area : 1)));
   record.area = static_cast<float>(placed.area);
   record.sync = static_cast<uint32_t>(light.sync);
-  // Of light that the material does not tell of, paths that meet the mesh get nothing.
+  // Paths that hit the mesh do not receive light that is independent of its material.
   if (light.sync == MaterialSync::kIndependent) record.sampled_only = 1;
   if (!placed.is_sampled) record.sampled_only = 0;
   return record;

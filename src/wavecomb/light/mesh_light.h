@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Mesh lights: triangles of meshes that UsdLux makes lights of, whose light may be other than what
-/// their material shows.
+/// Mesh lights: triangles of meshes with UsdLux light attributes, whose light may differ from the
+/// emission of their material.
 #pragma once
 
 #include "wavecomb/light/link.h"
@@ -11,8 +11,8 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Radiance of samples `s` on triangles `light`, as their mesh lights let it out. What is constant
-/// is tinted when the scene is built.
+/// Returns the radiance of samples `s` on triangles `light`, with tint and shaping of their mesh
+/// lights. Constant radiance was tinted when the scene was built.
 template <typename F>
 inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
                               const TriangleReader<F>& triangle, const KindSample<F>& s,
@@ -27,9 +27,9 @@ inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
   return shaped<F>(view, reader.shaping(), -s.wi, radiance, known);
 }
 
-/// Factor of what a path gets that meets a light with these multipliers: `share` of the path's last
-/// bounce is diffuse, the rest specular. A camera sees the light as it is. `is_seen`: no light
-/// sample could have been as the path is.
+/// Returns the factor for emission that a path hits, for a light with these multipliers. `share` is
+/// the diffuse fraction of the path's last bounce; the rest is specular. Cameras see the light
+/// without multipliers. `is_seen` marks paths that light sampling cannot produce.
 template <typename F>
 inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
                               const Mask<F>& is_seen, bool from_camera, const Color<F>& share) {
@@ -44,9 +44,10 @@ inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>
 
 }  // namespace detail
 
-/// What a path along `dir` gets of meshes of mesh lights `record` (kNoLight: of none) that it met,
-/// before MIS: `glow` is the radiance that the material says. `is_seen`: a camera or a mirror looks
-/// at it, else it is a bounce which light sampling could have made, `share` of which is diffuse.
+/// Returns the radiance that a path along `dir` receives from meshes with mesh light records
+/// `record` (kNoLight for other meshes), before MIS. `glow` is the emission of the material.
+/// `is_seen` marks hits from a camera or a mirror. Other hits are bounces that light sampling can
+/// also produce, with the diffuse fraction `share`.
 template <typename F>
 inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
                                     const Color<F>& glow, const Vec3<F>& dir, const UInt<F>& link,
@@ -74,8 +75,8 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
   return select<F>(given, radiance, glow);
 }
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h). Records of mesh lights are no lights that
-/// can be chosen; their triangles are rows of their own.
+/// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds.h). Records of mesh lights are never
+/// selected themselves; their triangles have separate rows.
 struct TriangleKind : NoEscape, NoShape {
   static LightKindInfo describe();
   template <typename F>

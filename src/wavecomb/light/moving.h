@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights that move while the shutter is open (scene/light_motion.h has the formula). What sees
-/// such a light at its time is taken to where the light rests, all is worked out there, and
-/// directions are taken back.
+/// Lights that move while the shutter is open (scene/light_motion.h has the formula). Points and
+/// directions at the light's time are transformed to its rest pose, everything is computed there,
+/// and directions are transformed back.
 #pragma once
 
 #include "wavecomb/core/rows.h"
@@ -10,11 +10,11 @@
 
 namespace wavecomb {
 
-/// Where the lanes' lights are at a time, seen from where they rest. Of lights that stand still all
-/// is as it was, to the bit.
+/// Pose of the lanes' lights at a time, relative to their rest pose. For lights without motion the
+/// transform is exactly the identity.
 template <typename F>
 struct LightPose {
-  Vec3<F> x, y, z;  ///< where the axes of rest point
+  Vec3<F> x, y, z;  ///< directions of the rest pose's axes
   Vec3<F> place, origin;
 
   Vec3<F> to_rest(const Vec3<F>& direction) const {
@@ -27,7 +27,7 @@ struct LightPose {
   Vec3<F> point_to_world(const Vec3<F>& p) const { return to_world(p - origin) + place; }
 };
 
-/// Of records `light` at `time`. Run only where LightView::motions.
+/// Returns the pose of light records `light` at `time`. Used only with LightView::motions.
 template <typename F>
 [[gnu::noinline]] LightPose<F> light_pose(const LightView& view, const UInt<F>& light,
                                           const F& time, const Mask<F>& lanes) {

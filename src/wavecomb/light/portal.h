@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Portals: rectangles that guide the sampling of a dome, of which a room has windows.
+/// Portals: rectangles, such as the windows of a room, that guide the sampling of a dome.
 ///
-/// A direction to the dome is taken through the portals with some probability a, uniform in the
-/// solid angle that they take up together, else by the dome's image. The density of a direction is
-/// that of the mixture, whichever way it came,
-///     p = a (portals that it goes through) / (sum of solid angles) + (1 - a) p_image,
-/// so that light from beside the portals still counts. With w the solid angle of the portals and i
-/// PortalGroup::image_solid_angle, a = i / (i + w) within bounds: what is smaller finds the light.
-/// Points that see no portal from its back
-/// (the side that it lets light out at), or only as small as kLeastRectSolidAngle, take the image
-/// alone.
+/// Directions to the dome are sampled through the portals with probability a, uniformly in their
+/// total solid angle, and otherwise by the dome's image. The density of a direction is that of the
+/// mixture for both techniques,
+///     p = a (number of portals it passes) / (sum of solid angles) + (1 - a) p_image,
+/// so that light from outside the portals also counts. With w the solid angle of the portals and i
+/// PortalGroup::image_solid_angle, a = i / (i + w), clamped: the smaller of the two finds the light
+/// better. Points that see no portal from its back (the side that light leaves at), or only ones
+/// smaller than kLeastRectSolidAngle, use the image alone.
 #pragma once
 
 #include "wavecomb/light/rect.h"
@@ -18,7 +17,7 @@ namespace wavecomb::detail {
 
 inline constexpr float kLeastPortalShare = 0.2f, kMostPortalShare = 0.9f;
 
-/// The portals of one dome, as the points `from` see them.
+/// Portals of one dome, as seen from the points `from`.
 template <typename F>
 class Portals {
  public:
@@ -34,13 +33,14 @@ class Portals {
     });
   }
 
-  /// How often directions go through the portals.
+  /// Returns the probability of sampling through the portals.
   F share() const {
     const F a = clamp(F(image_ / F(total_ + image_)), F(kLeastPortalShare), F(kMostPortalShare));
     return select(total_ > 0.f, a, F(0.f));
   }
 
-  /// Directions through them, uniform in solid angle; where none is seen: anything.
+  /// Samples directions through the portals, uniform in solid angle. Undefined if no portal is
+  /// visible.
   Vec3<F> sample(const F& u, const F& v) const {
     Vec3<F> wi(F(0.f), F(0.f), F(1.f));
     const F pick = u * total_;
@@ -57,7 +57,7 @@ class Portals {
     return wi;
   }
 
-  /// The density of the mixture. `through`: lanes whose direction came of sample().
+  /// Returns the density of the mixture. `through` marks lanes whose direction is from sample().
   F pdf(const Vec3<F>& wi, const F& image_pdf, const Mask<F>& through) const {
     F hits(0.f);
     for_each([&](const SphericalRect<F>& r, const LightReader<F>&) {
@@ -68,7 +68,7 @@ class Portals {
           r.usable & (dz > 0.f) & (x >= r.x0) & (x <= r.x1) & (y >= r.y0) & (y <= r.y1);
       hits += select(inside, F(1.f), F(0.f));
     });
-    hits = select(through, max(hits, F(1.f)), hits);  // on the edge, rounding may decide
+    hits = select(through, max(hits, F(1.f)), hits);  // rounding may decide at an edge
     const F share_ = share();
     const F by_portals = hits / select(total_ > 0.f, total_, F(1.f));
     return fma(share_, by_portals, F((1.f - share_) * image_pdf));
@@ -88,7 +88,7 @@ class Portals {
   Vec3<F> from_;
   Mask<F> active_;
   F image_;  ///< PortalGroup::image_solid_angle
-  F total_;  ///< solid angle of all
+  F total_;  ///< total solid angle of the portals
 };
 
 }  // namespace wavecomb::detail

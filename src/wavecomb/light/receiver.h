@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The point that a light sample is to illuminate.
+/// Point that a light sample illuminates.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -7,22 +7,22 @@
 
 namespace wavecomb {
 
-/// Where light is to arrive.
+/// Point to illuminate.
 template <typename F>
 struct LightReceiver {
   Vec3<F> p;
-  /// Normal on the side that light has to come from, as pack_normal gives it; 0: any side.
+  /// Packed normal (pack_normal) of the side that light must arrive at; 0 for both sides.
   UInt<F> normal;
-  UInt<F> seed;  ///< of bits below those of the number that chooses
-  F time;        ///< of the shutter, where lights move: mid-shutter, unless it is set
+  UInt<F> seed;  ///< source of random bits below the precision of the selecting number
+  F time;        ///< shutter time if lights move; default mid-shutter
 
-  /// Light may come from any side.
+  /// Light may arrive from any side.
   LightReceiver(const Vec3<F>& p_) : p(p_), normal(0u), seed(0u), time(0.5f) {}
   explicit LightReceiver(const Vec3<F>& p_, const UInt<F>& normal_)
       : p(p_), normal(normal_), seed(0u), time(0.5f) {}
 };
 
-/// A unit vector in ten bits a component, never 0.
+/// Packs a unit vector with ten bits for each component. The result is never 0.
 template <typename F>
 inline UInt<F> pack_normal(const Vec3<F>& n) {
   const auto steps = [](const F& x) {

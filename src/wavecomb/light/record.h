@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reads light records by lane, and what the files of the light kinds share.
+/// Reader of light records by lane, and definitions that all light kinds share.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -11,17 +11,17 @@
 
 namespace wavecomb {
 
-/// "Distance" of infinite lights.
+/// Distance of infinite lights.
 inline constexpr float kFarAway = 1e30f;
 
 namespace detail {
 
-/// Fields of the light in each lane.
+/// Fields of the light record in each lane.
 template <typename F>
 struct LightReader : RecordReader<F> {
   LightReader(const LightRecord* lights, const UInt<F>& light, const Mask<F>& active_)
       : RecordReader<F>(make_reader<LightRecord, F>(lights, light, active_)) {}
-  /// The same record in all lanes.
+  /// Reads the same record in all lanes.
   LightReader(const LightRecord& record, const Mask<F>& active_)
       : RecordReader<F>(make_reader<LightRecord, F>(record, active_)) {}
 
@@ -38,8 +38,8 @@ struct LightReader : RecordReader<F> {
   UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
 };
 
-/// The record that says what light `light` shines on and how: its own, or that of the mesh light
-/// which a triangle is part of; kNoLight for triangles that merely glow.
+/// Returns the record with the links and multipliers of light `light`: its own or, for a triangle,
+/// the record of its mesh light. Returns kNoLight for triangles that are only emissive.
 template <typename F>
 inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;
@@ -52,35 +52,36 @@ inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask
   return record;
 }
 
-/// What one light gives a shading point, before the choice of the light is counted.
+/// Sample of one light, without the probability of selecting the light.
 template <typename F>
 struct KindSample {
   Vec3<F> wi;  ///< unit direction to the light
   F distance;
-  Color<F> radiance;  ///< delta lights: the irradiance at normal incidence
-  F pdf;              ///< over solid angle; delta lights: 1; 0: no sample
+  Color<F> radiance;  ///< for delta lights, the irradiance at normal incidence
+  F pdf;              ///< over solid angle; 1 for delta lights; 0 without a sample
   Mask<F> is_delta;
 };
 
-/// Radiance and density over solid angle for a ray that met a light.
+/// Radiance and solid angle density for a ray that hit a light.
 template <typename F>
 struct KindHit {
   Color<F> radiance;
   F pdf;
 };
 
-/// What a kind is asked to sample: the light in lanes `lanes`, as `from` sees it, by (u, v).
+/// Parameters of a light sample: the light in lanes `lanes`, the point `from`, and the sample (u,
+/// v).
 template <typename F>
 struct LightQuery {
   const LightView& view;
-  const UInt<F>& index;         ///< of the light in each lane
-  const LightReader<F>& light;  ///< its record
+  const UInt<F>& index;         ///< index of the light in each lane
+  const LightReader<F>& light;  ///< record of the light
   const Vec3<F>& from;
   const F &u, &v;
   const Mask<F>& lanes;
 };
 
-/// Rays origin + t dir that met the shape of a light.
+/// Rays origin + t dir that hit the shape of a light.
 template <typename F>
 struct LightMeeting {
   const LightView& view;
@@ -90,7 +91,7 @@ struct LightMeeting {
   const Mask<F>& lanes;
 };
 
-/// Rays that left `from` and the scene along `dir`, of which one light is asked.
+/// Rays from `from` along `dir` that leave the scene, evaluated for one infinite light.
 template <typename F>
 struct LightEscape {
   const LightView& view;
@@ -99,8 +100,8 @@ struct LightEscape {
   const Mask<F>& lanes;
 };
 
-/// What a kind is asked to send a path from: the light in lanes `lanes`, its place by (u, v), its
-/// direction by (s, t).
+/// Parameters of a light path sample: the light in lanes `lanes`, the sample (u, v) for the origin
+/// and the sample (s, t) for the direction.
 template <typename F>
 struct EmissionQuery {
   const LightView& view;
@@ -109,37 +110,39 @@ struct EmissionQuery {
   const Mask<F>& lanes;
 };
 
-/// Where a path starts at a light and where it goes, before the choice of the light is counted.
+/// Origin and direction of a light path, without the probability of selecting the light.
 ///
-/// `density` is what the path's weight and those of multiple importance sampling need (docs/
-/// light-paths.md): that of the place times that of the direction over its cosine,
-///   p_A(p) p_w(d) / |cos|;   of a point p_w(d);   of an infinite light p_w(d) / (pi R^2);
-///   of a distant one without an angle 1 / (pi R^2),
-/// so that radiance (a point: intensity; without an angle: irradiance) / density is the flux that
-/// the path carries. 0: no path.
+/// `density` is what the path's weight and MIS need (docs/light-paths.md): the density of the
+/// origin times that of the direction, divided by the cosine,
+///   p_A(p) p_w(d) / |cos|;   for a point light p_w(d);   for an infinite light p_w(d) / (pi R^2);
+///   for a distant light without an angle 1 / (pi R^2),
+/// so that radiance (point light: intensity; distant light without an angle: irradiance) / density
+/// is the flux that the path carries. A density of 0 means that there is no path.
 template <typename F>
 struct KindEmission {
   Vec3<F> p, d;  ///< unit d
-  Vec3<F> n;     ///< unit, out of the light's surface, to keep clear of; 0: it has none
+  /// Unit normal of the light's surface, for the offset of the origin; 0 without a surface.
+  Vec3<F> n;
   Color<F> radiance;
   F density;
 };
 
-/// A path from `p` by cosine about the surface's normal `n`.
+/// Returns a path from `p` with cosine-distributed direction about the surface normal `n`.
 template <typename F>
 inline KindEmission<F> emit_by_cosine(const Vec3<F>& p, const Vec3<F>& n, const F& s, const F& t,
                                       const Color<F>& radiance, const F& density) {
   return {p, make_frame(n).to_world(square_to_cosine_hemisphere(s, t)), n, radiance, density};
 }
 
-/// kInvPi / area; 0 where that is out of range.
+/// Returns kInvPi / area, or 0 if that is out of range.
 template <typename F>
 inline F even_emission_density(const F& area) {
   const F density = kInvPi / select(area > 0.f, area, F(1.f));
   return select((area > 0.f) & is_finite(density), density, F(0.f));
 }
 
-/// A path towards the sphere around the scene, along `d`, from a place of its shadow by (u, v).
+/// Returns a path along `d` through the sphere around the scene. It starts on a disk of the
+/// sphere's radius in front of the scene, at a point sampled by (u, v).
 template <typename F>
 inline KindEmission<F> emit_from_afar(const LightView& view, const Vec3<F>& d, const F& u,
                                       const F& v, const Color<F>& radiance,
@@ -152,7 +155,7 @@ inline KindEmission<F> emit_from_afar(const LightView& view, const Vec3<F>& d, c
   return {centre + across, d, Vec3<F>(F(0.f)), radiance,
           direction_pdf * (kInvPi / (view.radius * view.radius))};
 }
-/// The same density for a direction that was met.
+/// Returns the density of emit_from_afar() for a direction with density `direction_pdf`.
 template <typename F>
 inline F density_from_afar(const LightView& view, const F& direction_pdf) {
   return direction_pdf * (kInvPi / (view.radius * view.radius));
@@ -163,9 +166,9 @@ inline KindHit<F> dark() {
   return {Color<F>(F(0.f)), F(0.f)};
 }
 
-/// The density over solid angle that a density of 1 / area becomes at distance^2 `d2`, where the
-/// direction makes an angle of cosine `cos_light` with the light's normal; 0 where the light is
-/// seen from behind or on edge, is degenerate, or the density is out of range.
+/// Returns the solid angle density for the area density 1 / area at squared distance `d2`, where
+/// the direction makes an angle with cosine `cos_light` with the light's normal. Returns 0 if the
+/// light is seen from behind or edge-on, is degenerate, or the density is out of range.
 template <typename F>
 inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   const F projected = cos_light * area;
@@ -174,7 +177,7 @@ inline F area_to_solid_angle(const F& d2, const F& cos_light, const F& area) {
   return select(good & is_finite(pdf), pdf, F(0.f));
 }
 
-/// Unit vector along d and its length; anything finite where d is 0.
+/// Unit vector along d, and its length. The vector is finite even if d is 0.
 template <typename F>
 struct Direction {
   Vec3<F> wi;
@@ -197,14 +200,14 @@ inline Color<F> not_negative(const Color<F>& c) {
 
 struct LightKindInfo;
 
-/// Kinds that rays which leave the scene do not see.
+/// Base of kinds without radiance for rays that leave the scene.
 struct NoEscape {
   template <typename F>
   static detail::KindHit<F> escape(const detail::LightEscape<F>& /*escape*/) {
     return detail::dark<F>();
   }
 };
-/// Kinds that rays do not meet.
+/// Base of kinds without a shape that rays can hit.
 struct NoShape {
   template <typename F>
   static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {

@@ -8,10 +8,10 @@ namespace {
 
 using namespace making;
 
-/// Pictures whose density has at least this spread are sampled evenly: it gives no more noise.
+/// Images whose distribution has at least this spread are sampled uniformly, which adds no noise.
 constexpr float kEvenSpread = 0.9f;
 
-/// The density by the picture; power by its mean.
+/// Adds the sampling distribution of the image, and sets the power by its mean.
 void add_picture(MadeLight& made, LightMaking& making) {
   Distribution2D d = density_of(made.record, making, &build_rect_distribution);
   made.power = kPiD * double{made.record.area} * d.mean_luminance;
@@ -24,7 +24,8 @@ void add_picture(MadeLight& made, LightMaking& making) {
   }
 }
 
-/// Seen from the front, looking along +z with +y up, +x is to the left: s runs along -x.
+/// Makes the record. Seen from the front, along +z with +y up, +x is to the left, so s runs along
+/// -x.
 void make(MadeLight& made, const Light& light, LightMaking& making) {
   const Affine& m = light.to_world;
   const double w = std::fabs(double{light.width}), h = std::fabs(double{light.height});

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rectangle lights: uniform over the solid angle; parallelograms, which a shear makes of them, and
-/// what is seen very small: uniform over the area.
+/// Rectangle lights, sampled uniformly by solid angle. Parallelograms (sheared rectangles) and
+/// rectangles of very small solid angle are sampled uniformly by area.
 ///
-/// With a picture, a point is taken by that with some probability a, else evenly as said. The
-/// density of a direction is that of the mixture, whichever way it came,
+/// With an image, a point is sampled by the image with probability a, and otherwise uniformly as
+/// above. The density of a direction is that of the mixture for both techniques,
 ///     p = a p_image d^2 / (A cos) + (1 - a) p_even,
-/// p_image over the unit square, A the area. Let i be the share of the square that the light of the
-/// picture takes up (Distribution2D::spread), and g that of the rectangle which what is seen of it
-/// takes up, 1 where that is equally near all over: a = g / (g + i) within bounds. What is smaller
-/// finds the light: the picture from afar, the solid angle close by.
+/// where p_image is the density over the unit square and A the area. Let i be the fraction of the
+/// square that the light of the image occupies (Distribution2D::spread), and g the fraction of the
+/// rectangle that dominates the view from the point, which is 1 if all of it is equally close. Then
+/// a = g / (g + i), clamped: the smaller of the two finds the light better, that is the image from
+/// far away and the solid angle close by.
 #pragma once
 
 #include "wavecomb/light/image.h"
@@ -17,7 +18,8 @@
 
 namespace wavecomb::detail {
 
-/// Radiance at (s, t) of the rect: s to the right and t up as seen from the front.
+/// Returns the radiance at (s, t) of the rectangle, with s to the right and t up as seen from the
+/// front.
 template <typename F>
 inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* textures, const F& s,
                               const F& t, const Mask<F>& active) {
@@ -30,27 +32,28 @@ inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* te
   return select<F>(textured, color * not_negative(image), color);
 }
 
-/// Solid angles below are no better sampled than the area, and lose digits.
+/// Below this solid angle, area sampling is as good, and solid angles lose precision.
 inline constexpr float kLeastRectSolidAngle = 2e-3f;
 
-/// A rectangle as a point sees it (C. Urena, M. Fajardo, A. King, "An Area-Preserving
-/// Parametrization for Spherical Rectangles", CGF 32(4) 2013). The point is at the origin of x, y
-/// along the edges and z towards the rectangle, which is [x0, x1] x [y0, y1] at the distance z.
+/// Rectangle as seen from a point (C. Urena, M. Fajardo, A. King, "An Area-Preserving
+/// Parametrization for Spherical Rectangles", CGF 32(4) 2013). The point is the origin, x and y run
+/// along the edges, and z points towards the rectangle, which is [x0, x1] x [y0, y1] at distance z.
 ///
-/// The solid angle is the sum over its corners of +-atan(x y / (z d)), d = sqrt(x^2 + y^2 + z^2),
-/// which is what the paper's sum of angles minus 2 pi comes to: there each angle is
-/// pi / 2 + asin(b c), b and c the z components of the normals of the planes through two
-/// neighbouring edges. Each angle is that of the complex number z d + i x y, so that the difference
-/// of the two along an edge x, less than pi, is one of
+/// The solid angle is the sum over the corners of +-atan(x y / (z d)), d = sqrt(x^2 + y^2 + z^2).
+/// This equals the paper's sum of angles minus 2 pi, in which each angle is pi / 2 + asin(b c),
+/// with b and c the z components of the normals of the planes through two adjacent edges. Each
+/// angle is the argument of the complex number z d + i x y, so that the difference of the two
+/// angles along an edge x, which is less than pi, is the argument of
 ///   z^2 d_0 d_1 + x^2 y_0 y_1 + i x z (y_1 d_0 - y_0 d_1).
-/// Where that is out of range (lengths beyond 10^9 or below 10^-9) the rectangle is not usable.
+/// If that is out of range (lengths above 10^9 or below 10^-9), the rectangle is not usable.
 template <typename F>
 struct SphericalRect {
   Vec3<F> x, y, n;
   F inverse_width, inverse_height, x0, x1, y0, y1, z;
   F solid_angle;
-  F begin;           ///< k of the paper
-  F near_y, b0, b1;  ///< 1 / sqrt(y0^2 + z^2); z components of the normals for the edges y0 and y1
+  F begin;  ///< k in the paper
+  /// 1 / sqrt(y0^2 + z^2), and the z components of the normals at the edges y0 and y1
+  F near_y, b0, b1;
   Mask<F> usable;
 };
 
@@ -67,7 +70,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   r.y0 = dot(corner, r.y);
   r.x1 = r.x0 + light[&LightRecord::length_u];
   r.y1 = r.y0 + light[&LightRecord::length_v];
-  r.z = -dot(corner, r.n);  // the light is seen from the side that n points to
+  r.z = -dot(corner, r.n);  // the front of the light is the side that n points to
   const F z2 = r.z * r.z, edge0 = fma(r.y0, r.y0, z2), edge1 = fma(r.y1, r.y1, z2);
   const auto between = [&](const F& x) {
     const F zd0 = r.z * sqrt(fma(x, x, edge0)), zd1 = r.z * sqrt(fma(x, x, edge1));
@@ -77,7 +80,7 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   const F right = between(r.x1), left = between(r.x0);
   r.solid_angle = right - left;
   r.begin = kPi + left;
-  const F least(1e-30f);  // a point on the line of an edge
+  const F least(1e-30f);  // for a point on the line of an edge
   r.near_y = 1.f / sqrt(max(edge0, least));
   r.b0 = -r.y0 * r.near_y;
   r.b1 = r.y1 / sqrt(max(edge1, least));
@@ -86,8 +89,8 @@ inline SphericalRect<F> make_spherical_rect(const LightReader<F>& light, const V
   return r;
 }
 
-/// Where on the rectangle (u, v) of the unit square lands, as shares of its width and height: the
-/// paper's algorithm 2, with its z0 = -z, and f = g / sin.
+/// Maps (u, v) of the unit square to the rectangle, in fractions of its width and height. This is
+/// the paper's algorithm 2, with z0 = -z and f = g / sin.
 template <typename F>
 inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, const F& v) {
   const auto [sin_a, cos_a] = sincos_2pi(F(fma(u, r.solid_angle, r.begin) * kInv2Pi));
@@ -107,7 +110,7 @@ inline Vec2<F> sample_spherical_rect(const SphericalRect<F>& r, const F& u, cons
   return {share(F(x - r.x0), r.inverse_width), share(F(y - r.y0), r.inverse_height)};
 }
 
-/// Density over solid angle of a point of the rect; 0 where it is seen from behind.
+/// Returns the solid angle density of a point on the rectangle; 0 if it is seen from behind.
 template <typename F>
 inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_light,
                   const F& area) {
@@ -118,9 +121,10 @@ inline F rect_pdf(const SphericalRect<F>& r, const F& distance2, const F& cos_li
   return select(r.usable, pdf, area_to_solid_angle<F>(distance2, cos_light, area));
 }
 
-/// Probability that the point on a rect with a picture of that `spread` is taken by the picture: a
-/// multiple of 1/16, so that both choices get whole numbers of the 2^24 that u may be. The share g
-/// is bounded from below by solid angle / (area * the most that a piece gives, z / d^3).
+/// Returns the probability of sampling a rectangle by its image, which has the given `spread`. It
+/// is a multiple of 1/16, so that both techniques get a whole number of the 2^24 values of u. The
+/// fraction g is bounded from below by solid angle / (area * largest solid angle per area, z /
+/// d^3).
 template <typename F>
 inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
   const F x = clamp(F(0.f), r.x0, r.x1), y = clamp(F(0.f), r.y0, r.y1);
@@ -132,14 +136,14 @@ inline F picture_share(const SphericalRect<F>& r, const F& area, float spread) {
   return select(r.usable, sixteenths, F(14.f)) * 0.0625f;
 }
 
-/// Lanes whose rect has a picture to sample by.
+/// Returns the lanes whose rectangle is sampled by an image.
 template <typename F>
 inline Mask<F> has_picture(const LightReader<F>& light, const Mask<F>& active) {
   return active & Mask<F>(light.texture() != UInt<F>(kNoTexture)) &
          Mask<F>(light[&LightRecord::distribution] != UInt<F>(kNoDistribution));
 }
 
-/// Runs `one(distribution, lanes)` for each picture among the lanes.
+/// Calls `one(distribution, lanes)` for each image in the lanes.
 template <typename F, typename Function>
 inline void for_each_picture(const LightView& view, const LightReader<F>& light,
                              const Mask<F>& lanes, const Function& one) {
@@ -154,7 +158,7 @@ inline void for_each_picture(const LightView& view, const LightReader<F>& light,
   }
 }
 
-/// Where on the rect (u, v) lands that is chosen evenly, as shares of its edges.
+/// Samples the rectangle without its image: (u, v) to fractions of its edges.
 template <typename F>
 inline Vec2<F> sample_rect_evenly(const SphericalRect<F>& r, const F& u, const F& v,
                                   const Mask<F>& active) {
@@ -163,8 +167,8 @@ inline Vec2<F> sample_rect_evenly(const SphericalRect<F>& r, const F& u, const F
   return {select(r.usable, by_angle.x, u), select(r.usable, by_angle.y, v)};
 }
 
-/// A point of the rect as shares of its edges. `share` is 0 and `picture_pdf`, over the unit
-/// square, does not count where there is no picture.
+/// Point on the rectangle in fractions of its edges. Without an image, `share` is 0 and
+/// `picture_pdf`, which is over the unit square, is ignored.
 template <typename F>
 struct RectPoint {
   Vec2<F> at;
@@ -201,7 +205,7 @@ template <typename F>
   return point;
 }
 
-/// The density of the mixture over solid angle, of which `even` is that of even choice.
+/// Returns the solid angle density of the mixture. `even` is the density without the image.
 template <typename F>
 inline F pictured_rect_pdf(const F& share, const F& picture_pdf, const F& even, const F& distance2,
                            const F& cos_light, const F& area) {
@@ -209,7 +213,7 @@ inline F pictured_rect_pdf(const F& share, const F& picture_pdf, const F& even, 
   return fma(share, by_picture, F(F(1.f - share) * even));
 }
 
-/// A point q = p + a u + b v, towards n only.
+/// Samples a point q = p + a u + b v. The rectangle emits only towards n.
 template <typename F>
 inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& light,
                                  const Vec3<F>& from, const F& u, const F& v,
@@ -234,8 +238,8 @@ inline KindSample<F> sample_rect(const LightView& view, const LightReader<F>& li
           pdf, Mask<F>(false)};
 }
 
-/// Where on the rect a point of its plane is, as shares of its edges: with h = q - p = a u + b v
-/// and m = u x v, a = (h x v) . m / m^2 and b = (u x h) . m / m^2.
+/// Returns the position of a point of the rectangle's plane in fractions of its edges: with h = q -
+/// p = a u + b v and m = u x v, a = (h x v) . m / m^2 and b = (u x h) . m / m^2.
 template <typename F>
 inline Vec2<F> place_on_rect(const LightReader<F>& light, const Vec3<F>& q) {
   const Vec3<F> h = q - light.p();
@@ -248,7 +252,7 @@ inline Vec2<F> place_on_rect(const LightReader<F>& light, const Vec3<F>& q) {
   return {clamp(a, F(0.f), F(1.f)), clamp(b, F(0.f), F(1.f))};
 }
 
-/// What a ray gets from the rect at distance t.
+/// Returns radiance and density for a ray that hits the rectangle at distance t.
 template <typename F>
 inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
                            const Vec3<F>& origin, const Vec3<F>& dir, const F& t,
@@ -269,7 +273,7 @@ inline KindHit<F> hit_rect(const LightView& view, const LightReader<F>& light,
   return {select<F>(front, radiance, Color<F>(F(0.f))), pdf};
 }
 
-/// A path from a point of the picture by its density, or of the rect evenly.
+/// Samples a path from a point on the rectangle, by the distribution of its image or uniformly.
 template <typename F>
 inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
@@ -287,7 +291,7 @@ inline KindEmission<F> emit_rect(const EmissionQuery<F>& q) {
                            F(square_pdf * even_emission_density<F>(light.area())));
 }
 
-/// KindEmission::density of emit_rect for a ray that met it.
+/// Returns KindEmission::density of emit_rect() for a ray that hits the rectangle.
 template <typename F>
 inline F rect_emission_density(const LightMeeting<F>& m) {
   const LightReader<F>& light = m.light;
@@ -305,7 +309,7 @@ inline F rect_emission_density(const LightMeeting<F>& m) {
 
 namespace wavecomb {
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+/// Kind of rect lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct RectKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

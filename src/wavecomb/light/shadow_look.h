@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-/// UsdLuxShadowAPI: shadows that end at a distance, and that are not black.
+/// UsdLuxShadowAPI: shadows with a limited distance, and coloured shadows.
 ///
-/// A shadow whose nearest occluder is at t is as strong as s(t) = ((D - t) / f)^gamma from D - f to
-/// D, 1 before and 0 beyond. Shadow rays end at
+/// A shadow whose nearest occluder is at distance t has the strength s(t) = ((D - t) / f)^gamma
+/// from D - f to D, 1 before and 0 beyond. Shadow rays end at
 ///   L = D - f u^(1 / gamma),   u uniform in [0, 1),
-/// so that P(L > t) = s(t): what they find is that shadow, in the mean.
+/// so that P(L > t) = s(t). Their result is that shadow in the mean.
 ///
-/// A bounce that meets the light knows nothing of this; so light samples alone find such lights.
+/// Emission that a bounce hits cannot reproduce this, so only light samples find such lights.
 #pragma once
 
 #include "wavecomb/light/record.h"
 
 namespace wavecomb {
 
-/// How far a light's shadow rays go, and what of its light arrives in its shadows.
+/// Length of a light's shadow rays, and the fraction of its light that remains in its shadows.
 template <typename F>
 struct ShadowReach {
   F distance;
   Color<F> color;
 };
 
-/// Of the light whose record says `look` (kPlainShadow: as far as the light, and black).
+/// Returns the shadow reach of shadow record `look`. With kPlainShadow it is unlimited, and shadows
+/// are black.
 template <typename F>
 [[gnu::noinline]] ShadowReach<F> shadow_reach(const LightView& view, const UInt<F>& look,
                                               const F& u, const Mask<F>& active) {

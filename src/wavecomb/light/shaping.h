@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How much of its radiance a shaped light sends in a direction: UsdLuxShapingAPI.
+/// Directional shaping of a light's radiance: UsdLuxShapingAPI.
 ///
-/// With e the direction of emission and a the light's axis, both unit, and angle = acos(e . a),
+/// Let e be the direction of emission and a the light's axis, both unit vectors, and let
+/// angle = acos(e . a). The factors
 ///   focus   lerp(focusTint, 1, |e . a|^focus)
 ///   cone    1 - smoothstep(lerp(coneAngle, 0, softness), coneAngle, angle)
-///   IES     candela at (theta, phi) of e in the light's space, theta scaled by angleScale: what
-///           that takes beyond 180 degrees has the candela at 180, what it takes below 0 is dark
+///   IES     candela at (theta, phi) of e in the light's space, with theta scaled by angleScale;
+///           scaled angles above 180 degrees use the value at 180, and those below 0 are dark
 /// multiply the radiance.
 #pragma once
 
@@ -14,8 +15,8 @@
 
 namespace wavecomb::detail {
 
-/// The last of n ascending numbers from `first` on that is at most x, but no more than the last but
-/// one.
+/// Returns the index of the last of n ascending numbers, starting at `first`, that is at most x,
+/// but at most n - 2.
 template <typename F>
 inline UInt<F> interval_below(const float* numbers, const UInt<F>& first, const UInt<F>& n,
                               const F& x, const Mask<F>& active) {
@@ -31,7 +32,7 @@ inline UInt<F> interval_below(const float* numbers, const UInt<F>& first, const 
   }
 }
 
-/// Where x lies between two neighbours of ascending numbers.
+/// Position of x between two adjacent ascending numbers.
 template <typename F>
 struct Between {
   UInt<F> index;
@@ -47,8 +48,8 @@ inline Between<F> find_between(const float* numbers, const UInt<F>& first, const
   return {i, clamp(part, F(0.f), F(1.f))};
 }
 
-/// Candela of profiles `ies` at angles in degrees, theta from the axis and phi around it in
-/// [0, 360].
+/// Returns the candela of profiles `ies` at angles in degrees: theta from the axis, and phi around
+/// it in [0, 360].
 template <typename F>
 inline F ies_candela(const LightView& view, const UInt<F>& ies, const F& theta, const F& phi,
                      const Mask<F>& active) {
@@ -77,7 +78,7 @@ inline F ies_candela(const LightView& view, const UInt<F>& ies, const F& theta, 
   return select(inside, F(fma(h.part, F(b - a), a)), F(0.f));
 }
 
-/// Radiance as shaping `shaping` lets it out along `emitted`; as it is where that is kNoShaping.
+/// Returns the radiance along `emitted` after shaping `shaping`. kNoShaping leaves it unchanged.
 template <typename F>
 inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3<F>& emitted,
                        const Color<F>& radiance, const Mask<F>& lanes) {
@@ -103,7 +104,7 @@ inline Color<F> shaped(const LightView& view, const UInt<F>& shaping, const Vec3
   const F cone = read(&R::cone), start = read(&R::cone_start);
   const Mask<F> coned = active & (cone < kPi);
   if (any(coned)) {
-    const Vec3<F> across = cross(emitted, axis);  // the sine keeps small angles exact
+    const Vec3<F> across = cross(emitted, axis);  // the sine is accurate for small angles
     const F angle = atan2(F(sqrt(length_squared(across))), cosine);
     const F width = cone - start;
     const F x = clamp(F((angle - start) / select(width > 0.f, width, F(1.f))), F(0.f), F(1.f));

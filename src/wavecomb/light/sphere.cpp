@@ -8,7 +8,8 @@ namespace {
 
 using namespace making;
 
-/// A sphere of as much volume as the transformed one has; of radius 0: a point.
+/// Makes the record of a sphere with the volume of the transformed sphere, or of a point light if
+/// the radius is 0.
 void make(MadeLight& made, const Light& light, LightMaking& /*making*/) {
   const Affine& m = light.to_world;
   const Double3 x = to_double(m.axis(0)), y = to_double(m.axis(1)), z = to_double(m.axis(2));
@@ -41,7 +42,8 @@ Bounds box(const LightRecord& light) {
   return box_around(light.p, light.p, {light.radius, light.radius, light.radius});
 }
 
-/// |o + t d|^2 = r^2, the nearer root that is ahead: from inside, the far side.
+/// Solves |o + t d|^2 = r^2. Returns the nearest positive root, which from inside is the far side,
+/// or 0.
 double intersect(const LightRecord& light, const double* o, const double* d) {
   const Double3 from{o[0], o[1], o[2]}, along{d[0], d[1], d[2]};
   const double radius = light.radius;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sphere lights, which shine outwards, and point lights.
+/// Sphere lights, which emit outwards, and point lights.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -7,16 +7,16 @@
 
 namespace wavecomb::detail {
 
-/// The cone of directions in which a sphere is seen.
+/// Cone of directions that a sphere subtends.
 template <typename F>
 struct SphereCone {
-  Vec3<F> axis;           ///< unit, to the centre
+  Vec3<F> axis;           ///< unit vector to the centre
   F distance2, distance;  ///< to the centre
-  F one_minus_cos;        ///< of the half angle, exact also for small ones
-  Mask<F> outside;        ///< the point sees the sphere from outside; else nothing of it
+  F one_minus_cos;        ///< 1 - cos of the half angle, accurate for small angles
+  Mask<F> outside;        ///< whether the point is outside the sphere; from inside it is invisible
 };
 
-/// sin^2 = r^2 / d^2, and 1 - cos = sin^2 / (1 + cos) rather than a difference near 0.
+/// Uses sin^2 = r^2 / d^2, and 1 - cos = sin^2 / (1 + cos) to avoid cancellation for small angles.
 template <typename F>
 inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>& from) {
   const Direction<F> d = make_direction<F>(light.p() - from);
@@ -27,8 +27,8 @@ inline SphereCone<F> make_sphere_cone(const LightReader<F>& light, const Vec3<F>
   return {d.wi, d.length2, d.length, sin2 / (1.f + safe_sqrt(F(1.f - sin2))), outside};
 }
 
-/// 1 / (2 pi (1 - cos)): uniform over the cone. 0 from inside, and where the sphere is too small to
-/// see.
+/// Returns the uniform density 1 / (2 pi (1 - cos)) over the cone; 0 from inside, and if the sphere
+/// is too small.
 template <typename F>
 inline F sphere_cone_pdf(const SphereCone<F>& cone) {
   const Mask<F> good = cone.outside & (cone.one_minus_cos > 0.f);
@@ -36,8 +36,9 @@ inline F sphere_cone_pdf(const SphereCone<F>& cone) {
   return select(good & is_finite(pdf), pdf, F(0.f));
 }
 
-/// A direction uniform in the cone that the sphere fills (P. Shirley, C. Wang, K. Zimmerman, "Monte
-/// Carlo Techniques for Direct Lighting Calculations", ACM TOG 15(1) 1996); radius 0: its centre.
+/// Samples a direction uniformly in the cone that the sphere subtends (P. Shirley, C. Wang, K.
+/// Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", ACM TOG 15(1) 1996). For a
+/// point light (radius 0) it is the direction to the centre.
 template <typename F>
 inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& from, const F& u,
                                    const F& v) {
@@ -47,7 +48,7 @@ inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& f
 
   const Vec3<F> local = square_to_cone(u, v, cone.one_minus_cos);
   const Vec3<F> wi = make_frame(cone.axis).to_world(local);
-  // The near crossing: d cos - sqrt(r^2 - d^2 sin^2).
+  // Distance of the near hit: d cos - sqrt(r^2 - d^2 sin^2).
   const F sin2 = fma(local.x, local.x, F(local.y * local.y));
   const F half_chord = safe_sqrt(F(radius * radius - cone.distance2 * sin2));
   const F near = max(fma(cone.distance, local.z, F(-half_chord)), F(0.f));
@@ -60,14 +61,14 @@ inline KindSample<F> sample_sphere(const LightReader<F>& light, const Vec3<F>& f
           select(is_point, point_pdf, sphere_cone_pdf<F>(cone)), is_point};
 }
 
-/// What a ray from `origin` that met the sphere gets.
+/// Returns radiance and density for a ray from `origin` that hit the sphere.
 template <typename F>
 inline KindHit<F> hit_sphere(const LightReader<F>& light, const Vec3<F>& origin) {
   const SphereCone<F> cone = make_sphere_cone<F>(light, origin);
   return {select<F>(cone.outside, light.radiance(), Color<F>(F(0.f))), sphere_cone_pdf<F>(cone)};
 }
 
-/// A path from a point uniform over the sphere; of radius 0: in any direction.
+/// Samples a path from a point uniform over the sphere, or in any direction from a point light.
 template <typename F>
 inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
   const LightReader<F>& light = q.light;
@@ -81,7 +82,7 @@ inline KindEmission<F> emit_sphere(const EmissionQuery<F>& q) {
   return e;
 }
 
-/// KindEmission::density of emit_sphere.
+/// Returns KindEmission::density of emit_sphere().
 template <typename F>
 inline F sphere_emission_density(const LightReader<F>& light) {
   return select(light.radius() == 0.f, F(kInv4Pi), even_emission_density<F>(light.area()));
@@ -91,7 +92,7 @@ inline F sphere_emission_density(const LightReader<F>& light) {
 
 namespace wavecomb {
 
-/// As WAVECOMB_LIGHT_KINDS lists them (light/kinds.h).
+/// Kind of sphere lights in WAVECOMB_LIGHT_KINDS (light/kinds.h).
 struct SphereKind : NoEscape {
   static LightKindInfo describe();
   template <typename F>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Triangles of emissive meshes: uniform over the area, shining to both sides.
+/// Triangles of emissive meshes, sampled uniformly by area. They emit on both sides.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -10,7 +10,7 @@
 
 namespace wavecomb::detail {
 
-/// A TriangleLight.
+/// Fields of a TriangleLight.
 template <typename F>
 struct TriangleRow {
   Vec3<F> p, u, v;
@@ -21,7 +21,7 @@ struct TriangleRow {
 };
 static_assert(sizeof(TriangleLight) == 4 * kRowWords<TriangleRow>);
 
-/// The triangles of the lights in the active lanes.
+/// Triangles of the lights in the active lanes.
 template <typename F>
 struct TriangleReader : TriangleRow<F> {
   TriangleReader(const LightView& view, const UInt<F>& light, const Mask<F>& active)
@@ -29,14 +29,14 @@ struct TriangleReader : TriangleRow<F> {
             load_row<TriangleRow, F>(view.triangles, light - view.first_triangle, active)) {}
 };
 
-/// What triangles at barycentrics `b`, world position q, give where it varies: the emission of
-/// `material` (lanes `glows`; 1 in the others) times its opacity. `index`: of TriangleUvs. Textures
-/// are read at their finest level.
+/// Returns the varying radiance of triangles at barycentrics `b` and world position q: the emission
+/// of `material` (1 outside the lanes `glows`) times its opacity. `index` refers to TriangleUvs.
+/// Textures are read at their finest level.
 ///
-/// Presence is an event: a bounce meets the triangle with probability opacity and then gets all of
-/// the emission. A light sample, whose shadow ray ends before the triangle, gets the mean of that.
-/// Both estimate the integral of opacity * emission, so that the weights of MIS are those of the
-/// directions' densities alone.
+/// Presence is stochastic: a bounce hits the triangle with a probability equal to the opacity, and
+/// then receives the full emission. A light sample, whose shadow ray ends before the triangle,
+/// receives the mean. Both estimate the integral of opacity * emission, so that MIS weights depend
+/// only on the densities of the directions.
 template <typename F>
 [[gnu::noinline]] Color<F> varying_radiance(const LightView& view, const UInt<F>& material,
                                             const UInt<F>& index, const Vec2<F>& b,
@@ -44,7 +44,7 @@ template <typename F>
                                             const Mask<F>& active) {
   constexpr uint32_t kWords = sizeof(TriangleUvs) / 4;
   const auto row = load_rows<8, F>(view.triangle_uvs, index * kWords, active);
-  // Vertex 2 goes first: sums of floats have an order.
+  // Vertex 2 goes first, since the order of float sums matters.
   const UvTriangle<F> corners({row[0], row[1]}, {row[4], row[5]}, {row[2], row[3]});
   const Vec2<F> uv = corners.at(b.y, b.x);
   const MeshPlace<F> place{float_bits<F>(row[6]), float_bits<F>(row[7]), b.x, b.y};
@@ -71,14 +71,14 @@ template <typename F>
   return radiance;
 }
 
-/// What a triangle gives at barycentrics `b`, world position q.
+/// Returns the radiance of a triangle at barycentrics `b` and world position q.
 template <typename F>
 inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightView& view,
                                   const Vec2<F>& b, const Vec3<F>& q, const Mask<F>& active) {
   const Mask<F> varies = active & (light.radiance.x < 0.f);
   if (none(varies)) [[likely]]
     return light.radiance;
-  // Copies, so that what plain triangles use may stay in registers.
+  // Copies, so that the values that plain triangles use can stay in registers.
   const UInt<F> material = float_bits<F>(light.radiance.y), index = float_bits<F>(light.radiance.z);
   const Vec2<F> at = b;
   const Vec3<F> place = q;
@@ -87,7 +87,7 @@ inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightVie
                    light.radiance);
 }
 
-/// A path from a point uniform over the triangle, to either side.
+/// Samples a path from a point uniform over the triangle, on either side.
 template <typename F>
 inline KindEmission<F> emit_triangle(const TriangleReader<F>& light, const LightView& view,
                                      const F& u, const F& v, const F& s, const F& t,
@@ -104,7 +104,7 @@ inline KindEmission<F> emit_triangle(const TriangleReader<F>& light, const Light
                            F(0.5f * even_emission_density<F>(area)));
 }
 
-/// A point q = p + b1 u + b2 v, with density 1 / area.
+/// Samples a point q = p + b1 u + b2 v with density 1 / area.
 template <typename F>
 inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const LightView& view,
                                      const Vec3<F>& from, const F& u, const F& v,
@@ -118,17 +118,17 @@ inline KindSample<F> sample_triangle(const TriangleReader<F>& light, const Light
   return {d.wi, d.length, radiance, pdf, Mask<F>(false)};
 }
 
-/// Density over solid angle, and the probability of the light's choice by power.
+/// Solid angle density, and the probability of selecting the light by power.
 template <typename F>
 struct TriangleDensity {
   F solid_angle, pick_pdf;
 };
 
-/// For a hit at distance t along dir.
+/// Returns the densities for a hit at distance t along dir.
 template <typename F>
 inline TriangleDensity<F> triangle_pdf(const LightView& view, const UInt<F>& light,
                                        const Vec3<F>& dir, const F& t, const Mask<F>& active) {
-  // The last four words of the row.
+  // Reads the last four words of the row.
   const auto r = load_rows<4, F>(
       view.triangles,
       (light - view.first_triangle) * (sizeof(TriangleLight) / 4) + word_of(&TriangleLight::m),

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A straight way through the cells of a grid, one after the other.
+/// Traversal of a grid along a ray, cell by cell.
 #pragma once
 
 #include "wavecomb/medium/grid_lookup.h"
 
 namespace wavecomb {
 
-/// Lanes walk through one grid, each along its own ray, cell by cell (Amanatides and Woo, "A Fast
-/// Voxel Traversal Algorithm", 1987). Lengths are those of the world.
+/// Traversal of one grid by a packet, in which each lane follows its own ray (Amanatides and Woo,
+/// "A Fast Voxel Traversal Algorithm", 1987). Lengths are in world space.
 template <typename F>
 class BrickWalk {
   using U = UInt<F>;
 
  public:
-  /// Nobody walks yet.
+  /// Starts without active lanes.
   explicit BrickWalk(const PlacedGrid& placed)
       : placed_(placed),
         grid_(placed.grid),
@@ -33,7 +33,8 @@ class BrickWalk {
     start(o, d, most, active);
   }
 
-  /// `lanes` begin to walk the part of o + x d, 0 < x < `most`, that is in the grid's table.
+  /// Starts the rays of `lanes` at the part of o + x d, 0 < x < `most`, that is inside the grid's
+  /// table.
   void start(const Vec3<F>& o, const Vec3<F>& d, const F& most, const Mask<F>& lanes) {
     o_ = select<F>(lanes, bricks_point<F>(placed_.to_bricks, o), o_);
     d_ = select<F>(lanes, bricks_vector<F>(placed_.to_bricks, d), d_);
@@ -63,24 +64,24 @@ class BrickWalk {
     }
   }
 
-  /// Lanes that are still on their way.
+  /// Returns the lanes that have not reached their end.
   const Mask<F>& on() const { return on_; }
-  /// Where they are, and where they leave their cell or end.
+  /// Returns the current distance. leave() is the distance at which a lane leaves its cell or ends.
   const F& x() const { return x_; }
   F leave() const { return max(x_, min(min(next_[0], next_[1]), min(next_[2], end_))); }
-  /// The greatest value that the grid gives in the cell.
+  /// Returns the largest value of the grid in the current cell.
   F most() const {
     if (!grid_.most) return F(1.f);
     const auto at = [&](int k) { return U(to_int<F>(cell_[k])); };
     return gather<F>(grid_.most, at(0) + grid_.size[0] * (at(1) + grid_.size[1] * at(2)), on_);
   }
-  /// The point of the grid's space at `x`.
+  /// Returns the point at distance `x` in the grid's space.
   Vec3<F> at(const F& x) const { return fma(d_, x, o_); }
 
-  /// `lanes` stop within their cell.
+  /// Moves `lanes` to distance x within their cell.
   void move_to(const F& x, const Mask<F>& lanes) { x_ = select(lanes, x, x_); }
   void stop(const Mask<F>& lanes) { on_ = on_ & not_(lanes); }
-  /// `lanes` go into the next cell.
+  /// Advances `lanes` to the next cell.
   void next_cell(Mask<F> lanes) {
     const F leaves = leave();
     x_ = select(lanes, leaves, x_);
@@ -97,7 +98,7 @@ class BrickWalk {
   }
 
  private:
-  /// Where the ray leaves its cell along axis k.
+  /// Returns the distance at which the ray leaves its cell along axis k.
   F crossing(int k) const {
     const F* const from[3] = {&o_.x, &o_.y, &o_.z};
     const F face = cell_[k] + select(forth_[k], F(1.f), F(0.f));

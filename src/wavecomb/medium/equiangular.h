@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Distances along a way that are chosen by a lamp beside it (Kulla and Fajardo, "Importance
-/// Sampling Techniques for Path Tracing in Participating Media", 2012).
+/// Equiangular sampling of distances along a ray segment, by a light beside it (Kulla and Fajardo,
+/// "Importance Sampling Techniques for Path Tracing in Participating Media", 2012).
 ///
-/// In an even medium a distance is drawn from a mixture: of the exponential of the channel that
-/// decides (medium/tracking.h), and, in a share q, of a density in which a lamp's point c sees
-/// equal angles,
+/// In a homogeneous medium a distance is sampled from a mixture: by the exponential distribution of
+/// the hero channel (medium/tracking.h) and, with probability q, by equal angles as seen from a
+/// point c on a light,
 ///   e(x) = D / ((b - a) (D^2 + (x - delta)^2)),
-/// D the distance of c from the way, delta where it is nearest, a and b the angles at which c sees
-/// the ends of the medium. Both densities and their integrals are closed, so what is drawn weighs
-/// exactly what it should, whichever of the two it came from (balance heuristic), and so does not
-/// having stopped before what lies behind. q and c depend on the way alone.
+/// where D is the distance of c from the ray, delta the position closest to c, and a and b the
+/// angles at which c sees the ends of the medium. Both densities and their integrals have closed
+/// forms. Samples of both techniques, and passing the medium without a collision, are therefore
+/// weighted exactly (balance heuristic). q and c depend only on the ray segment.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -18,23 +18,23 @@
 
 namespace wavecomb {
 
-/// The greatest share of equal angles.
+/// Largest probability of equiangular sampling.
 inline constexpr float kMostEquiangular = 0.5f;
-/// Where less is worth it, there is none.
+/// Below this probability equiangular sampling is not used.
 inline constexpr float kLeastEquiangular = 0.02f;
 
-/// Whether a scene has lamps that are somewhere.
+/// Returns whether a scene has finite lights.
 inline bool has_lamps(const LightView& lights) {
   return lights.count > lights.infinite_count;
 }
 
-/// A part of a way as a lamp sees it.
+/// Equiangular distribution of distances along a ray segment, for one light.
 template <typename F>
 struct LampWay {
-  F share{0.f};  ///< q, 0 where it is not worth it
+  F share{0.f};  ///< q, or 0 without equiangular sampling
   F nearest{0.f}, aside{1.f}, from{0.f}, span{1.f};
 
-  /// A distance, with a number in [0, 1).
+  /// Samples a distance with a random number in [0, 1).
   F draw(const F& u) const {
     const SinCos<F> turn = sincos_2pi(F(fma(u, span, from) * (0.5f / kPi)));
     return nearest + aside * turn.sin / max(turn.cos, F(1e-6f));
@@ -43,14 +43,14 @@ struct LampWay {
     const F along = x - nearest;
     return aside / F(span * fma(aside, aside, F(along * along)));
   }
-  /// The share of distances below `x`.
+  /// Returns the probability of distances below `x`.
   F before(const F& x) const {
     return clamp(F((atan2(F(x - nearest), aside) - from) / span), F(0.f), F(1.f));
   }
 };
 
-/// The part between `begin` and `end` of o + x d, for a medium of that extinction (of the channel
-/// that it dims least), and a lamp that numbers `r` choose.
+/// Returns the distribution for the part between `begin` and `end` of o + x d. `extinction` is that
+/// of the least attenuated channel. The sample values `r` select the light and the point on it.
 template <typename F>
 inline LampWay<F> lamp_way(const LightView& lights, const Vec3<F>& o, const Vec3<F>& d,
                            const F& begin, const F& end, const F& extinction, const Sample4<F>& r,
@@ -69,17 +69,17 @@ inline LampWay<F> lamp_way(const LightView& lights, const Vec3<F>& o, const Vec3
   way.aside = max(F(sqrt(dot(across, across))), F(1e-4f * length));
   way.from = atan2(F(begin - way.nearest), way.aside);
   way.span = max(F(atan2(F(end - way.nearest), way.aside) - way.from), F(1e-6f));
-  // As often as the lamp sees the way as near, and as light comes there and back through the
-  // medium.
+  // q grows with the angle that the segment subtends from the light, and with the transmittance of
+  // the medium from `begin` to the closest point and on to the light.
   const F before = clamp(F(way.nearest - begin), F(0.f), length);
   const F q = F(kMostEquiangular / kPi) * way.span * exp(F(-extinction * (before + way.aside)));
   way.share = select(there & (q > kLeastEquiangular), q, F(0.f));
   return way;
 }
 
-/// What became of a way through an even medium, where it ended after length `x` in it, at distance
-/// `at`: the true share of it, and with which it was drawn where this channel decides; by density
-/// where it has `stopped`.
+/// Probabilities of the outcome of a segment through a homogeneous medium that ends after length
+/// `x` in it, at distance `at`: the true one, and the one it was sampled with if this channel is
+/// the hero. They are densities where the segment was `stopped`.
 template <typename F>
 struct EvenChance {
   F truth, drawn;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Flights and transmittance through volumes that are even, which need no collisions that change
-/// nothing.
+/// Free flights and transmittance in homogeneous volumes, which need no null collisions.
 #pragma once
 
 #include <algorithm>
@@ -11,19 +10,19 @@
 
 namespace wavecomb {
 
-/// Whether a volume is the same everywhere in its box.
+/// Returns whether a volume is homogeneous within its box.
 inline bool is_even(const VolumeRecord& v) {
   return !v.density.grid.table;
 }
 
-/// And whether lamps may draw distances in it.
+/// Returns whether lights guide the distances in a volume (equiangular.h).
 inline bool is_drawn_by_lamps(const VolumeRecord& v) {
   return is_even(v) && std::max({v.albedo[0], v.albedo[1], v.albedo[2]}) > 0;
 }
 
 namespace detail {
 
-/// The ways from number `k` on, within the box of an even volume.
+/// Packet of ray segments from index `k` on, clipped to the box of a homogeneous volume.
 template <typename F>
 struct EvenWays {
   Vec3<F> o, d;
@@ -45,9 +44,10 @@ struct EvenWays {
 
 }  // namespace detail
 
-/// Flies through an even volume, drawing distances by `lamps`, too (equiangular.h). `most`: how far
-/// ways go, whatever has stopped them since: lamps are asked for the same part of a way each time.
-/// kStops finds what stops, kRatios weighs it once all volumes were flown through.
+/// Samples free flights through a homogeneous volume, including by lights (equiangular.h). `most`
+/// is the original length of each segment, before any volume stopped it, so that repeated calls
+/// sample the lights for the same part. kStops samples where flights stop; kRatios computes the
+/// weights after all volumes were sampled.
 template <typename F>
 inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways, const float* most,
                        const Flights& flights, FlightKeeps keeps, const LightView& lamps,
@@ -108,7 +108,7 @@ inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways, 
   }
 }
 
-/// Multiplies each `product` by the transmittance of a way through an even volume.
+/// Multiplies each `product` by the transmittance of a ray segment through a homogeneous volume.
 template <typename F>
 inline void pass_evenly(const VolumeRecord& v, const Ways& ways, float* const (&product)[3],
                         VolumeCounts& counts) {

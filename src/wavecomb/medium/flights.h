@@ -1,29 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What becomes of flights through volumes, as data.
+/// Data of free flights through volumes.
 #pragma once
 
 #include "wavecomb/core/math.h"
 
 namespace wavecomb {
 
-/// What becomes of flights, side by side. Before: `t` is how far they may go, `material` kNoEvent,
-/// `ratio` 1.
+/// Results of free flights, in columns. Initially `t` is the length of each segment, `material` is
+/// kNoEvent and `ratio` is 1.
 struct Flights {
   static constexpr uint32_t kNoEvent = 0xffffffffu;
-  static constexpr uint32_t kNoHero = 4;  ///< of a flight that is none of volumes any more
+  static constexpr uint32_t kNoHero = 4;  ///< volumes no longer apply to the flight
 
   float* t;
-  uint32_t* material;  ///< of the volume that stopped a flight
-  float* ratio[3];     ///< by channel: probability of what happened, over that by the channel that
-                       ///< decided
-  const uint32_t* hero;  ///< the channel that decides
-  /// By channel: what it weighs beside, of what is drawn otherwise or not at all. Before: 1.
+  uint32_t* material;  ///< of the volume that stopped the flight
+  /// Probability of the outcome by channel, divided by that of the hero channel.
+  float* ratio[3];
+  const uint32_t* hero;  ///< the channel that samples the distance
+  /// Additional factor of the weight by channel, for outcomes that the hero channel did not sample.
+  /// Initially 1.
   float* scale[3];
 };
-/// What flights through one volume are told of.
+/// Results that a pass through one volume computes.
 enum class FlightKeeps : uint8_t { kStops, kRatios, kBoth };
 
-/// The channel that decides: each as often as it has of the throughput.
+/// Selects the hero channel, in proportion to the throughput.
 template <typename F>
 inline UInt<F> hero_of(const F& u, const Color<F>& throughput) {
   using U = UInt<F>;
@@ -32,11 +33,11 @@ inline UInt<F> hero_of(const F& u, const Color<F>& throughput) {
                 select(at < F(throughput.x + throughput.y), U(1u), U(2u)));
 }
 
-/// Each channel decides in so many flights as it has of the path's throughput T (hero wavelengths,
-/// Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). So the weight of a flight is, with
-/// the probabilities p_c of what happened,
+/// Returns the weight of a flight. The hero channel is selected in proportion to the path's
+/// throughput T (hero wavelengths, Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). With
+/// p_c the probability of the outcome in channel c, the weight is
 ///   p_c sum(T) / sum over channels k of T_k p_k
-/// which leaves sum(T) as it was, however often the path is scattered.
+/// which keeps sum(T) constant over any number of scatterings.
 template <typename F>
 inline Color<F> flight_weight(const Color<F>& ratio, const Color<F>& throughput) {
   const F sum = throughput.x + throughput.y + throughput.z, shares = dot(ratio, throughput);

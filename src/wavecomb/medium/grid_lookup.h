@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Values of a grid between its voxels. All lanes read one grid, each at its own place.
+/// Interpolated lookup in a voxel grid. All lanes read the same grid, each at its own position.
 #pragma once
 
 #include "wavecomb/core/lanes.h"
@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// A point of the world in a grid's space, which is measured in bricks.
+/// Transforms a point from world space to a grid's space, whose unit is one brick.
 template <typename F>
 inline Vec3<F> bricks_point(const float (&m)[12], const Vec3<F>& p) {
   const auto row = [&](int i) {
@@ -27,7 +27,7 @@ inline Vec3<F> bricks_vector(const float (&m)[12], const Vec3<F>& v) {
 
 namespace detail {
 
-/// Value `i` of what a grid's bricks hold.
+/// Returns value `i` of a brick.
 template <typename F>
 inline F voxel_value(const GridView& grid, const UInt<F>& brick, const UInt<F>& i,
                      const Mask<F>& active) {
@@ -40,9 +40,9 @@ inline F voxel_value(const GridView& grid, const UInt<F>& brick, const UInt<F>& 
 
 }  // namespace detail
 
-/// What a grid gives at `p`, in its own space, by trilinear interpolation: r, g, b, or one value
-/// three times. 1 in all of the cells of a grid without a table. `p` lies in the table, but for
-/// rounding.
+/// Returns the value of a grid at `p`, in the grid's space, by trilinear interpolation: r, g, b, or
+/// a single value three times. A grid without a table is 1 everywhere. `p` lies inside the table,
+/// up to rounding.
 template <typename F>
 inline Color<F> grid_color(const GridView& grid, const Vec3<F>& p, const Mask<F>& active) {
   using U = UInt<F>;
@@ -87,7 +87,7 @@ inline Color<F> grid_color(const GridView& grid, const Vec3<F>& p, const Mask<F>
   return select<F>(there, value, out);
 }
 
-/// Of one component.
+/// Returns the value of a grid with one component.
 template <typename F>
 inline F grid_value(const GridView& grid, const Vec3<F>& p, const Mask<F>& active) {
   return grid_color<F>(grid, p, active).x;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The phase function of Henyey and Greenstein ("Diffuse radiation in the Galaxy", 1941).
+/// Phase function of Henyey and Greenstein ("Diffuse radiation in the Galaxy", 1941).
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -7,11 +7,11 @@
 
 namespace wavecomb {
 
-/// Below this a mean cosine is taken for 0, in density and samples alike.
+/// Smaller mean cosines count as 0, in densities and in samples.
 inline constexpr float kLeastMeanCosine = 1e-3f;
 
-/// Density over solid angle for the cosine `c` between the directions of flight before and after,
-/// with the mean cosine g:
+/// Returns the solid angle density for the cosine `c` between the propagation directions before and
+/// after scattering, with mean cosine g:
 ///   p = (1 - g^2) / (4 pi (1 + g^2 - 2 g c)^(3/2))
 template <typename F>
 inline F henyey_greenstein(const F& g, const F& c) {
@@ -20,7 +20,7 @@ inline F henyey_greenstein(const F& g, const F& c) {
   return kInv4Pi * (1.f - g2) / (s * sqrt(s));
 }
 
-/// The cosine that the density's cumulative distribution gives for u in [0, 1).
+/// Samples the cosine by inverting the cumulative distribution at u in [0, 1).
 template <typename F>
 inline F sample_henyey_greenstein(const F& g, const F& u) {
   const Mask<F> even = g == F(0.f);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a path is inside of: the bounds that it has entered and not left (Schmidt and Budge,
-/// "Simple Nested Dielectrics in Ray Traced Images", 2002). Of several the one of highest priority
-/// is there, of equal ones the last entered.
+/// Medium stack of a path: the bounds that it has entered and not left (Schmidt and Budge, "Simple
+/// Nested Dielectrics in Ray Traced Images", 2002). Where several overlap, the one with the highest
+/// priority counts, and among equal priorities the last one entered.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -10,16 +10,16 @@
 
 namespace wavecomb {
 
-/// More at a time are forgotten, the first entered first.
+/// Size of the stack. If it overflows, the first bound entered is forgotten.
 inline constexpr size_t kMostInside = 4;
-/// Material where there is nothing.
+/// Material of an empty entry.
 inline constexpr uint32_t kNothing = 0xffffffffu;
 
-/// One of the bounds.
+/// Bound of a medium.
 template <typename F>
 struct Bound {
-  UInt<F> place;     ///< placed_geometry
-  UInt<F> material;  ///< kNothing: none
+  UInt<F> place;     ///< placed_geometry() of the mesh
+  UInt<F> material;  ///< kNothing if there is no bound
 };
 
 template <typename F>
@@ -27,7 +27,7 @@ class Inside {
   using U = UInt<F>;
 
  public:
-  /// Inside of nothing.
+  /// Creates an empty stack.
   Inside() {
     for (size_t k = 0; k < kMostInside; ++k) place_[k] = material_[k] = U(kNothing);
   }
@@ -42,7 +42,8 @@ class Inside {
     r.material_2 = material_[2], r.material_3 = material_[3];
   }
 
-  /// What the last vertex's ray in `bit` (Crossing) has crossed.
+  /// Updates the stack for the bound that the last vertex's ray, selected by `bit` (Crossing), has
+  /// crossed.
   void cross(const InteriorView& view, const UInt<F>& place, const UInt<F>& crossed, Crossing bit,
              const Mask<F>& active) {
     const auto has = [&](Crossing b) { return Mask<F>((crossed & uint32_t{b}) != U(0u)); };
@@ -54,7 +55,7 @@ class Inside {
     enter({place, material}, crosses & has(kEnters));
     leave(place, crosses & not_(has(kEnters)));
   }
-  /// The same in all lanes of another packet.
+  /// Returns a packet with this stack in all lanes.
   template <typename G>
   Inside<G> everywhere() const {
     Inside<G> all;
@@ -64,7 +65,7 @@ class Inside {
     }
     return all;
   }
-  /// Takes over what `lanes` of another are inside of.
+  /// Replaces the stacks of `lanes` by those of `other`.
   void take(const Inside& other, const Mask<F>& lanes) {
     for (size_t k = 0; k < kMostInside; ++k) {
       place_[k] = select(Mask<U>(lanes), other.place_[k], place_[k]);
@@ -72,7 +73,7 @@ class Inside {
     }
   }
 
-  /// The one that counts.
+  /// Returns the bound that counts, the one with the highest priority.
   Bound<F> top(const InteriorView& view, const Mask<F>& active) const {
     Bound<F> best{U(kNothing), U(kNothing)};
     F most(-kInfinity);
@@ -88,14 +89,14 @@ class Inside {
     return best;
   }
 
-  /// Lanes that have entered something of an instance.
+  /// Returns the lanes that have entered a bound of the geometry `place`.
   Mask<F> holds(const U& place) const {
     Mask<F> any_of(false);
     for (size_t k = 0; k < kMostInside; ++k)
       any_of = any_of | (Mask<F>(material_[k] != U(kNothing)) & Mask<F>(place_[k] == place));
     return any_of;
   }
-  /// `lanes` enter.
+  /// Enters `bound` in `lanes`.
   void enter(const Bound<F>& bound, const Mask<F>& lanes) {
     Mask<U> left(lanes & Mask<F>(material_[kMostInside - 1] != U(kNothing)));
     drop(0, left);
@@ -107,7 +108,7 @@ class Inside {
       left = left & Mask<U>(not_(Mask<F>(here)));
     }
   }
-  /// `lanes` leave what they have entered last of an instance, if anything.
+  /// Leaves the last entered bound of the geometry `place` in `lanes`, if there is one.
   void leave(const U& place, const Mask<F>& lanes) {
     Mask<F> left = lanes;
     for (size_t k = kMostInside; k-- > 0;) {
@@ -122,7 +123,7 @@ class Inside {
   template <typename G>
   friend class Inside;
 
-  /// Takes out number k.
+  /// Removes entry k.
   void drop(size_t k, const Mask<U>& lanes) {
     for (; k < kMostInside; ++k) {
       const bool last = k + 1 == kMostInside;
@@ -134,15 +135,17 @@ class Inside {
   U place_[kMostInside], material_[kMostInside];
 };
 
-/// A bound as a ray meets it.
+/// Bound that a ray hits.
 template <typename F>
 struct BoundMet {
-  Inside<F> after;  ///< what it is inside of on the other side
-  Mask<F> passes;   ///< nothing is seen of it: something else is there, or it does nothing
-  F outer;          ///< index of refraction on the side that is not its own
+  Inside<F> after;  ///< medium stack on the other side
+  /// Whether the ray passes unchanged, since another bound has priority or this one has no effect.
+  Mask<F> passes;
+  F outer;  ///< index of refraction on the outer side
 };
 
-/// `lanes` meet `bound`, from outside where `enters`, with `now` the top of `before`.
+/// Returns the effect of `bound` on `lanes`, which hit it from outside where `enters`. `now` is the
+/// top of `before`.
 template <typename F>
 inline BoundMet<F> meet_bound(const InteriorView& view, const Inside<F>& before,
                               const Bound<F>& now, const Bound<F>& bound, const Mask<F>& enters,
@@ -162,7 +165,7 @@ inline BoundMet<F> meet_bound(const InteriorView& view, const Inside<F>& before,
   const U kind = gather_field<F>(view.media, &InteriorMedium<float>::kind, bound.material, lanes);
   const Mask<F> clear =
       Mask<F>(kind == U(static_cast<uint32_t>(InteriorKind::kClear))) & (met.outer == 1.f);
-  // What is left that was never entered is seen as it is.
+  // A bound that is left without having been entered stays visible.
   met.passes = lanes & (clear | (same(now, then) & (enters | before.holds(bound.place))));
   return met;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays through what fills meshes, as data (interiors.h).
+/// Data of rays through media inside meshes (interiors.h).
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -9,19 +9,19 @@
 
 namespace wavecomb {
 
-/// Rays side by side, and the paths that they are of.
+/// Columns of rays, and the rows of their paths.
 struct InteriorRays {
-  float *o[3], *d[3];    ///< anew where a path has walked
-  const uint32_t* slot;  ///< of rows
+  float *o[3], *d[3];    ///< updated if a path has scattered
+  const uint32_t* slot;  ///< row of each path
   size_t size;
-  const float* times;  ///< null where nothing moves
+  const float* times;  ///< shutter times; null without motion
   float* paths;        ///< PathRow
   float* inside;       ///< InsideRow
 };
 
-/// What becomes of them: as medium/tracking.h has it of flights, and what absorption leaves.
-/// Before, where something else may stop them (`limited`): where that is, and what. A ray that has
-/// walked meets none of it any more, and its hero is kNoHero.
+/// Results of the rays, as in Flights, and the transmittance of absorption. With `limited`, `t` and
+/// `material` initially hold the event in a volume that stops each ray. Such an event no longer
+/// applies to a ray that has scattered, whose hero becomes kNoHero.
 struct InteriorEvents {
   bool limited;
   float* t;
@@ -30,14 +30,15 @@ struct InteriorEvents {
   uint32_t* hero;
 };
 
-/// Where a ray through media begins: number of the first length, and what all others are hashes of.
+/// Start of a ray through media: the hero channel, the random number of the first distance, and the
+/// seed for all other random numbers.
 template <typename F>
 struct InteriorStart {
   UInt<F> hero, seed;
   F first;
 };
 
-/// Mesh and material of a hit, and the object as placed_geometry counts them.
+/// Mesh and material of a hit, and its object as placed_geometry().
 template <typename F>
 struct HitPlace {
   UInt<F> mesh, material, object;
@@ -57,20 +58,21 @@ inline HitPlace<F> hit_place(const SceneView& scene, const UInt<F>& inst, const 
 
 namespace detail {
 
-/// A ray on its way.
+/// State of a ray in progress.
 template <typename F>
 struct InteriorState {
   Vec3<F> o, d;
   Color<F> throughput;
-  F start;  ///< length behind it, since the last collision
+  F start;  ///< length covered since the last collision
   F first;  ///< Walk::first
-  /// To the next collision, or kFar; kFar (1 + u) where nothing has scattered yet, with the number
-  /// u of the first length, which is spread over a pixel's samples. Of a shadow ray, to its end.
+  /// Distance to the next collision, or kFar. Until something scatters it is kFar (1 + u), which
+  /// stores the random number u of the first distance; u is stratified over a pixel's samples. For
+  /// shadow rays it is the remaining length.
   F rest;
   UInt<F> seed, number, hero, flags;
   WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)
 };
-/// What it is inside of, and what has become of its light since the last collision.
+/// Medium stack of a ray, and its attenuation since the last collision.
 template <typename F>
 struct InteriorLoad {
   UInt<F> place_0, place_1, place_2, place_3, material_0, material_1, material_2, material_3;
@@ -85,18 +87,18 @@ struct InteriorHit {
   F t, u, v;
   UInt<F> prim, geom, inst;
 };
-/// A packet of rays.
+/// Packet of rays.
 template <typename F>
 struct InteriorPacket {
-  UInt<F> who;  ///< among all
+  UInt<F> who;  ///< index among all rays
   Mask<F> active;
   InteriorState<F> s;
   InteriorLoad<F> l;
   InteriorHit<F> hit;
   uint32_t kind = kSeenByAll;  ///< RayVisibility of the rays
-  UInt<F> shadow_set{0u};  ///< of shadow rays: ShadowRow::set, 0 where every object is in the way
+  UInt<F> shadow_set{0u};      ///< ShadowRow::set of shadow rays; 0 if all objects block them
 };
-/// A bound that rays of a packet have met.
+/// Hits of a packet: surfaces, and which of them bound a medium or let the ray pass.
 template <typename F>
 struct InteriorMet {
   Mask<F> surface, passes, bound;

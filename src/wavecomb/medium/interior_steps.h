@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The steps of rays through what fills meshes: to the next bound or collision (interiors.h, which
-/// includes this).
+/// Steps of rays through media inside meshes, each to the next bound or collision. Included by
+/// interiors.h.
 #pragma once
 
 #include "wavecomb/medium/interiors.h"
@@ -19,7 +19,7 @@ inline Mask<F> Interiors::sees(const Rays<F>& r, const UInt<F>& object,
   const LinkView& links = scene_.lights.links;
   const Mask<F> linked = seen & Mask<F>(r.shadow_set != U(0u));
   if (!links.members || none(linked)) return seen;
-  // As casts_shadow (accel/presence.h).
+  // Same test as casts_shadow() (accel/presence.h).
   const U set = select(Mask<U>(linked), r.shadow_set, U(1u)) - 1u;
   const U link = gather<U>(links.classes, object, Mask<U>(linked));
   const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(linked));
@@ -152,7 +152,7 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
   const Mask<F> collides = r.active & not_(stopped) & (s.rest < far);
   const F length = select(collides, s.rest, far);
 
-  // Ratios of probabilities, all over that of the least scattering: none of them overflows.
+  // Ratios relative to the channel with the least scattering, so that none overflows.
   const Color<F>&a = medium.absorption, &b = medium.scattering;
   const F least = min(b.x, min(b.y, b.z)), most = max(max_component(b), F(1e-30f));
   const auto chance = [&](const F& scattering) {
@@ -197,7 +197,7 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
     row.crossed = U(0u);
     row.outer = met.outer;
     row.medium = now.material;
-    // What is not closed, and looked through to where the scene ends.
+    // Rays that leave the scene from an unclosed mesh.
     s.start = select(open & not_(collides) & not_(stopped), F(kInfinity), s.start);
     const U by_event =
         select(Mask<U>(event), U(scene_.interiors.event_material), U(uint32_t{Flights::kNoEvent}));
@@ -280,7 +280,7 @@ inline size_t Interiors::advance_shadow(const InteriorRays& all, float* const (&
       r.l.absorbed * Color<F>(exp(F(-e.x * length)), exp(F(-e.y * length)), exp(F(-e.z * length)));
   const Vec3<F> o = r.s.o;
   const Met<F> met = meet<F>(r, inside, now, r.active & not_(open));
-  // What bounds nothing lets this ray pass, since it was found to be free of it.
+  // A hit that bounds no medium does not block this ray, which was found to be unoccluded.
   const Mask<F> by = r.active & not_(open) & not_(met.bound);
   const F past = past_hit<F>(r.hit.t);
   r.s.o = select<F>(by, fma(r.s.d, past, o), r.s.o);

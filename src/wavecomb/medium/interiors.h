@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays through what fills meshes, bound by bound.
+/// Rays through media inside meshes, from bound to bound.
 ///
-/// On a way through media k with absorption a_k and scattering s_k, over lengths t_k,
+/// A ray through media k with absorption a_k and scattering s_k, over lengths t_k, has
 ///   throughput *= exp(-sum a_k t_k)
-/// and a collision comes after an optical depth of scattering that is exponential, by a hero
-/// channel (medium/tracking.h). Each medium is even, so that the length is drawn anew where one
-/// begins. Where lamps draw lengths, too, that is once the bound or surface ahead is known.
+/// and collides after an exponentially distributed optical depth of scattering, which a hero
+/// channel samples (medium/tracking.h). Each medium is homogeneous, so a new distance is sampled
+/// where a medium begins. If lights guide distances, it is sampled when the next bound or surface
+/// is known.
 ///
-/// What collides behind a bound that refracts walks on: no light sample could reach it. Where it
-/// meets a surface it is a path again, whose bounce no light sample has competed with. What
-/// collides in a clear bound is an event, with a light sample, a bounce and MIS as in volumes.
+/// Scattering behind a refractive boundary skips light sampling, since no shadow ray can reach a
+/// light, and continues as a random walk. Where the walk hits a surface, it becomes a path again,
+/// with MIS weight 1 for the emission it hits. Scattering inside a clear bound, which does not
+/// refract, is an event with light sample, bounce and MIS, as in volumes.
 #pragma once
 
 #include "wavecomb/integrate/path_pool.h"
@@ -22,12 +24,14 @@
 
 namespace wavecomb {
 
-/// Contract: a ray draws its own random numbers and no other's, so that neither order nor number of
-/// lanes shows.
+/// Traces the rays of a wave through the media inside meshes.
+///
+/// Contract: the random numbers of a ray depend only on that ray, so that neither order nor lane
+/// width has an effect.
 class Interiors {
  public:
-  /// `counts` gets the rays that are traced here, as those of walks. `by_lamps`: lamps draw
-  /// distances in fog, too (equiangular.h).
+  /// `counts` receives the number of traced rays, as steps of random walks. `by_lamps` selects
+  /// equiangular sampling of distances in fog (equiangular.h).
   Interiors(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
             const InteriorBuffers& buffers, Counts& counts, bool by_lamps)
       : scene_(scene),
@@ -37,17 +41,17 @@ class Interiors {
         b_(buffers),
         counts_(counts) {}
 
-  /// What is around a point. `keys`: of any path.
+  /// Returns the medium stack at a point. `keys` may be those of any path.
   Inside<float> surround(Vec3<float> p, float time, PresenceKeys keys) const;
 
-  /// Takes all rays to what stops them. `hits`: theirs, afterwards those of what is seen. Where a
-  /// path begins it is in `around`; null: it goes on. start(i, path) gives the InteriorStart of the
-  /// rays from i on.
+  /// Traces all rays to the event or surface that stops them. `hits` holds their first hits, and on
+  /// return the hits of visible surfaces. `around` is the medium stack at the camera for new paths,
+  /// or null for paths that continue. start(i, path) returns the InteriorStart of the packet at i.
   template <typename F, typename Start>
   void fly(const InteriorRays& rays, const HitSpan& hits, const InteriorEvents& events,
            const Inside<float>* around, PresenceKeys keys, const Start& start) const;
-  /// Multiplies by what shadow rays pass, whose lengths are `most`; 0: nobody asks. `keys`: with
-  /// the shadow sets where lights are linked.
+  /// Multiplies `product` by the transmittance of shadow rays of length `most`, where 0 skips a
+  /// ray. `keys` include the shadow sets if lights are linked.
   template <typename F>
   void pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
             PresenceKeys keys) const;
@@ -89,13 +93,12 @@ class Interiors {
     counts_.walk_steps += n;
   }
 
-  /// Lanes of a packet whose rays see an object (placed_geometry): it is visible to their kind, and
-  /// linked to the light of a shadow ray. An object that a ray does not see neither stops nor dims
-  /// it, but the ray enters and leaves it.
+  /// Returns the lanes of a packet whose rays see an object (placed_geometry): it is visible to
+  /// their kind of ray, and linked to the light of a shadow ray. An object that a ray does not see
+  /// neither stops nor attenuates it, but the ray still enters and leaves it.
   template <typename F>
   Mask<F> sees(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
-  /// The medium between a bound and the next one ahead; nothing where the ray does not see the
-  /// bound.
+  /// Returns the medium inside a bound, or none if the ray does not see the bound.
   template <typename F>
   InteriorMedium<F> medium_of(const Rays<F>& r, const Bound<F>& bound,
                               const Mask<F>& active) const {
@@ -103,7 +106,7 @@ class Interiors {
     return load_row<InteriorMedium, F>(reinterpret_cast<const float*>(scene_.interiors.media),
                                        bound.material, sees<F>(r, bound.place, there));
   }
-  /// What else stops a ray, and how far ahead.
+  /// Event in a volume that stops a ray, and the distance to it.
   template <typename F>
   struct Limit {
     F length;
@@ -118,37 +121,38 @@ class Interiors {
     return {select(may, max(F(at - r.s.start), F(0.f)), F(kInfinity)),
             gather<U>(events.material, r.who, Mask<U>(may))};
   }
-  /// Distance at which a ray continues past a hit at t that does not stop it and bounds nothing.
-  /// The step is just above rounding errors, since a bound may lie close behind; to meet the same
-  /// surface again costs time only.
+  /// Returns the distance at which a ray continues past a hit at t that neither stops it nor bounds
+  /// a medium. The step is just above rounding error, since a bound may follow closely. Hitting the
+  /// same surface again only costs time.
   template <typename F>
   F past_hit(const F& t) const {
     return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
   }
-  /// What a ray of the packet has met, and where it goes on that passes: `s` and `inside` are then
-  /// on the other side.
+  /// Returns what the rays of the packet hit. Where a ray passes, `s` and `inside` are moved to the
+  /// other side.
   template <typename F>
   Met<F> meet(Rays<F>& r, Inside<F>& inside, const Bound<F>& now, const Mask<F>& lanes) const;
-  /// Whether lamps draw distances in a medium.
+  /// Returns whether lights guide the distances in a medium.
   template <typename F>
   static Mask<F> is_lit(const InteriorMedium<F>& m) {
     return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(InteriorKind::kClear))) &
            (max_component(m.scattering) > 0.f);
   }
-  /// Draws how far it is to the next collision, with number `u`. Where nothing scatters there is
-  /// none, and a first number that waits stays. Where lamps draw, the number waits for the length.
+  /// Samples the distance to the next collision with the random number `u`. A medium without
+  /// scattering has no collision and keeps a stored number for the first distance. If lights guide
+  /// the distance, stores `u` until the length of the segment is known.
   template <typename F>
   void draw(Rays<F>& r, const Inside<F>& inside, const F& u, const Mask<F>& lanes) const;
-  /// Does so by lamps, with the number that waits, in a medium that ends at `far`.
+  /// Samples the distance by lights, with the stored number, in a medium that ends at `far`.
   template <typename F>
   LampWay<F> draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& medium, const F& far,
                            const Mask<F>& lanes) const;
-  /// Walks on from a collision; gives the lanes that do not.
+  /// Scatters at a collision. Returns the lanes whose path is terminated.
   template <typename F>
   Mask<F> turn(const InteriorRays& all, Rays<F>& r, const InteriorMedium<F>& medium,
                const F& length, const Mask<F>& lanes) const;
-  /// Takes rays to their next bound or collision; notes those that end, and lists the others from
-  /// `left` on. Gives how many.
+  /// Advances rays to their next bound or collision, finishes those that end, and lists the others
+  /// from `left` on. Returns the number of listed rays.
   template <typename F>
   size_t advance(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
                  Rays<F>& r, size_t left) const;
@@ -156,13 +160,13 @@ class Interiors {
   void finish(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
               const Rays<F>& r, const InsideRow<F>& inside, const UInt<F>& material,
               const Mask<F>& died, const Mask<F>& done) const;
-  /// Of shadow rays.
+  /// Advances shadow rays.
   template <typename F>
   size_t advance_shadow(const InteriorRays& all, float* const (&product)[3], Rays<F>& r,
                         size_t left) const;
   template <typename F>
   size_t put(const InteriorRays& all, const Rays<F>& r, const Mask<F>& goes_on, size_t left) const;
-  /// Advances the rays that are listed until none is left.
+  /// Advances the listed rays until none is left.
   template <typename F, typename Advance>
   void run(const InteriorRays& all, size_t left, PresenceKeys keys, const Advance& advance) const;
 
@@ -237,8 +241,8 @@ inline void Interiors::fly(const InteriorRays& rays, const HitSpan& hits,
     left +=
         scene_.visibility ? put<F>(rays, r, active, left) : advance<F>(rays, hits, events, r, left);
   }
-  // The hits leave out bounds that are hidden from these rays, which they enter and leave all the
-  // same.
+  // The first hits leave out bounds that are invisible to these rays. The rays must still enter and
+  // leave them.
   if (scene_.visibility) keys.ray_kind = kSeenByAll;
   run<F>(rays, left, keys, [&](Rays<F>& r, size_t at) {
     r.kind = kind;
@@ -250,7 +254,7 @@ template <typename F>
 inline void Interiors::pass(const InteriorRays& rays, const float* most, float* const (&product)[3],
                             PresenceKeys keys) const {
   using U = UInt<F>;
-  // A ray enters and leaves also the bounds that do not dim it.
+  // Rays also enter and leave bounds that do not attenuate them.
   const PresenceKeys asked = keys;
   keys.ray_kind = kSeenByAll;
   keys.shadow_set = nullptr;
@@ -285,7 +289,8 @@ inline void Interiors::pass(const InteriorRays& rays, const float* most, float* 
   });
 }
 
-/// A ray that goes any way leaves what it has not entered. What it leaves first is the innermost.
+/// A ray in an arbitrary direction leaves the bounds that it has not entered. The first one that it
+/// leaves is the innermost.
 inline Inside<float> Interiors::surround(Vec3<float> p, float time, PresenceKeys keys) const {
   keys.ray_kind = kSeenByAll;
   Bound<float> left[kMostInside];

@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Fields of volumes at the time of a ray. What is at p is what the field has at p - v(p) t, with
-/// the velocity v there and t the seconds since the grids were as they are.
+/// Lookup of volume fields at the time of a ray. The value at p is the field's value at p - v(p) t,
+/// where v is the velocity at p and t the time in seconds since the grids were sampled.
 ///
-/// Volumes that move are looked at cell by cell of a space that bounds all that comes by
-/// (scene/volume_motion.h), others by those of their grids; which of the two is the same for all
-/// lanes.
+/// Moving volumes are traversed by the cells of a grid that bounds the field over the whole shutter
+/// interval (scene/volume_motion.h), others by the cells of the field's grid. All lanes use the
+/// same one of the two.
 #pragma once
 
 #include "wavecomb/medium/grid_lookup.h"
 
 namespace wavecomb {
 
-/// The cells by which a volume's density is flown through.
+/// Returns the cells for traversing a volume's density.
 inline const PlacedGrid& flown_cells(const VolumeRecord& v) {
   return v.moves ? v.density_cells : v.density;
 }
-/// And those of what it emits.
+/// Returns the cells for traversing a volume's emission.
 inline const PlacedGrid& glow_cells(const VolumeRecord& v) {
   return v.moves ? v.glow_cells : v.glow;
 }
 
-/// Seconds at a time of the shutter, from 0 to 1.
+/// Returns the seconds at a shutter time from 0 to 1.
 template <typename F>
 inline F seconds_at(const VolumeRecord& v, const F& time) {
   return fma(time, F(v.seconds_span), F(v.seconds_open));
 }
 
-/// Where a field is read for `p`, in its bricks.
+/// Returns the position, in bricks, at which a field is read for `p`.
 template <typename F>
 inline Vec3<F> drifted(const FieldDrift& drift, const GridView& velocity, const Vec3<F>& p,
                        const F& seconds, const Mask<F>& active) {
@@ -35,7 +35,7 @@ inline Vec3<F> drifted(const FieldDrift& drift, const GridView& velocity, const 
   return bricks_point<F>(drift.to_bricks, p) - way;
 }
 
-/// Density at `p`, in the space of `flown_cells`.
+/// Returns the density at `p`, in the space of `flown_cells`.
 template <typename F>
 inline F density_at(const VolumeRecord& v, const Vec3<F>& p, const F& seconds,
                     const Mask<F>& active) {
@@ -43,7 +43,7 @@ inline F density_at(const VolumeRecord& v, const Vec3<F>& p, const F& seconds,
   return grid_value<F>(v.density.grid, drifted<F>(v.density_drift, v.velocity, p, seconds, active),
                        active);
 }
-/// What the field of emission has at `p`, in the space of `glow_cells`, at a time of the shutter.
+/// Returns the emission field at `p`, in the space of `glow_cells`, at a shutter time.
 template <typename F>
 inline Color<F> glow_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
                         const Mask<F>& active) {
@@ -51,7 +51,7 @@ inline Color<F> glow_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
   return grid_color<F>(
       v.glow.grid, drifted<F>(v.glow_drift, v.velocity, p, seconds_at<F>(v, time), active), active);
 }
-/// What the field of colour has at a point of the world, at a time of the shutter.
+/// Returns the colour field at a point in world space, at a shutter time.
 template <typename F>
 inline Color<F> tint_at(const VolumeRecord& v, const Vec3<F>& p, const F& time,
                         const Mask<F>& active) {

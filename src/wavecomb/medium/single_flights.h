@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Ways of the reference integrator through what fills meshes (volumes.h, which includes this).
+/// Ray segments of the reference integrator through media inside meshes. Included by volumes.h.
 #pragma once
 
 #include "wavecomb/medium/volumes.h"
@@ -11,7 +11,7 @@ Flight<float> Volumes::fly_inside(const SampleKey<float>& key, uint32_t depth, S
                                   const PresenceKeys& keys, float time, PathState<float>& path,
                                   Hit& hit, InsideRow<float>& inside) const {
   using F = float;
-  // A wave of one.
+  // A wave with one path.
   alignas(64) float row[kRowWords<PathRow>], place[kRowWords<InsideRow>];
   store_row<PathRow, F>(
       row, 0u,

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Free flights and transmittance along ways through volumes.
+/// Free flights and transmittance along ray segments through volumes.
 ///
-/// Null-scattering (Miller, Georgiev and Jarosz, "A null-scattering path integral formulation of
-/// light transport", 2019): extinction is filled up with collisions that change nothing, to a
-/// majorant that is constant in each cell of a grid, so that distances to collisions are
-/// exponential. One volume is looked at after the other; where several overlap, the nearest of
-/// their collisions is that of all together, since the least of independent exponential distances
-/// is exponential with the sum of their rates.
+/// Uses null scattering (Miller, Georgiev and Jarosz, "A null-scattering path integral formulation
+/// of light transport", 2019): null collisions increase the extinction to a majorant that is
+/// constant in each cell of a grid, so that distances to collisions are exponential. Volumes are
+/// sampled one after the other. Where several overlap, the nearest of their collisions is the
+/// collision of all together, since the minimum of independent exponential distances is exponential
+/// with the sum of their rates.
 ///
-/// Random numbers: of collision i in volume v they are hashes of (the path's numbers, v, i), which
-/// no schedule changes.
+/// The random numbers of collision i in volume v are hashes of (the path's numbers, v, i), so that
+/// the schedule has no effect.
 #pragma once
 
 #include "wavecomb/medium/even_flights.h"
@@ -18,8 +18,9 @@
 
 namespace wavecomb {
 
-/// What a way draws from: the numbers of its vertex set, of which the first volume takes some as
-/// they are, well spread over a pixel's samples, and a seed for all others.
+/// Random numbers of a ray segment: the sample values of its vertex set, some of which the first
+/// volume uses directly, since they are stratified over a pixel's samples, and a seed for all other
+/// numbers.
 template <typename F>
 struct Way {
   Sample4<F> r;
@@ -29,7 +30,7 @@ struct Way {
       : r(sample_4d<F>(sampler, key, vertex_set(set, depth))),
         seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
   Way(const Passage<F>& p, VertexSet set) : Way(p.sampler, p.key, p.depth, set) {}
-  /// Another one with numbers of its own.
+  /// Returns a copy with independent random numbers.
   Way branch(uint32_t number) const {
     Way other = *this;
     other.seed = hash_u32<UInt<F>>(seed, UInt<F>(0x2545f491u + number));
@@ -39,11 +40,11 @@ struct Way {
 
 namespace detail {
 
-/// Seconds at which the lanes of a visitor look at a volume that moves.
+/// Time in seconds, by lane, at which a visitor reads a moving volume.
 template <typename F>
 class WaySeconds {
  public:
-  /// `times`: Ways::times.
+  /// `times` is Ways::times.
   WaySeconds(const VolumeRecord& v, const float* times) : v_(v), times_(times) {}
   void start(const UInt<F>& way, const Mask<F>& lanes) {
     if (v_.moves && times_)
@@ -63,13 +64,13 @@ class WaySeconds {
 
 namespace detail {
 
-/// Flights through one volume.
+/// Visitor that samples free flights through one volume.
 template <typename F>
 class FlightVisitor {
   using U = UInt<F>;
 
  public:
-  /// `times`: Ways::times.
+  /// `times` is Ways::times.
   FlightVisitor(const VolumeRecord& v, uint32_t material, const Flights& flights, FlightKeeps keeps,
                 const float* times)
       : v_(v), seconds_(v, times), material_(material), flights_(flights), keeps_(keeps) {}
@@ -130,7 +131,7 @@ class FlightVisitor {
 
 namespace detail {
 
-/// Flies through one volume.
+/// Samples free flights through one volume.
 template <typename F>
 inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, const Flights& flights,
                    FlightKeeps keeps, VolumeCounts& counts) {
@@ -141,19 +142,19 @@ inline void fly_in(const VolumeView& volumes, uint32_t i, const Ways& ways, cons
 
 }  // namespace detail
 
-/// Whether all volumes are alike in all channels.
+/// Returns whether all volumes have the same extinction in all channels.
 inline bool are_grey(const VolumeView& volumes) {
   return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
                      [](const VolumeRecord& v) { return v.is_grey; });
 }
-/// Whether flights weigh anything. `lamps`: the lights by which distances are drawn, too, in
-/// volumes that are even; or null.
+/// Returns whether flights have weights other than 1. `lamps` holds the lights that guide distances
+/// in homogeneous volumes, or is null.
 inline bool weigh_anything(const VolumeView& volumes, const LightView* lamps) {
   return lamps || !are_grey(volumes);
 }
 
-/// Flies through all volumes, and finds what stops flights alone. `scratch` gets how far they might
-/// go, which is `ways.most` and `flights.t`.
+/// Samples only where flights stop, in all volumes. `scratch` receives the original lengths of the
+/// segments, which are `ways.most` and `flights.t`.
 template <typename F>
 inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
                          float* scratch, const LightView* lamps, VolumeCounts& counts) {
@@ -165,8 +166,9 @@ inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flig
       detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kStops, counts);
 }
 
-/// And the ratios, once all know where they stop: flights through the first volumes went further
-/// than that, so once more, with the same numbers, to there. A flight to its own end is itself.
+/// Computes the ratios after all stops are known. Flights through the first volumes went further
+/// than the final stop, so they are repeated up to it with the same random numbers. A flight that
+/// its own volume stopped keeps its original length and repeats exactly.
 template <typename F>
 inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
                           float* scratch, const LightView* lamps, VolumeCounts& counts) {
@@ -187,7 +189,8 @@ inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Fli
   }
 }
 
-/// Both. `ways.most` is `flights.t`; `scratch` has room for twice as many numbers.
+/// Runs stop_flights() and weigh_flights(). `ways.most` is `flights.t`, and `scratch` has room for
+/// two numbers per segment.
 template <typename F>
 inline void fly_through(const VolumeView& volumes, const Ways& ways, const Flights& flights,
                         float* scratch, const LightView* lamps, VolumeCounts& counts) {
@@ -200,7 +203,7 @@ inline void fly_through(const VolumeView& volumes, const Ways& ways, const Fligh
     detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kBoth, counts);
 }
 
-/// One flight of each lane.
+/// Samples one flight in each lane.
 template <typename F>
 inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
                              const Color<F>& throughput, const Mask<F>& active,
@@ -234,14 +237,14 @@ inline Flight<F> fly_through(const VolumeView& volumes, const Passage<F>& p,
 
 namespace detail {
 
-/// Transmittance through one volume, on top of what is there.
+/// Visitor that multiplies by the transmittance of one volume.
 template <typename F>
 class TransmittanceVisitor {
   using U = UInt<F>;
   static constexpr float kLittle = 0.1f;
 
  public:
-  /// `times`: Ways::times.
+  /// `times` is Ways::times.
   TransmittanceVisitor(const VolumeRecord& v, float* const (&product)[3], const float* times)
       : v_(v), seconds_(v, times), columns_(product) {}
 
@@ -276,9 +279,9 @@ class TransmittanceVisitor {
 
 }  // namespace detail
 
-/// Multiplies each `product` by the transmittance of a way: where a volume is even, as it is, else
-/// by ratio tracking (Novak, Selle and Jarosz, "Residual Ratio Tracking", 2014, eq. 9), which ends
-/// at random where little is left.
+/// Multiplies each `product` by the transmittance of a ray segment: exactly for homogeneous
+/// volumes, and otherwise by ratio tracking (Novak, Selle and Jarosz, "Residual Ratio Tracking",
+/// 2014, eq. 9) with Russian roulette at low transmittance.
 template <typename F>
 inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
                                   float* const (&product)[3], VolumeCounts& counts) {
@@ -293,7 +296,7 @@ inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
   }
 }
 
-/// That of one way of each lane, at `time` of the shutter.
+/// Returns the transmittance of one ray segment in each lane, at shutter time `time`.
 template <typename F>
 inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
                                       const Vec3<F>& o, const Vec3<F>& d, const F& most,

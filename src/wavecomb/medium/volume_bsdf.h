@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program volume: a collision within a volume, or within a mesh that bounds fog.
+/// Program volume: scattering in a volume, or in fog inside a mesh.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Scatters by Henyey and Greenstein's phase function, as much as the albedo says.
+/// BSDF of a volume event: the Henyey-Greenstein phase function, scaled by the albedo.
 template <typename F>
 class VolumeBsdf : public BsdfTraits {
  public:
@@ -39,7 +39,7 @@ class VolumeBsdf : public BsdfTraits {
     return {wi, albedo_, henyey_greenstein<F>(g_, c), Mask<F>(false), F(1.f), F(1.f)};
   }
 
-  /// A point in a volume, in place of a surface (integrate/steps/interact.h).
+  /// Volume event, in place of a surface's shading point (integrate/steps/interact.h).
   struct Interaction {
     VolumeBsdf bsdf;
     Color<F> throughput;
@@ -76,7 +76,7 @@ class VolumeBsdf : public BsdfTraits {
     F g(0.f);
     Mask<F> in_mesh(false);
     if (v.knows_inside()) {
-      // What is absorbed there is by now.
+      // Absorption was applied before this step.
       in_mesh = v.active & Mask<F>(v.material == U(v.scene.interiors.event_material));
       albedo = select<F>(in_mesh, Color<F>(F(1.f)), albedo);
       g = select(in_mesh,
@@ -84,7 +84,7 @@ class VolumeBsdf : public BsdfTraits {
                                  v.path.medium, in_mesh),
                  g);
     }
-    // One volume after the other: the lanes of a packet that are in it.
+    // Handles one volume after the other, with the lanes of the packet that are inside it.
     for (Mask<F> rest = v.active & not_(in_mesh); any(rest);) {
       const uint32_t index = first_active<U>(volume, Mask<U>(rest));
       const VolumeRecord& r = volumes.volumes[index];

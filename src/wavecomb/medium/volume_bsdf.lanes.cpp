@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernels of program "volume". Compiled once per lane width, with WAVECOMB_LANES set to it.
+// Kernels of program "volume". Compiled once for each lane width, with WAVECOMB_LANES set to it.
 #include "wavecomb/medium/volume_bsdf.h"
 
 #include "wavecomb/integrate/shared_kernels.h"

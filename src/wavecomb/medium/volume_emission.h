@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Emission along ways through volumes.
+/// Emission along ray segments through volumes.
 #pragma once
 
 #include "wavecomb/medium/tracking.h"
 
 namespace wavecomb {
 
-/// Radiance that one volume sends along a way, by a point of it with density proportional to the
-/// grid's greatest values of its cells, and the transmittance of all volumes up to there. `time`:
-/// of the shutter.
+/// Estimates the radiance that one volume emits along a ray segment, by one point on it. The point
+/// is sampled in proportion to the grid's largest value in each cell, and the estimate includes the
+/// transmittance of all volumes up to the point. `time` is the shutter time.
 template <typename F>
 inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& way,
                             const Vec3<F>& o, const Vec3<F>& d, const F& most, const F& time,
@@ -32,7 +32,7 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way
   F before(0.f), x(0.f), greatest(0.f);
   Vec3<F> p(F(0.f));
   each_cell([&](const BrickWalk<F>& walk, const F& share) {
-    // The last cell that begins before what is wanted, so that rounding loses none.
+    // The last cell that begins before the target value, so that rounding skips no cell.
     const Mask<F> here = walk.on() & (share > 0.f) & (before <= wanted);
     const F fraction = clamp(F((wanted - before) / select(here, share, F(1.f))), F(0.f), F(1.f));
     const F at = fma(fraction, F(walk.leave() - walk.x()), walk.x());

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What lies between surfaces and below them: the volumes of a scene, what fills its meshes, and
-/// the walks of its light.
+/// Volumes of a scene, media inside its meshes, and subsurface random walks.
 #pragma once
 
 #include <algorithm>
@@ -15,15 +14,15 @@
 
 namespace wavecomb {
 
-/// What integrate/media.h asks for.
+/// Implementation of `Media` (integrate/media.h).
 class Volumes : public WalksBelow {
  public:
   static constexpr bool kAny = true, kShines = true, kStreams = true;
   template <typename F>
   using Programs = AppendedProgram<wavecomb::Programs<F>, VolumeBsdf<F>>;
 
-  /// `counts` gets what ways through them take. `walks`: room for walks, of Walkers::kColumns;
-  /// `interiors`: for rays through what fills meshes.
+  /// `counts` receives the statistics of ray segments. `walks` has Walkers::kColumns columns for
+  /// random walks, and `interiors` holds the buffers for media inside meshes.
   Volumes(const WaveContext& context, Counts& counts, const SoaBlock& walks,
           const InteriorBuffers& interiors)
       : WalksBelow(context, counts, walks),
@@ -36,13 +35,15 @@ class Volumes : public WalksBelow {
         interiors_(context.scene, *context.accel, context.traversal_width, interiors, counts,
                    context.settings->equiangular && has_lamps(context.scene.lights)) {}
 
-  /// `fly` of the reference where paths know what they are inside of: of the path in `path`, whose
-  /// row is `inside` and whose ray, of `keys`, has hit `hit`. Both may be others afterwards.
+  /// Samples the free flight of the reference integrator in scenes with nested dielectrics, for the
+  /// path `path` with medium stack `inside`, whose ray with `keys` has hit `hit`. May change both
+  /// the path and the hit.
   template <typename Hit>
   Flight<float> fly_inside(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
                            const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
                            InsideRow<float>& inside) const;
-  /// What the shadow ray of the reference passes inside of meshes.
+  /// Returns the transmittance of media inside meshes along a shadow ray of the reference
+  /// integrator.
   Color<float> pass_inside(const PresenceKeys& keys, float time, const InsideRow<float>& inside,
                            const Vec3<float>& o, const Vec3<float>& d, float t) const;
 
@@ -67,7 +68,7 @@ class Volumes : public WalksBelow {
     return sum;
   }
 
-  // The same of all rays of a wave, and of all its shadow rays that are free.
+  // Versions for all rays of a wave, and for all its unblocked shadow rays.
 
   template <typename F>
   void fly_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
@@ -96,7 +97,7 @@ class Volumes : public WalksBelow {
     if (weigh_anything(volumes_, lamps_))
       weigh_flights<F>(volumes_, ways, flights, scratch, lamps_, counts_.volumes);
   }
-  /// Of the rays from `i` on, whose paths have this throughput.
+  /// Returns the flights of the packet of rays at `i`, whose paths have this throughput.
   template <typename F>
   Flight<F> flight(const Wave& wave, size_t i, const Color<F>& throughput) const {
     const Flights f = flights_of(wave);
@@ -118,7 +119,8 @@ class Volumes : public WalksBelow {
     float* most = wave.ways.floats(kDistance);
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
       Mask<F> asked(load<UInt<F>>(q.occluded + i) == UInt<F>(0u));
-      // And those whose shadow has a colour, which dims what would come.
+      // Includes blocked rays with a coloured shadow, which attenuates the light instead of
+      // removing it.
       if (wave.pool.shades) [[unlikely]]
         asked = asked | is_shaded<F>(wave, i);
       store(most + i, select(asked, F(load<F>(q.tfar + i) * (1.f / kShadowReach)), F(0.f)));
@@ -148,7 +150,7 @@ class Volumes : public WalksBelow {
   }
 
  private:
-  /// Rays of a wave through what fills meshes.
+  /// Traces the rays of a wave through media inside meshes.
   template <typename F>
   void fly_inside_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
     const RayQueue& q = wave.rays;
@@ -175,7 +177,8 @@ class Volumes : public WalksBelow {
                         return begin_inside<F>(sampler, path.key, depth, path.throughput);
                       });
   }
-  /// Where the first distance is spread over a pixel's samples, unless volumes take that number.
+  /// Returns the start of a ray through media. The random number of the first distance is
+  /// stratified over the pixel's samples, unless volumes use that number.
   template <typename F>
   InteriorStart<F> begin_inside(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
                                 const Color<F>& throughput) const {
@@ -184,7 +187,7 @@ class Volumes : public WalksBelow {
     const F first = volumes_.count == 0 ? way.r.z : walk_numbers<F>(seed, UInt<F>(0u)).x;
     return {hero_of<F>(way.r.y, throughput), seed, first};
   }
-  /// What the middle of the camera is inside of while the shutter is half open.
+  /// Returns the medium stack at the centre of the camera at the middle of the shutter interval.
   Inside<float> around_camera(const PresenceKeys& keys) const {
     const Settings& s = *context_.settings;
     const CameraRay<float> ray = camera_ray<float>(
@@ -200,7 +203,8 @@ class Volumes : public WalksBelow {
             c.uints(kHero),
             {c.floats(kAbsorbed), c.floats(kAbsorbed + 1), c.floats(kAbsorbed + 2)}};
   }
-  /// The rays of a queue as ways of these lengths, with the numbers of `put_numbers`.
+  /// Returns the rays of a queue as segments of these lengths, with the random numbers of
+  /// put_numbers().
   template <typename Queue>
   static Ways ways_of(const Wave& wave, const Queue& q, const float* most) {
     return {q.ox,
@@ -215,7 +219,7 @@ class Volumes : public WalksBelow {
             q.size,
             wave.times.floats(0)};
   }
-  /// Lanes of shadow rays, from `i` on, whose shadow has a colour.
+  /// Returns the lanes of the shadow rays at `i` that have a coloured shadow.
   template <typename F>
   static Mask<F> is_shaded(const Wave& wave, size_t i) {
     const ShadowQueue& q = wave.shadows;
@@ -236,7 +240,7 @@ class Volumes : public WalksBelow {
   }
 
   const VolumeView volumes_;
-  const LightView* const lamps_;  ///< by which distances are drawn; null: not so
+  const LightView* const lamps_;  ///< lights that guide distances, or null
   const Interiors interiors_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waves through volumes. Compiled once per lane width, with WAVECOMB_LANES set to it.
+// Waves through volumes. Compiled once for each lane width, with WAVECOMB_LANES set to it.
 #include "wavecomb/medium/volumes.h"
 
 #include <bit>

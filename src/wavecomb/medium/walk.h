@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Random walks below surfaces, in even media, collision by collision.
+/// Subsurface random walks in homogeneous media, collision by collision.
 ///
-/// A walk begins where a diffuse lobe leads below a surface (OpenPbrBsdf::enters) and ends where it
-/// meets the surface of the same object from below: there a white diffuse surface takes over,
-/// seen from outside, with its light samples and its bounce. Nothing is refracted at either end.
-/// So light that arrives evenly leaves evenly, and a flat wall has the colour that is asked for
-/// (scene/walk_data.h).
+/// A walk begins where a diffuse lobe enters a subsurface body (OpenPbrBsdf::enters) and ends where
+/// it hits the surface of the same object from inside. There the path continues at a white diffuse
+/// surface, seen from outside, with a light sample and a bounce. Nothing is refracted at either
+/// end. Uniform incident light therefore leaves uniformly, and a flat surface has the requested
+/// colour (scene/walk_data.h).
 ///
-/// Techniques: each walk is of a channel, which decides how far it goes (hero wavelengths, Wilkie
-/// et al. 2014), and is free or led. A free walk goes as the medium scatters. One that is led makes
-/// for the surface that it entered by (Krivanek and d'Eon, "A Zero-Variance-Based Sampling Scheme
-/// for Monte Carlo Subsurface Scattering", 2014): with n the normal there, mu = d n, and nu the
-/// diffusion length in mean free paths, it draws
+/// Techniques: each walk has a hero channel, which determines its distances (hero wavelengths,
+/// Wilkie et al. 2014), and is either free or guided. A free walk follows the medium's phase
+/// function. A guided walk heads for the surface that it entered by (Krivanek and d'Eon, "A
+/// Zero-Variance-Based Sampling Scheme for Monte Carlo Subsurface Scattering", 2014): with n the
+/// normal there, mu = d n, and nu the diffusion length in mean free paths, it samples
 ///
-///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),   p(t) = s exp(-s t),  s = (1 - mu / nu)
-///   e
+///   p(d) = 1 / (2 pi (nu - mu) ln((nu + 1) / (nu - 1))),
+///   p(t) = s exp(-s t),   s = (1 - mu / nu) e
 ///
-/// with e the extinction. Its technique is chosen by a number that is spread over a pixel's
-/// samples, and its weight is that of all six (balance heuristic over whole walks): with q_k the
-/// techniques' shares and p_k their densities
+/// where e is the extinction. A random number that is stratified over the pixel's samples selects
+/// the technique, and the weight includes all six techniques (balance heuristic over whole walks).
+/// With q_k the probabilities of the techniques and p_k their densities,
 ///
 ///   T_c = T_c(0) A_c p_c / sum over k of q_k p_k
 ///
-/// A_c the albedos on the way, p_c the density of a free walk of channel c. So wherever light
-/// leaves, no weight is more than one over the share of free walks.
+/// where A_c is the product of the albedos along the walk and p_c the density of a free walk of
+/// channel c. No weight therefore exceeds one over the probability of free walks.
 #pragma once
 
 #include <algorithm>
@@ -36,28 +36,28 @@
 
 namespace wavecomb {
 
-/// Collisions after which a walk goes on by halves only: it is sure to end, and on the mean as
-/// bright.
+/// Number of collisions after which a walk continues only with probability 1/2 per collision. This
+/// guarantees termination and keeps the mean.
 inline constexpr uint32_t kLongWalk = 512;
-/// A walk that has less than this of the light that it began with goes on by chance.
+/// Fraction of the initial light below which a walk is subject to roulette.
 inline constexpr float kFaintWalk = 0.25f;
-/// Share of walks that are led below a thick wall, where collisions scatter evenly.
+/// Fraction of walks that are guided, in a thick body with isotropic scattering.
 inline constexpr float kLedShare = 0.75f;
 
-/// A walk before its next collision.
+/// State of a walk before its next collision.
 template <typename F>
 struct Walk {
   Vec3<F> o, d;
   Color<F> throughput;
-  F first;            ///< sum of the channels of the throughput that it began with
-  F rest;             ///< to the next collision, once a flight has begun
-  UInt<F> seed;       ///< of its random numbers
-  UInt<F> number;     ///< of collisions so far
-  UInt<F> normal;     ///< pack_normal of the surface that it entered by, outwards
-  F choice, flight;   ///< random numbers: for the technique, for the first distance
-  UInt<F> technique;  ///< its channel, and kLed more where it is led
-  Color<F> free;      ///< q_k p_k of free walks by channel, in the sum over all techniques
-  Color<F> led;       ///< of those that are led
+  F first;            ///< sum of the channels of the initial throughput
+  F rest;             ///< distance to the next collision, after begin_flight()
+  UInt<F> seed;       ///< seed of its random numbers
+  UInt<F> number;     ///< number of collisions so far
+  UInt<F> normal;     ///< pack_normal() of the outward normal of the surface that it entered by
+  F choice, flight;   ///< random numbers for the technique and the first distance
+  UInt<F> technique;  ///< hero channel, plus kLed if the walk is guided
+  Color<F> free;      ///< q_k p_k of free walks by channel, relative to the sum over all techniques
+  Color<F> led;       ///< the same quantity for guided walks
 
   static constexpr uint32_t kLed = 4;
 
@@ -65,7 +65,7 @@ struct Walk {
   Mask<F> is_led() const { return Mask<F>(technique >= UInt<F>(kLed)); }
 };
 
-/// Four random numbers of collision `number`.
+/// Returns four random numbers for collision `number`.
 template <typename F>
 inline Sample4<F> walk_numbers(const UInt<F>& seed, const UInt<F>& number) {
   using U = UInt<F>;
@@ -89,12 +89,13 @@ template <typename F>
 inline F sum(const Color<F>& c) {
   return c.x + c.y + c.z;
 }
-/// f(c, a_c, b_c) of each channel.
+/// Returns f(a_c, b_c) for each channel c.
 template <typename F, typename Function>
 inline Color<F> each_channel(const Color<F>& a, const Color<F>& b, const Function& f) {
   return {f(a.x, b.x), f(a.y, b.y), f(a.z, b.z)};
 }
-/// A step has these densities, by technique; `through` times the walk's light is left.
+/// Applies a step with these densities by technique, which multiplies the light of the walk by
+/// `through`.
 template <typename F>
 inline void weigh_step(const Color<F>& free, const Color<F>& led, const Color<F>& through,
                        Walk<F>& w) {
@@ -106,7 +107,8 @@ inline void weigh_step(const Color<F>& free, const Color<F>& led, const Color<F>
   w.led = w.led * scale;
   w.throughput = w.throughput * through * scale;
 }
-/// s / e by channel. The first flight goes where a lobe led, and as far as the medium has it.
+/// Returns s / e by channel. The first flight follows the direction of the lobe with the extinction
+/// of the medium.
 template <typename F>
 inline Color<F> led_density(const WalkMedium<F>& medium, const Walk<F>& w) {
   const F mu = select(Mask<F>(w.number == UInt<F>(0u)), F(0.f), dot(w.d, walk_normal(w)));
@@ -116,9 +118,9 @@ inline Color<F> led_density(const WalkMedium<F>& medium, const Walk<F>& w) {
 
 }  // namespace detail
 
-/// Chooses the technique of a walk that enters; `across` is how far it would go through its object.
-/// A channel has as much as will be left of its light below a wall. Few are led where light passes
-/// through, or is not scattered evenly.
+/// Selects the technique of a walk that enters a body. `across` is the thickness of the object
+/// along the ray. Channels are selected by the light that a thick body would reflect. Few walks are
+/// guided if the body is thin or scattering is anisotropic.
 template <typename F>
 inline void choose_technique(const WalkMedium<F>& medium, const F& across, Walk<F>& w) {
   using U = UInt<F>;
@@ -145,7 +147,7 @@ inline void choose_technique(const WalkMedium<F>& medium, const F& across, Walk<
   before(w.free.x, 0u);
 }
 
-/// Chooses how far a walk goes until its next collision.
+/// Samples the distance of a walk to its next collision.
 template <typename F>
 inline void begin_flight(const WalkMedium<F>& medium, Walk<F>& w) {
   using U = UInt<F>;
@@ -158,8 +160,8 @@ inline void begin_flight(const WalkMedium<F>& medium, Walk<F>& w) {
   w.rest = max(F(-log(F(1.f - number)) / extinction), F(1e-30f));
 }
 
-/// Takes a walk on by `t`: to a collision, where `collides`, or to the surface. Gives the lanes
-/// that go on; those of walks that have come to the surface are not among them.
+/// Advances a walk by `t`, to a collision where `collides`, otherwise to the surface. Returns the
+/// lanes that continue, without those that have reached the surface.
 template <typename F>
 inline Mask<F> end_flight(const WalkMedium<F>& medium, const F& t, const Mask<F>& collides,
                           Walk<F>& w) {
@@ -175,7 +177,7 @@ inline Mask<F> end_flight(const WalkMedium<F>& medium, const F& t, const Mask<F>
   detail::weigh_step<F>(free, led, select<F>(collides, free * medium.albedo, free), w);
   w.o = fma(w.d, t, w.o);
 
-  // After the number of the flight come those of the collision.
+  // The random numbers of the collision follow the number of the flight.
   const Sample4<F> r = walk_numbers<F>(w.seed, U(w.number + 0x80000000u));
   const F left = detail::sum(w.throughput);
   F q = select(left < F(kFaintWalk) * w.first, F(left / w.first), F(1.f));
@@ -212,7 +214,7 @@ inline Mask<F> end_flight(const WalkMedium<F>& medium, const F& t, const Mask<F>
   return on;
 }
 
-/// The medium of a material below whose surface light walks.
+/// Returns the subsurface medium of a material.
 template <typename F>
 inline WalkMedium<F> walk_medium(const WalkView& view, const UInt<F>& material,
                                  const Mask<F>& active) {

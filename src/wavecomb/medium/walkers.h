@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Walks below surfaces side by side: all take a step at a time, and those that have ended make
-/// room, so that lanes stay full.
+/// Subsurface random walks of a wave. All walks take one step at a time, and the remaining ones are
+/// compacted, so that lanes stay full.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -10,20 +10,20 @@
 
 namespace wavecomb {
 
-/// Where a walk has come to the surface.
+/// End of a walk at the surface.
 template <typename F>
 struct WalkEnd {
-  Vec3<F> p, d;  ///< the point, and the direction that the walk came in
+  Vec3<F> p, d;  ///< hit point, and direction in which the walk arrived
   Color<F> throughput;
   F u, v;
   UInt<F> prim, geom, inst;
   UInt<F> material, collisions;
 };
 
-/// Walks, side by side; columns of a block that somebody else has.
+/// Columns of walks, in a block that the caller owns.
 ///
-/// Contract: each walk draws its own random numbers and no other's, so that neither order nor
-/// number of lanes shows.
+/// Contract: the random numbers of a walk depend only on that walk, so that neither order nor lane
+/// width has an effect.
 class Walkers {
  public:
   static constexpr size_t kColumns = 36;
@@ -33,16 +33,17 @@ class Walkers {
 
   static constexpr uint32_t kNoMedium = 0xffffffffu;
 
-  /// Takes over walks in the active lanes. `who`: what `finish` is told; `slot`: of the path.
+  /// Adds the walks in the active lanes. `who` is passed to `finish`, and `slot` is the path's
+  /// slot.
   template <typename F>
   void add(const Walk<F>& w, const UInt<F>& who, const UInt<F>& slot, const F& time,
            const Mask<F>& active) {
     size_ += put<F>(size_, {w, who, slot, UInt<F>(kNoMedium), time}, active);
   }
 
-  /// Lets walks in that were added: medium_of(inst, geom, prim, met) gives the material of what
-  /// they meet of their objects, which `keys` has, or kNoMedium. leave(lanes, slot): those that
-  /// walk not.
+  /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material that they hit on
+  /// their object, which `keys` specify, or kNoMedium. Calls leave(lanes, slot) for paths that do
+  /// not start a walk.
   template <typename F, typename MediumOf, typename Leave>
   void enter(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
              const PresenceKeys& keys, const MediumOf& medium_of, const Leave& leave) {
@@ -65,9 +66,9 @@ class Walkers {
     size_ = left;
   }
 
-  /// Walks until none is left. `keys`: of the paths' slots, with their objects, whose salt is that
-  /// of the ray that entered. finish(lanes, who, end, came): walks that have ended, of which those
-  /// in `came` have come to the surface.
+  /// Runs all walks to their end. `keys` are indexed by path slot and specify the objects; their
+  /// salt is that of the ray that entered. Calls finish(lanes, who, end, came) for walks that have
+  /// ended. Lanes in `came` have reached the surface.
   template <typename F, typename Finish>
   void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
            PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
@@ -180,8 +181,8 @@ class Walkers {
             number(kMaterial),
             real(kTime)};
   }
-  /// Puts the active lanes side by side from `i` on; returns how many. What lies behind them, up to
-  /// a packet, may be overwritten.
+  /// Stores the active lanes contiguously from `i` on, and returns their number. May overwrite up
+  /// to a packet behind them.
   template <typename F>
   size_t put(size_t i, const Row<F>& row, const Mask<F>& active) {
     using U = UInt<F>;

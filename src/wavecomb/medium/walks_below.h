@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Paths that lead below a surface walk on to where they come out: all of a wave side by side.
+/// Subsurface random walks: from the ray that enters a body to the point where the path leaves it,
+/// for all paths of a wave together.
 #pragma once
 
 #include <algorithm>
@@ -17,19 +18,21 @@
 
 namespace wavecomb {
 
-/// The part of Volumes that is below surfaces.
+/// Base of Volumes for subsurface scattering.
 class WalksBelow {
  public:
-  /// `counts` gets what walks take. `walks`: room for them, of Walkers::kColumns.
+  /// `counts` receives the statistics of walks. `walks` has Walkers::kColumns columns.
   WalksBelow(const WaveContext& context, Counts& counts, const SoaBlock& walks)
       : context_(context), counts_(counts), walks_(walks) {}
 
-  /// Whether light walks below surfaces.
+  /// Returns whether the scene has subsurface scattering.
   bool has_walks() const { return context_.scene.walks.media != nullptr; }
-  /// Walks of the reference: the path of a ray that led below a surface and hit `hit`. `keys`: of
-  /// that ray, with the object. Afterwards the ray, in `path`, and its hit are those of who sees
-  /// from outside where the walk has ended, if it `came_out`; false: it has ended below. Both are
-  /// as they were where the object is not met, and light samples do not compete with the path.
+  /// Runs the walk of the reference integrator for a path whose ray has entered a subsurface body
+  /// and hit `hit`. `keys` are those of the ray and include the object. If the walk leaves the
+  /// body, sets `came_out`, and `path` and `hit` describe a ray that views the exit point from
+  /// outside. Returns false if the walk was terminated inside. If the ray does not hit the object,
+  /// returns true with `path` and `hit` unchanged, except that path.pdf becomes 0, since no light
+  /// sample competes with the path.
   template <typename Hit>
   bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
             const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
@@ -60,7 +63,7 @@ class WalksBelow {
                        });
     return came_out;
   }
-  /// Lanes, of the rays from `i` on, that see where a walk has ended.
+  /// Returns the lanes of the rays at `i` that view the exit point of a walk.
   template <typename F>
   Mask<F> came_out(const Wave& wave, size_t i) const {
     return Mask<F>(load<UInt<F>>(wave.ways.uints(kExit) + i) != UInt<F>(0u));
@@ -83,7 +86,7 @@ class WalksBelow {
   static_assert(kScratch + 2 == Wave::kWayColumns);
   static_assert(Walkers::kColumns == Wave::kWalkColumns);
 
-  /// Walks of all rays of a wave that led below a surface.
+  /// Runs the walks of all rays of a wave that entered a subsurface body.
   template <typename F>
   void walk_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {
     using U = UInt<F>;
@@ -115,7 +118,7 @@ class WalksBelow {
     const auto leave = [&](const Mask<F>& lanes, const U& slot) {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
       path.receiver = U(0u);
-      // No light sample competes with it (steps/sample_light.h).
+      // No light sample competes with the path (steps/sample_light.h).
       path.pdf = F(0.f);
       store_row<PathRow, F>(wave.pool.paths, slot, path, lanes);
     };
@@ -154,7 +157,7 @@ class WalksBelow {
             U(0u),      none,
             none};
   }
-  /// A ray that sees from outside where a walk has ended.
+  /// Ray that views the exit point of a walk from outside.
   template <typename F>
   struct Seen {
     Vec3<F> o, d;
@@ -166,8 +169,8 @@ class WalksBelow {
     return {fma(end.d, t, end.p), -end.d, t};
   }
 
-  /// Lets walks in below the objects of `keys`: those that leave(lanes, slot) is told of meet none,
-  /// or walk in no medium.
+  /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths that hit none of
+  /// them, or whose material has no subsurface medium.
   template <typename F, typename Leave>
   void enter(Walkers& walkers, const PresenceKeys& keys, uint32_t width, const Leave& leave) const {
     using U = UInt<F>;
@@ -183,7 +186,7 @@ class WalksBelow {
     counts_.walks += walkers.size();
     counts_.walk_steps += walkers.size();
   }
-  /// Adds what walks that have ended took to their materials.
+  /// Adds the collisions of ended walks to their materials.
   template <typename F>
   static void count_collisions(std::span<float> of_material, const WalkEnd<F>& end,
                                const Mask<F>& ended) {
@@ -196,7 +199,7 @@ class WalksBelow {
       of_material[material[lane]] += static_cast<float>(collisions[lane] + 1);
     }
   }
-  /// Charges the time of walks to their materials, by collisions, which Wave::scratch has.
+  /// Charges the time of walks to their materials, by the collision counts in Wave::scratch.
   static void charge_walks(Wave& wave, double ns) {
     double all = 0;
     for (const float steps : wave.scratch) all += double{steps};

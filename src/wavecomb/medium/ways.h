@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Many ways through one volume, in lanes that take the next way when they are done with one.
+/// Traversal of one volume by many ray segments. A lane takes the next segment when it has finished
+/// one.
 #pragma once
 
 #include "wavecomb/core/hash.h"
@@ -10,17 +11,17 @@
 
 namespace wavecomb {
 
-/// Ways side by side: points o + x d, 0 < x < most.
+/// Columns of ray segments: points o + x d with 0 < x < most.
 struct Ways {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
   const float* most;
-  const uint32_t* seed;  ///< what all random numbers of a way are hashes of
-  const float* first;    ///< but for the first distance in the first volume: a number in [0, 1)
+  const uint32_t* seed;  ///< seed for the random numbers of each segment
+  const float* first;    ///< random number in [0, 1) of the first distance in the first volume
   size_t count;
-  const float* times = nullptr;  ///< of the shutter; null where nothing moves
+  const float* times = nullptr;  ///< shutter times; null without motion
 };
 
-/// Numbers of a way through one volume, one after the other. Each lane counts its own.
+/// Random number sequence of a ray segment in one volume. Each lane has a separate counter.
 template <typename F>
 struct CollisionNumbers {
   UInt<F> seed{0u}, count{0u};
@@ -41,7 +42,7 @@ struct CollisionNumbers {
 
 namespace detail {
 
-/// How many of the set lanes are before each lane.
+/// Returns, for each lane, the number of set lanes before it.
 template <typename F>
 inline UInt<F> ranks(const Mask<F>& lanes) {
   if constexpr (kIsScalar<F>) {
@@ -58,17 +59,18 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 
 }  // namespace detail
 
-/// Follows ways from one collision with the majorant to the next, real or not. A lane that has
-/// ended takes the next way once three eighths of the lanes have (a quarter: fuller lanes, and more
-/// time).
-/// `Visitor`, of the lanes' ways:
+/// Follows ray segments from one collision with the majorant to the next, real or null. Idle lanes
+/// take the next segments once three eighths of the lanes are idle; with a quarter, lanes are
+/// fuller but the total time is longer.
+/// `Visitor` has these functions for the segments of the lanes:
 ///
-///   start(way, lanes)                          lanes begin with these ways
-///   Mask<F> collide(lanes, x, p, majorant, numbers)    at o + x d, which is p in the grid's space;
-///                                              gives the lanes that end there
-///   finish(way, lanes)                         lanes have ended
+///   start(way, lanes)    begins these segments
+///   Mask<F> collide(lanes, x, p, majorant, numbers)    handles a collision at o + x d, at the
+///   point
+///                        p of the grid's space, and returns the lanes that end there
+///   finish(way, lanes)   ends these segments
 ///
-/// What becomes of a way depends on no other.
+/// The result of a segment does not depend on other segments.
 template <typename F, typename Visitor>
 inline void each_collision(const PlacedGrid& placed, float scale, uint32_t volume, const Ways& ways,
                            VolumeCounts& counts, Visitor& visitor) {
@@ -124,14 +126,14 @@ inline void each_collision(const PlacedGrid& placed, float scale, uint32_t volum
   }
 }
 
-/// The ways of one packet, for who has no more.
+/// Ray segments of a single packet.
 template <typename F>
 class PacketWays {
   using U = UInt<F>;
   static constexpr size_t kLanes = kWidth<F>;
 
  public:
-  /// Lanes that are not active have a way of no length.
+  /// Inactive lanes have a segment of length 0.
   PacketWays(const Vec3<F>& o, const Vec3<F>& d, const F& most, const U& seed, const F& first,
              const F& time, const Mask<F>& active) {
     const F* const columns[8] = {&o.x, &o.y, &o.z, &d.x, &d.y, &d.z, &first, &time};

@@ -22,7 +22,7 @@ double error_threshold(const ErrorMap& map, const Settings& settings);
 
 /// Result of an error check.
 struct AdaptiveCheck {
-  std::vector<uint8_t> active;  ///< by pixel; all 0: the render is done
+  std::vector<uint8_t> active;  ///< by pixel; all 0 if the render is done
   uint64_t active_count = 0;
   /// Expected number of samples of the finished image, if errors fall with the square root of the
   /// sample count.
@@ -39,9 +39,10 @@ AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
 
 /// Returns the number of samples of each light path at the end of a pass.
 ///
-/// Args: `done`: samples of light paths so far; `before`, `after`: samples of pixels at the start
-/// and the end of the pass; `share`: the most samples of light paths, from the ratio of the two
-/// kinds of paths that the render uses; `active_share`: |A| / P below.
+/// `done` is the number of samples of light paths so far. `before` and `after` are the samples of
+/// pixels at the start and the end of the pass. `share` is the largest number of samples of light
+/// paths, from the ratio of the two kinds of paths that the render uses. `active_share` is |A| / P
+/// below.
 ///
 /// A pass traces |A| (after - before) paths from the |A| active pixels, and P paths for each sample
 /// of the P light paths. With n samples of pixels, m of light paths and the variances V_c and V_l

@@ -18,8 +18,8 @@ constexpr double kDarkShare = 0.25;
 
 /// Measurements of the pilot.
 struct Pilot {
-  std::vector<double> error;  ///< by pixel: deviation over brightness; negative: unknown
-  std::vector<double> cost;   ///< by pixel: mean cost of a sample; empty: not measured
+  std::vector<double> error;  ///< by pixel: deviation over brightness; negative if unknown
+  std::vector<double> cost;   ///< by pixel: mean cost of a sample; empty if not measured
 };
 
 double light_of(const Film& film, size_t pixel) {
@@ -141,7 +141,7 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         --given;
       }
     }
-    if (given == before) {  // all of those are 0: take one from the first that is not
+    if (given == before) {  // all of those are 0, so take one from the first that is not
       --*std::find_if(out.begin(), out.end(), [](uint32_t n) { return n > 0; });
       --given;
     }

@@ -34,9 +34,9 @@ uint32_t pilot_samples(const Settings& settings);
 
 /// Statistics of an allotment.
 struct AllotmentFacts {
-  uint32_t pilot = 0;            ///< samples per pixel of the pilot; 0: pixels are sampled evenly
+  uint32_t pilot = 0;            ///< samples per pixel of the pilot; 0 if pixels are sampled evenly
   uint32_t least = 0, most = 0;  ///< samples of a pixel at the end
-  double gain = 0;               ///< predicted efficiency over even sampling; 0: unknown
+  double gain = 0;               ///< predicted efficiency over even sampling; 0 if unknown
 };
 
 /// Distributes samples so that the mean per pixel is exactly settings.spp and every pixel has at

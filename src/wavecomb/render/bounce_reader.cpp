@@ -13,8 +13,8 @@
 namespace wavecomb {
 namespace {
 
-/// Returns one over the length of the bounce ray from vertex `i`. 0: it left the scene; negative:
-/// unknown, because the next vertex was not recorded.
+/// Returns one over the length of the bounce ray from vertex `i`. 0 means that it left the scene. A
+/// negative value means that the length is unknown, because the next vertex was not recorded.
 float bounce_nearness(const PathHistory& history, uint32_t slot, uint32_t i) {
   if (i + 1 == BounceReader::kVertices) return -1;
   if (i + 1 >= history.count(slot)) return 0;

@@ -40,8 +40,8 @@ struct LessonPlan {
   uint32_t first, samples;  ///< first sample and number of samples of each pixel
   uint32_t most_depth;
   const GuideGrid& grid;
-  GuideView guide;            ///< field that guides the bounces; empty: none
-  const PictureTiles* tiles;  ///< brightness of the image; null: unknown
+  GuideView guide;            ///< field that guides the bounces, or empty
+  const PictureTiles* tiles;  ///< brightness of the image; null if unknown
   PathCosts costs;
   uint32_t roulette_depth;
 };
@@ -63,8 +63,8 @@ class BounceReader final : public HistoryReader {
   void append_to(Lessons& lessons) const;
 
  private:
-  /// Adds the training samples of the path in `slot`. `end`: its radiance; `path`: its index;
-  /// `inverse_scale`: one over the brightness of the image at its pixel.
+  /// Adds the training samples of the path in `slot`, which has index `path` and ended with the
+  /// radiance `end`. `inverse_scale` is one over the brightness of the image at its pixel.
   void read(const PathHistory& history, uint32_t slot, const Color<float>& end, size_t path,
             float inverse_scale);
   void add_record(size_t path, const HistoryRow<float>& v, const GuidePlace<float>& place,

@@ -62,7 +62,7 @@ uint64_t share_of_samples(const Settings& settings, uint64_t share) {
   return std::min(samples / share, kMostTrainingPaths);
 }
 
-/// Returns the number of training paths; 0: too few to learn from.
+/// Returns the number of training paths, or 0 if they are too few to learn from.
 uint64_t training_paths(const Settings& settings, uint32_t threads) {
   const bool is_auto = settings.guiding == Guiding::kAuto;
   uint64_t paths = share_of_samples(settings, is_auto ? kAutoShare : kTrainingShare);
@@ -76,8 +76,9 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
 }
 
 /// Returns the mean cost and variance of a path, from the paths of the last round, which belong to
-/// `pixels`, with the effect of roulette. `spread`: variance without roulette; if it is unknown,
-/// estimated from differences between neighbours. Leaves out the paths that differ most.
+/// `pixels`, with the effect of roulette. `spread` is the variance without roulette. If it is
+/// unknown, it is estimated from differences between neighbours. Leaves out the paths that differ
+/// most.
 PathLesson mean_path(const Lessons& lessons, std::span<const uint32_t> pixels,
                      const PictureTiles& tiles, std::optional<double> spread) {
   PathLesson mean;
@@ -186,7 +187,8 @@ class Trainer {
     return view;
   }
 
-  /// Returns the gain in efficiency of the current field, measured by a pilot render; 0: unknown.
+  /// Returns the gain in efficiency of the current field, measured by a pilot render, or 0 if
+  /// unknown.
   double tell_gain(const Trial& without) {
     if (!tiles_->is_lit() || field_->facts().regions == 0) return 0;
     const GuideView guide = view();
@@ -197,7 +199,7 @@ class Trainer {
     return statistics_.gain;
   }
 
-  /// For Guiding::kAuto: returns whether to continue after `round`, whose paths had the cost
+  /// For Guiding::kAuto, returns whether to continue after `round`, whose paths had the cost
   /// `cost`. Updates the budget.
   bool goes_on(uint32_t round, double cost, const Trial& without) {
     if (round == 0) return can_afford(cost, without);
@@ -211,8 +213,8 @@ class Trainer {
     return gain >= kPromisingGain;
   }
 
-  /// Lowers the budget to what the cost of the image allows. `cost`: cost of the first round's
-  /// paths. Returns false if too few paths are left.
+  /// Lowers the budget to what the cost of the image allows. `cost` is the cost of the first
+  /// round's paths. Returns false if too few paths are left.
   bool can_afford(double cost, const Trial& without) {
     if (is_timed()) return true;
     const auto samples = static_cast<double>(settings_.spp * uint64_t{order_.size()});

@@ -25,11 +25,11 @@ struct WaveContext;
 /// Statistics of the training.
 struct GuideStatistics {
   GuideFacts facts;    ///< of the last field that was built
-  uint64_t paths = 0;  ///< training paths; 0: nothing was learned
+  uint64_t paths = 0;  ///< training paths; 0 if nothing was learned
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;
   /// For Guiding::kAuto: efficiency with the field over efficiency without, measured in pilot
-  /// renders; 0: unknown.
+  /// renders, or 0 if unknown.
   double gain = 0;
   /// Expected fraction of vertices at which a path survives learned roulette.
   double survival = 1;
@@ -40,7 +40,7 @@ struct GuideStatistics {
 
 /// Result of the training.
 struct GuideTraining {
-  std::shared_ptr<const GuideField> field;  ///< null: nothing was learned
+  std::shared_ptr<const GuideField> field;  ///< null if nothing was learned
   std::optional<PictureTiles> tiles;        ///< brightness of the image; set if there is a field
   GuideStatistics statistics;
 };

@@ -43,8 +43,8 @@ struct Trial {
   }
 };
 
-/// Renders `samples` samples of each pixel twice, with `settings` except for the seed. `guide`: the
-/// field to use, or null for none.
+/// Renders `samples` samples of each pixel twice, with `settings` except for the seed. `guide` is
+/// the field to use, or null for none.
 Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
               const WaveSetup& waves, std::span<const uint32_t> pixels, uint32_t samples,
               const GuideGrid& grid, const std::function<bool()>& stopped);

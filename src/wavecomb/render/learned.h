@@ -21,7 +21,7 @@ namespace wavecomb {
 struct Learned {
   std::shared_ptr<const Scene> scene;              ///< the rendered scene
   bool by_tree = false;                            ///< LightView::by_tree
-  std::shared_ptr<const LightCalibration> lights;  ///< null: lights are chosen by power
+  std::shared_ptr<const LightCalibration> lights;  ///< null if lights are selected by power
   std::shared_ptr<const GuideTraining> training;   ///< may have no field
 };
 
@@ -36,12 +36,12 @@ struct LearnedPlace {
   /// Axis that the surface faces (one of kGuideAxes), and whether the field has a region there.
   uint32_t axis = 0;
   bool known = false;
-  /// If `known`: density per steradian of the guiding distribution, kGuideSide rows of kGuideSide
+  /// Density per steradian of the guiding distribution, if `known`: kGuideSide rows of kGuideSide
   /// bins of the square map of directions (learn/directions.h).
   std::vector<float> density;
   float guided_share = 0;  ///< fraction of bounces that sample the guiding field
   /// Survival probability of learned roulette for a throughput equal to the brightness of the
-  /// image, before clamping (learn/worth.h); 0: unknown.
+  /// image, before clamping (learn/worth.h), or 0 if unknown.
   float survival = 0;
   /// Names of lights and emissive meshes with their selection probability at the point, largest
   /// first, without those of probability 0. Empty if there are no lights or more than kMostWeighed.

@@ -30,14 +30,14 @@ namespace wavecomb {
 /// samples are integers, so that they do not depend on the order.
 class LightBalance {
  public:
-  /// `shares`: selection probabilities (> 0) of the parts while samples are taken. `cells`: number
-  /// of groups of similar vertices, each of which has its own M and N.
+  /// `shares` are the selection probabilities (> 0) of the parts while samples are taken. `cells`
+  /// is the number of groups of similar vertices, each of which has its own M and N.
   LightBalance(std::span<const double> shares, size_t cells);
 
-  /// Adds a selection of `part` at a vertex in `cell`. `value`: contribution of the light sample
-  /// times its MIS weight, over the brightness of the image there. `weight`: that MIS weight.
-  /// Ignores values that are not finite, and clamps to kMostValue the value that the sample would
-  /// have at a selection probability of 1.
+  /// Adds a selection of `part` at a vertex in `cell`. `value` is the contribution of the light
+  /// sample times its MIS weight, divided by the brightness of the image there, and `weight` is
+  /// that MIS weight. Ignores values that are not finite, and clamps to kMostValue the value that
+  /// the sample would have at a selection probability of 1.
   void add(size_t cell, size_t part, double value, double weight);
 
   /// Returns the selection probabilities of least variance. The fraction kFloor is distributed half
@@ -65,8 +65,9 @@ class LightBalance {
 /// Odds between the two children of a light tree node, from samples of the lights below it.
 class NodeBalance {
  public:
-  /// Adds a light sample below the node. `right`: it is below the right child; `probability`:
-  /// selection probability of its child; `value`, `weight`: see LightBalance::add.
+  /// Adds a light sample below the node, which is below the right child if `right`. `probability`
+  /// is the selection probability of its child. `value` and `weight` are those of
+  /// LightBalance::add.
   void add(bool right, double probability, double value, double weight);
   /// Returns the factor on the odds of the right child for which the second moment is least: a
   /// power of sqrt(2) in [1/8, 8], or 1 if there are too few samples.

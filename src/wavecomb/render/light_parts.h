@@ -23,7 +23,7 @@ struct LightParts {
   bool by_tree = false;
   std::vector<double> power;        ///< selection probability by power of each part; the sum is 1
   std::vector<std::string> names;   ///< names of lights and meshes, "tree", "N others"
-  std::vector<uint32_t> of_record;  ///< part by light record; kNoPart: never selected
+  std::vector<uint32_t> of_record;  ///< part by light record; kNoPart if never selected
   std::vector<std::pair<uint32_t, uint32_t>> of_mesh;  ///< first light and part, ascending
 
   size_t size() const { return power.size(); }
@@ -50,14 +50,14 @@ struct NodeTilt {
 
 /// Calibrated light tables that replace those of a LightView.
 struct WeighedLights {
-  std::vector<double> shares;   ///< by part, after rounding; empty: the tables of the view remain
+  std::vector<double> shares;   ///< by part, after rounding; empty if the tables of the view remain
   std::vector<float> pick_pdf;  ///< by light; empty for selection by tree
   std::vector<uint32_t> pick_bins;
   PickTable pick;  ///< with a null pointer to the bins
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;
-  std::vector<LightTreeNode> nodes;  ///< empty: the nodes of the tree remain
+  std::vector<LightTreeNode> nodes;  ///< empty if the nodes of the tree remain
 
   /// Replaces the tables of `view`. Contract: the view then points into this object.
   void apply(LightView& view) const;
@@ -68,7 +68,7 @@ struct WeighedLights {
 /// Contract: the arguments of the constructor outlive it.
 class LightWeigher {
  public:
-  /// `tree`: the tree of the set; needs nodes only if tilts are passed to weigh().
+  /// `tree` is the tree of the set. It needs nodes only if tilts are passed to weigh().
   LightWeigher(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
   /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1), up to

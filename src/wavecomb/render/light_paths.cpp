@@ -11,7 +11,7 @@
 namespace wavecomb {
 namespace {
 
-/// The sphere around all surfaces, a little larger.
+/// Scale of the sphere around all surfaces, slightly above 1.
 constexpr float kRoom = 1.001f;
 
 Bounds shape_bounds(const PlacedShape& shape) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What a render needs for paths that start at lights (docs/light-paths.md).
+/// Light paths of a render: support by the scene, unit and filter of light splats
+/// (docs/light-paths.md).
 #pragma once
 
 #include <cmath>
@@ -16,41 +17,42 @@ namespace wavecomb {
 
 struct CameraSetup;
 
-/// How many paths start at lights for each path of a pixel, over the number of the picture's
-/// pixels: 2^exponent.
+/// Number of light paths per camera path, averaged over the image: 2^exponent.
 struct LightPathShare {
   int exponent = 0;
 
   float paths() const { return std::ldexp(1.f, exponent); }
-  /// Samples of each number of such paths where pixels have `n`.
+  /// Returns the samples of each light path when pixels have `n` samples.
   uint32_t samples(uint32_t n) const {
     return exponent >= 0 ? n << exponent : (n + (1u << -exponent) - 1) >> -exponent;
   }
 };
 
-/// What of the scene such paths do not go with; empty: nothing.
+/// Returns the feature of the scene that does not work with light paths. Empty if there is none.
 LightPathRefusal light_path_refusal(const Scene& scene);
-/// Throws Error where there is anything.
+/// Throws Error if the scene has such a feature.
 void check_light_paths(const Scene& scene, const Settings& settings);
 
-/// The brightness, a power of two, that the scene as a whole would have of its lights' power.
+/// Returns the mean radiance that the scene would have if it received the power of all its lights,
+/// times the camera's exposure, rounded up to a power of two.
 float scene_brightness(const Scene& scene);
-/// The unit of splats: that of light of which the scene as a whole would be as bright as its lights
-/// have power, over 2^44. So splats keep some 20 bits and more from 2^-24 of that brightness up,
-/// and reach 2^17 of it.
+/// Returns the fixed-point unit of light splats: scene_brightness() / 2^44. Splats thus keep at
+/// least 20 bits of contributions above 2^-24 of that brightness, and reach up to 2^17 times the
+/// brightness.
 FixedPoint splat_unit(const Scene& scene);
 
-/// How light that paths show to the camera counts for the pixels of a render.
+/// Returns the filter that distributes contributions of light paths to the pixels of a render.
 SplatFilter splat_filter_of(const CameraSetup& camera, const FilterTable& filter,
                             const Region& rendered);
 
-/// Lets the lights of `view` send paths: towards all surfaces, from before all shapes of lights.
+/// Enables light paths for the lights of `view`: sets the sphere around all surfaces, and the
+/// distance from which paths of infinite lights start, in front of all light shapes.
 void send_paths(const Scene& scene, LightView& view);
 
-/// Whether any light of the scene may send paths.
+/// Returns whether any light of the scene emits light paths.
 bool sends_paths(const Scene& scene);
 
-/// Names of the lights that send none: camera paths find all of their light.
+/// Returns the names of the lights that emit no light paths. Camera paths find all of their light.
 std::vector<std::string> lights_without_paths(const Scene& scene);
 
 }  // namespace wavecomb

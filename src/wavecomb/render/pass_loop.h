@@ -26,10 +26,10 @@ namespace wavecomb {
 /// samples depend on film, settings and pass only, unless there is a time limit.
 class PassLoop {
  public:
-  /// `pass`: the state that belongs to the film, if both come from a checkpoint. `step`: samples
-  /// per pixel that a pass adds if the render is not adaptive. `light_share`: number of light
-  /// paths, if there are any. `before_lights`: called in each pass between its camera paths and its
-  /// light paths; may be null.
+  /// `pass` is the state that belongs to the film, if both come from a checkpoint. `step` is the
+  /// number of samples per pixel that a pass adds if the render is not adaptive, and `light_share`
+  /// the number of light paths, if there are any. Each pass calls `before_lights` between its
+  /// camera paths and its light paths; it may be null.
   PassLoop(const Settings& settings, uint32_t step, PassState pass, LightPathShare light_share,
            Film& film, PassRunner& runner, RenderCosts& costs, Watch& watch,
            std::function<void()> before_lights = nullptr);

@@ -18,7 +18,7 @@ inline constexpr uint32_t kCheckSamples = 16;
 
 /// Target samples of each pixel if they differ (render/allotment.h).
 struct Allotment {
-  uint32_t pilot = 0;            ///< samples of the pilot; 0: pixels are sampled evenly
+  uint32_t pilot = 0;            ///< samples of the pilot; 0 if pixels are sampled evenly
   uint32_t spp = 0;              ///< final mean per pixel
   std::vector<uint32_t> counts;  ///< final samples by pixel; empty until the pilot is done
 
@@ -34,7 +34,7 @@ struct Allotment {
 struct PassState {
   uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
   uint32_t light_target = 0;      ///< samples of each light path after the pass
-  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1 if active; empty: all are
+  std::vector<uint8_t> active{};  ///< by pixel, row by row: 1 if active; empty if all are
   Allotment allotment{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
@@ -48,7 +48,7 @@ struct PassRules {
   bool timed = false;        ///< the render has a time limit
   uint32_t step = 16;        ///< not adaptive: samples that a pass adds
   bool progressive = false;  ///< sample counts double from one sample on
-  uint32_t pilot = 0;        ///< a pass ends at this sample count; 0: pixels are sampled evenly
+  uint32_t pilot = 0;        ///< a pass ends at this sample count; 0 if pixels are sampled evenly
 };
 
 /// Time until the limit, and rendering speed so far.
@@ -88,8 +88,8 @@ struct PassPlan {
 /// Plans the remaining work of a pass: its active pixels below their target, grouped by sample
 /// count and target, fewest samples first.
 ///
-/// Args: `order`: the rendered pixels (x | y << 16); `window`: pixels of the film; `samples`:
-/// sample count of each film pixel, row by row. Returns no batches if the pass is done.
+/// `order` holds the rendered pixels (x | y << 16), `window` the pixels of the film, and `samples`
+/// the sample count of each film pixel, row by row. Returns no batches if the pass is done.
 PassPlan plan_pass(std::span<const uint32_t> order, const Region& window,
                    std::span<const uint32_t> samples, const PassState& pass);
 

@@ -17,7 +17,7 @@ namespace wavecomb {
 struct Pick {
   std::string object;            ///< ObjectNames::object
   std::string asset;             ///< ObjectNames::asset
-  uint32_t light = kNoLight;     ///< index into Scene::lights; kNoLight: a surface
+  uint32_t light = kNoLight;     ///< index into Scene::lights; kNoLight for a surface
   uint32_t material = 0;         ///< surfaces only, as are instance, normal and uv
   uint32_t instance = 0;         ///< index into SceneView::instances
   Vec3<float> position, normal;  ///< world space; unit shading normal

@@ -4,11 +4,11 @@
 /// They run in this order, and each uses the results of those before:
 /// 1. light calibration: the contribution of each light to the image (light_calibration.h);
 /// 2. costs of materials (render_costs.h);
-/// 3. aiming: where paths from lights should go (light_aiming.h);
+/// 3. aiming: directions for light paths (light_aiming.h);
 /// 4. training: where light comes from (guide_training.h).
 /// Each returns its result with the seconds that it took and its statistics. Except for costs,
-/// which change no image, they depend on counted samples of the whole image only. Whether and how
-/// many paths start at lights was decided before, by a pilot that compares whole renders
+/// which change no image, they depend only on counted samples of the whole image. Whether and how
+/// many light paths the render uses was decided before, by a pilot that compares whole renders
 /// (transport_choice.h).
 #pragma once
 
@@ -35,8 +35,8 @@ struct PilotCache {
 
 /// Results of the pilots of one render.
 struct PilotResults {
-  std::shared_ptr<const LightCalibration> lights;  ///< null: not calibrated yet
-  std::shared_ptr<const LightAiming> aiming;       ///< null: paths from lights are not aimed
+  std::shared_ptr<const LightCalibration> lights;  ///< null if not calibrated yet
+  std::shared_ptr<const LightAiming> aiming;       ///< null if light paths are not aimed
   /// Never null; without a field before and unless it is trained.
   std::shared_ptr<const GuideTraining> training = std::make_shared<const GuideTraining>();
   LightView light_view;  ///< lights with calibrated weights, and aimed if they send paths

@@ -21,8 +21,8 @@ inline constexpr size_t kRayKinds = 3;
 
 /// Options of RayRecording::replay().
 struct Replay {
-  bool alone = true;     ///< by Embree alone; false: by EmbreeAccelerator
-  uint32_t threads = 0;  ///< 0: all hardware threads
+  bool alone = true;     ///< by Embree alone, or else by EmbreeAccelerator
+  uint32_t threads = 0;  ///< 0 means all hardware threads
   /// By kind of ray: rays per packet, and whether Embree is told that they are coherent. Without a
   /// value, coherence is as recorded.
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
@@ -30,7 +30,7 @@ struct Replay {
   std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace
 };
 
-/// Result of a replay. `hits`: rays that hit something or are blocked.
+/// Result of a replay. `hits` counts the rays that hit something or are blocked.
 struct ReplayTimes {
   double wall_s = 0;
   std::array<double, kRayKinds> thread_s{};

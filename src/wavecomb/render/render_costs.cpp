@@ -97,7 +97,8 @@ bool RenderCosts::apply(const CostProfile& profile) {
   }
   for (size_t t = 0; t < order.texture_ns.size(); ++t) {
     const auto at = textures.find(scene_.textures()[t]->name());
-    const bool known = at != textures.end() && at->second >= 0;  // 0: too little to be measured
+    // 0 means too little to be measured
+    const bool known = at != textures.end() && at->second >= 0;
     if (known) order.texture_ns[t] = at->second;
     knows_all = knows_all && known;
   }

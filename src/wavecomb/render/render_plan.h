@@ -44,8 +44,8 @@ uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wav
 /// Contract: scene, accelerator, settings and policy outlive the plan, and the plan outlives the
 /// films and contexts made from it.
 struct RenderPlan {
-  /// `policy`: replaces the policy of the settings, unless null. Throws Error if the scene or this
-  /// build does not support what the settings ask for.
+  /// `policy` replaces the policy of the settings, unless it is null. Throws Error if the scene or
+  /// this build does not support what the settings ask for.
   RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator, const Settings& settings,
              LightPathShare light_share, const SchedulingPolicy* policy);
   RenderPlan(const RenderPlan&) = delete;
@@ -72,8 +72,9 @@ struct RenderPlan {
 
   /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;
-  /// Creates the data that the waves of the render read. `film`: from make_film(). `costs`: those
-  /// of this render. `visible`: the points with which light paths are merged, or null.
+  /// Creates the data that the waves of the render read. `film` is from make_film(), `costs` are
+  /// those of this render, and `visible` holds the points with which light paths are merged, or is
+  /// null.
   WaveContext make_context(Film& film, RenderCosts& costs, RayRecorder* recorder,
                            const VisibleGrid* visible) const;
 

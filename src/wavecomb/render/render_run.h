@@ -35,7 +35,7 @@ struct TrialShared {
 /// constructor outlive the run.
 class RenderRun {
  public:
-  /// `build_s`: build time of the accelerator in seconds, for statistics.
+  /// `build_s` is the build time of the accelerator in seconds, for statistics.
   RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
             const RenderOptions& options, Watch& watch, double build_s);
 

@@ -42,7 +42,7 @@ struct LightShare {
 /// Statistics of the light calibration.
 struct LightShares {
   double seconds = 0;
-  uint32_t paths = 0;         ///< 0: there was nothing to calibrate
+  uint32_t paths = 0;         ///< 0 if there was nothing to calibrate
   bool kept = false;          ///< taken over from an earlier render
   uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
   std::vector<LightShare> parts;
@@ -50,8 +50,8 @@ struct LightShares {
 
 /// Statistics of the aiming of light paths.
 struct AimStatistics {
-  uint32_t targets = 0;  ///< spheres; 0: paths are not aimed
-  uint64_t paths = 0;    ///< training paths; 0: aiming was not trained
+  uint32_t targets = 0;  ///< spheres; 0 if paths are not aimed
+  uint64_t paths = 0;    ///< training paths; 0 if aiming was not trained
   double seconds = 0;
 };
 
@@ -68,7 +68,7 @@ struct RenderStatistics {
   uint32_t passes = 0;  ///< begun
   Sharing sharing;
   uint64_t resumed_samples = 0;  ///< from a checkpoint; not in `samples`
-  double error = 0;              ///< mean relative error of the image; infinite: unknown
+  double error = 0;              ///< mean relative error of the image; infinite if unknown
   SceneBytes scene_bytes;
   uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
   bool cancelled = false;  ///< stopped by the caller; false if a time limit ended the render
@@ -77,7 +77,7 @@ struct RenderStatistics {
   double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
   std::vector<MaterialStatistics> materials;
   double cost_r2 = 0, cost_mean_error = 0;  ///< of predictions for the last pass that had any
-  uint64_t cost_materials = 0;              ///< number of materials compared; 0: no prediction
+  uint64_t cost_materials = 0;  ///< number of materials compared; 0 without a prediction
   std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
   double calibration_s = 0;
   LightShares light_calibration;

@@ -16,7 +16,7 @@ struct RenderStatus {
   uint32_t passes = 0;         ///< begun
   uint64_t active_pixels = 0;  ///< in the current pass
   double seconds = 0;          ///< since the render began or was resumed
-  /// Mean relative error of the image at the last check; infinite: unknown.
+  /// Mean relative error of the image at the last check, or infinite if unknown.
   double error = std::numeric_limits<double>::infinity();
 };
 

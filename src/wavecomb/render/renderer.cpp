@@ -35,7 +35,7 @@ struct WavefrontRenderer::Impl {
   double build_s = 0;
   PilotCache pilot_cache;
 
-  /// Renders with settings whose transport is decided. `shared`: for pilot renders.
+  /// Renders with settings whose transport is decided. Pilot renders pass data in `shared`.
   Picture render(const Settings& settings, LightPathShare light_share, const RenderOptions& options,
                  Watch& watch, const TrialShared& shared = {});
   /// Renders a small image for choose_transport(). Stops if `outer` is stopped.

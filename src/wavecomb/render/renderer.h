@@ -91,7 +91,7 @@ struct RenderOptions {
 /// renders, both by one thread at a time. Any thread may call the other functions at any time.
 class WavefrontRenderer {
  public:
-  /// `threads`: number of threads for building; 0 means all.
+  /// `threads` is the number of threads for building; 0 means all.
   explicit WavefrontRenderer(std::shared_ptr<const Scene> scene, uint32_t threads = 0);
   ~WavefrontRenderer();
 

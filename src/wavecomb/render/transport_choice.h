@@ -33,14 +33,14 @@ struct TransportChoice {
   Transport transport = Transport::kPath;
   LightPathShare share;  ///< for Transport::kLight
   std::string why;       ///< completes a sentence about the choice
-  double gain = 0;  ///< predicted efficiency over a render without light paths; 0: not measured
+  double gain = 0;  ///< predicted efficiency over a render without light paths; 0 if not measured
   double seconds = 0;
 };
 
 /// Result of a small pilot render.
 struct TransportTrial {
   std::vector<float> beauty;          ///< rgb
-  std::vector<float> by_light_paths;  ///< the part of beauty from light paths; empty: none
+  std::vector<float> by_light_paths;  ///< the part of beauty from light paths; empty without them
   uint64_t rays = 0, records = 0;     ///< traced rays and shading records
 };
 /// Renders a small image with the given ratio of light paths. If the last argument is true,

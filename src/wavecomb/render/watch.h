@@ -22,7 +22,7 @@ enum class Request : uint8_t {
 /// Contract: run() once. It calls look() and snapshot() on its own thread.
 class Watch {
  public:
-  /// `interval_s`: seconds between calls of look().
+  /// `interval_s` is the time between calls of look() in seconds.
   explicit Watch(double interval_s = 0.1) : interval_s_(interval_s) {}
 
   /// Runs `work` on a separate thread. Calls `look` every interval, and `snapshot` with the work

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 3a: hits become shading records, and so does what stopped a path before its hit; paths
-/// that left the scene or met a light's shape end here.
+/// Wave stage 3a: turns hits and volume events into shading records. Paths that leave the scene or
+/// hit a light's shape end here.
 #pragma once
 
 #include "wavecomb/core/rows.h"
@@ -17,8 +17,7 @@
 
 namespace wavecomb {
 
-/// Notes how dense the camera's paths are that have met something: what PathState::ratio begins
-/// with.
+/// Initialises PathState::ratio of camera paths that have hit something.
 template <typename F>
 [[gnu::noinline, gnu::cold]] void begin_ratios(Wave& wave, const WaveContext& context,
                                                const UInt<F>& slot, const Vec3<F>& o,
@@ -33,7 +32,7 @@ template <typename F>
       slot, active);
 }
 
-/// What has stopped the paths of a packet's flights.
+/// Returns the volume events that stopped the flights of a packet.
 template <typename F>
 VolumeSeen<F> volume_seen(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
                           const Flight<F>& flight) {
@@ -51,8 +50,8 @@ VolumeSeen<F> volume_seen(const Wave& wave, const WaveContext& context, const UI
   return seen;
 }
 
-/// Tells AOVs how paths, whose throughput is now `throughput`, have come through what lies between
-/// surfaces.
+/// Records for AOVs how paths passed through volumes and media. `throughput` is the throughput
+/// after the flight.
 template <typename F>
 void note_way(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
               const Color<F>& throughput, const Mask<F>& active) {
@@ -64,8 +63,8 @@ void note_way(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& 
     wave.aovs.expressions().template walk<F>(slot, walked);
 }
 
-/// Reads the ray queue and the hit buffer, fills the shading queue in the rays' order. Paths from
-/// lights (`kFromLights`) bring nothing where they end.
+/// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays.
+/// Light paths (`kFromLights`) contribute nothing where they end.
 template <typename F, typename Media, bool kFromLights = false>
 void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
              [[maybe_unused]] const Media& media) {

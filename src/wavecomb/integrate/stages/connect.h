@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 4b, where vertices are connected: those from lights are shaded for the camera paths in
-/// their slots, and what the rays between them bring is added to those.
+/// Wave stage 4b, for connections: shades the vertices of light paths for the camera paths in the
+/// same slots, and adds the contributions of unblocked connections to those camera paths.
 #pragma once
 
 #include "wavecomb/integrate/stages/order.h"
@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Makes records of the vertices from lights that the records just shaded are connected to, one
-/// program's together.
+/// Fills the shading queue with the light path vertices that the records just shaded connect to,
+/// grouped by program.
 template <typename F>
 void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;
@@ -20,7 +20,7 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   const size_t shaded = queue.size;
   queue.clear();
   size_t n = 0;
-  // What is written lies before what is still to be read.
+  // The queue is overwritten in place: writes stay behind reads.
   for (size_t i = 0; i < shaded; i += kWidth<F>) {
     Mask<F> active = first_lanes<F>(shaded - i);
     const U slot = load<U>(queue.slot + i);
@@ -42,8 +42,8 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   wave.counts.add_records(depth, n);
 }
 
-/// Connects the vertices of camera paths at `depth`, which were shaded. The list of their next rays
-/// stays as it is.
+/// Connects the shaded vertices of camera paths at `depth`. Does not change the list of their next
+/// rays.
 template <typename F>
 void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 1: a camera ray for every slot.
+/// Wave stage 1: generates a camera ray for every slot.
 #pragma once
 
 #include "wavecomb/integrate/wave.h"
@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Fills the pool and the ray queue, slot by slot: slot = pixel in the task * samples + sample.
-/// Returns the column of far-plane distances, or null when the camera has no far plane.
+/// Fills the pool and the ray queue, where slot = pixel in the task * samples + sample. Returns the
+/// column of far-plane distances, or null if the camera has no far plane.
 template <typename F>
 const float* generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
   using U = UInt<F>;
@@ -18,14 +18,14 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   RayQueue& rays = wave.rays;
   const uint32_t n = task.path_count();
   const float inv_samples = 1.f / static_cast<float>(task.samples);
-  float* tfar = wave.shadows.tfar;  // free until the first shading
+  float* tfar = wave.shadows.tfar;  // unused until the first shading
   wave.aovs.clear(n);
   wave.history.clear(n);
   if (wave.visible) wave.visible.clear(n);
   for (uint32_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
     const U slot = lane_index<F>() + i;
-    // slot / samples, exact: slots are below 2^20 and half a step is added.
+    // slot / samples. Exact, since slots are below 2^20 and half a step is added.
     const U index = U(to_int<F>((F(Int<F>(slot)) + 0.5f) * inv_samples));
     const U pixel = gather<U>(task.pixels, index, Mask<U>(active));
     const U sample = slot - index * task.samples + task.first_sample;

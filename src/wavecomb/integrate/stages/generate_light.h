@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 1 of paths from lights: one for every slot.
+/// Wave stage 1 of light paths: starts a light path in every slot.
 #pragma once
 
 #include "wavecomb/integrate/light_path.h"
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Fills the pool, slot by slot as generate() does, and the ray queue with those that have a light
-/// to start at.
+/// Fills the pool, with slots numbered as in generate(), and the ray queue with the paths for which
+/// a light was sampled.
 template <typename F>
 void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
   using U = UInt<F>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 3b: the policy gives the shading queue its order.
+/// Wave stage 3b: orders the shading queue by the scheduling policy.
 #pragma once
 
 #include "wavecomb/core/fields.h"
@@ -10,10 +10,9 @@
 
 namespace wavecomb {
 
-/// Where in its textures a record reads: UDIM tile 7 bits | mip level 4 | Morton of uv on a 128 x
-/// 128 grid
-/// 14. An estimate for keys: the level comes from the mesh's mean uv density, texture transforms
-/// are left out.
+/// Returns a key of the texture position that a record reads: UDIM tile (7 bits), mip level (4
+/// bits), Morton code of uv on a 128 x 128 grid (14 bits). It is an estimate: the level uses the
+/// mean uv density of the mesh, and texture transforms are ignored.
 template <typename F>
 UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone_width,
                     const Mask<F>& active) {
@@ -30,13 +29,13 @@ UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone
   const U cell = morton_2<U>(U(to_int<F>(F((u - fu) * 128.f))) & 0x7fu,
                              U(to_int<F>(F((v - fv) * 128.f))) & 0x7fu);
   const F density = gather_member<F>(scene.meshes, &MeshRecord::uv_density, hit.mesh, active);
-  // Level of a 2^15-texel texture, from the exponent of the footprint: floor(log2(width)) + 15.
+  // Mip level of a 2^15-texel texture, from the exponent of the footprint: floor(log2(width)) + 15.
   const F width = clamp(F(cone_width * density), F(0x1p-15f), F(1.f));
   const U level = ((float_bits<F>(width) >> 23) - 112u) & 0xfu;
   return select(Mask<U>(has_uv), (tile << 18) | (level << 14) | cell, U(0u));
 }
 
-/// Works out the columns of ShadingQueueView in `wanted`.
+/// Computes the columns of ShadingQueueView whose bits are set in `wanted`.
 template <typename F>
 void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
   using U = UInt<F>;
@@ -59,7 +58,8 @@ void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
   }
 }
 
-/// Packets that shading would run: in arrival order, and with each program's records together.
+/// Number of packets that shading would run in arrival order, and with the records grouped by
+/// program.
 struct PacketEstimate {
   double arrival = 0, grouped = 0;
 };
@@ -79,14 +79,15 @@ inline PacketEstimate estimate_packets(std::span<const uint32_t> program, size_t
   return e;
 }
 
-/// Which policy was used, for the chooser to learn from.
+/// Policy that was used, as feedback for the chooser.
 struct OrderChoice {
   size_t arm = 0;
   Work work;
   double prepare_ns = 0;
 };
 
-/// Keys -> stable sort -> sorted_indices -> materialize, each in its own phase.
+/// Runs keys -> stable sort -> sorted_indices -> materialize, each in a separate phase of the
+/// clock.
 template <typename F>
 OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth) {
   using Clock = PhaseClock::Clock;
@@ -135,8 +136,8 @@ OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth
   return choice;
 }
 
-/// Adds every seventeenth queue to the measures of coherence, in the order in which it is shaded.
-/// (A prime: waves of 8 or 16 depths would always show the same one.)
+/// Adds every seventeenth queue to the coherence statistics, in shading order. The interval is a
+/// prime number, since waves of 8 or 16 depths would otherwise always measure the same depth.
 template <typename F>
 void watch_coherence(Wave& wave, const WaveContext& context) {
   if (wave.queues % 17 != 1) return;

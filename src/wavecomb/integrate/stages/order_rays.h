@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 2a: rays in an order that traversal may like better. Made from the rays alone, so it is
-/// the same under every shading policy.
+/// Wave stage 2a: sorts rays for more coherent traversal. The order depends only on the rays, so it
+/// is the same under every shading policy.
 #pragma once
 
 #include "wavecomb/core/morton.h"
@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Morton code of points on the grid, 30 bits.
+/// Returns the 30-bit Morton code of points on the grid.
 template <typename F>
 inline UInt<F> position_key(const OrderGrid& grid, const Vec3<F>& p) {
   using U = UInt<F>;
@@ -19,10 +19,10 @@ inline UInt<F> position_key(const OrderGrid& grid, const Vec3<F>& p) {
   return morton_3<U>(axis(p.x, 0), axis(p.y, 1), axis(p.z, 2));
 }
 
-/// Axes longer than this count as long ones; about 1 / sqrt(3).
+/// Length from which a direction's component counts as long, about 1 / sqrt(3).
 inline constexpr float kLong = 0.6f;
 
-/// Six bits of a direction: its octant, and which of its axes are long.
+/// Returns six bits of a direction: its octant, and which of its components are long.
 template <typename F>
 inline UInt<F> direction_key(const Vec3<F>& d) {
   using U = UInt<F>;
@@ -32,8 +32,9 @@ inline UInt<F> direction_key(const Vec3<F>& d) {
          (is_long(d.y) << 1) | is_long(d.z);
 }
 
-/// Keys of the rays in the pool rows of `slot`: the Morton code of the origin, under the octant of
-/// the direction where asked for. Paths and shadow rays both start with origin and direction.
+/// Computes the sort keys of the rays in the pool rows of `slot`: the Morton code of the origin,
+/// preceded by the octant of the direction if `by_octant`. Rows of paths and of shadow rays both
+/// start with origin and direction.
 template <typename F>
 void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid& grid,
               bool by_octant, uint64_t* keys) {
@@ -44,8 +45,8 @@ void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid
     const Mask<F> active = first_lanes<F>(n - i);
     const auto ray = load_head<RayHead, PathRow, F>(rows, load<U>(slot + i), active);
     U key = position_key<F>(grid, ray.o);
-    // The octant takes the two spare bits and the place of the lowest: it is worth more than that
-    // one.
+    // The octant takes the two spare bits and replaces the lowest bit of the Morton code, which
+    // matters less.
     if (by_octant) key = ((direction_key<F>(ray.d) >> 3) << 29) | (key >> 1);
     store(lanes, key);
     const size_t m = std::min(kWidth<F>, n - i);
@@ -53,7 +54,7 @@ void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid
   }
 }
 
-/// What was done, for the chooser to learn from.
+/// Ray order that was used, as feedback for the chooser.
 struct RayOrderChoice {
   bool chosen = false;
   size_t arm = 0;
@@ -61,8 +62,8 @@ struct RayOrderChoice {
   double prepare_ns = 0;
 };
 
-/// Orders the queue's slots as `order` says; kAuto asks the chooser. `rows` of the pool hold the
-/// rays.
+/// Sorts the queue's slots by `order`; for kAuto the chooser decides. `rows` holds the rays of the
+/// pool.
 template <typename F, typename Queue>
 RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth, RayOrder order,
                           Chooser& chooser, const float* rows, Queue& queue) {
@@ -99,7 +100,7 @@ RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth
   return choice;
 }
 
-/// Tells the chooser how long traversal took.
+/// Reports the traversal time to the chooser.
 inline void learn_order(Chooser& chooser, uint32_t depth, const RayOrderChoice& choice,
                         PhaseClock::Clock::time_point start) {
   if (!choice.chosen) return;

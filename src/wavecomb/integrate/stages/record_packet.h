@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A packet of records of the shading queue, and what became of it.
+/// Packet of records of the shading queue, and the outcome of shading it.
 #pragma once
 
 #include "wavecomb/integrate/shading_record.h"
@@ -8,12 +8,12 @@
 
 namespace wavecomb {
 
-/// Records from `i` on of the queue's order, before `end`.
+/// Records of the queue in shading order, from `i` to at most `end`.
 template <typename F>
 struct RecordPacket {
   using U = UInt<F>;
   Mask<F> active;
-  U arrival;  ///< where outcomes are noted
+  U arrival;  ///< index in arrival order, at which outcomes are stored
   ShadingRecord<F> record;
   U material;
 
@@ -27,7 +27,7 @@ struct RecordPacket {
                              : load<U>(queue.uints(Q::kMaterial) + i);
   }
 
-  /// Notes which paths go on along `next` and which have a shadow ray.
+  /// Stores which paths continue along `next` and which have a shadow ray along `shadow`.
   void note(const ShadingQueue& queue, const Mask<F>& alive, const Vec3<F>& next,
             const Mask<F>& has_shadow, const Vec3<F>& shadow) const {
     using Q = ShadingQueue;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 5: radiance of the slots into the film, a pixel's samples in sample order.
+/// Wave stage 5: adds the radiance of the slots to the film, the samples of a pixel in sample
+/// order.
 #pragma once
 
 #include <cmath>
@@ -11,14 +12,15 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Adds the rows of slots [first, end) to `sum`, word by word, in the order of the slots.
+/// Adds the rows of slots [first, end) to `sum`, word by word, in slot order.
 template <size_t N>
 inline void add_rows(const float* rows, size_t first, size_t end, double (&sum)[N]) {
   for (size_t s = first; s < end; ++s)
     for (size_t c = 0; c < N; ++c) sum[c] += double{rows[s * N + c]};
 }
 
-/// The same rows into the error sums of `pixel`, which does not have them yet.
+/// Adds the rows of slots [first, end) to the error sums of `pixel`, before they are added to the
+/// pixel.
 inline void add_errors(const float* rows, size_t first, size_t end, const Film::Pixel& pixel,
                        ErrorSums& errors) {
   double sum[3] = {pixel.r, pixel.g, pixel.b};

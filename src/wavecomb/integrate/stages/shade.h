@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 3c: shading, batch by batch, in lanes.
+/// Wave stage 3c: shades the queue batch by batch, in packets.
 #pragma once
 
 #include "wavecomb/integrate/media.h"
@@ -8,11 +8,11 @@
 
 namespace wavecomb {
 
-/// Records in one batch at most: their columns stay in the first-level cache, and time is taken per
-/// batch.
+/// Largest number of records in a batch. Their columns fit the first-level cache, and time is
+/// measured once per batch.
 inline constexpr size_t kMaxBatch = 256;
 
-/// End of the batch that starts at `begin`: a run of one program.
+/// Returns the end of the batch that starts at `begin`, a run of records of one program.
 template <typename F>
 size_t batch_end(const ShadingQueue& queue, size_t begin) {
   using U = UInt<F>;
@@ -29,12 +29,12 @@ size_t batch_end(const ShadingQueue& queue, size_t begin) {
   return limit;
 }
 
-/// Where the columns have record i of the order.
+/// Returns the index of record i of the shading order in the queue's columns.
 inline size_t place_of_record(const ShadingQueue& queue, size_t i) {
   return queue.ordered ? queue.sorted_indices[i] : i;
 }
 
-/// Charges a batch's time to the materials of its records.
+/// Charges the time of a batch to the materials of its records.
 inline void charge_batch(Wave& wave, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const double ns =
@@ -46,8 +46,7 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
-/// Spreads a batch's time over the paths of its records, or adds what the model says of them, for
-/// the cost AOV.
+/// Adds the time of a batch to the paths of its records, or their modelled costs, for the cost AOV.
 inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const ShadingQueue& queue = wave.shading;
@@ -61,7 +60,7 @@ inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, s
         slot(i), context.roulette_costs->material(material[place_of_record(queue, begin + i)]));
 }
 
-/// Whether scene and settings ask for nothing that plain kernels know nothing of.
+/// Returns whether plain kernels have all features that the scene and the settings use.
 inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) {
   const SceneView& scene = context.scene;
   return !context.joins_light() && !scene.has_motion && !scene.has_curves && !context.links() &&
@@ -69,7 +68,7 @@ inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) 
          !settings.schlick_fresnel;
 }
 
-/// The kernels, by variant.
+/// Returns the kernels, by variant.
 template <typename F, typename Media>
 const detail::BatchKernels<F>& kernels_for(const WaveContext& context,
                                            const ShadeSettings& settings) {
@@ -97,7 +96,8 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   }
 }
 
-/// Appends to a list of `n` rays those of the outcome `what`, of the records from `i` on.
+/// Appends to `list`, which has `n` rays, the rays with outcome `what` of the packet of records at
+/// `i`.
 template <typename F, typename List>
 WAVECOMB_INLINE void keep_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
                                ShadingQueue::Outcome what, uint32_t shift) {
@@ -109,7 +109,7 @@ WAVECOMB_INLINE void keep_rays(const ShadingQueue& queue, size_t i, List& list, 
   n += compress_store<U>(list.slot + n, slot, wanted);
 }
 
-/// Lists the shadow rays alone, in arrival order.
+/// Lists the shadow rays only, in arrival order.
 template <typename F>
 void compact_shadows(Wave& wave) {
   size_t shadows = 0;
@@ -119,7 +119,7 @@ void compact_shadows(Wave& wave) {
   wave.shadows.size = shadows;
 }
 
-/// Lists the paths that go on and the shadow rays, both in arrival order.
+/// Lists the rays of continuing paths and the shadow rays, both in arrival order.
 template <typename F>
 void compact(Wave& wave) {
   const ShadingQueue& queue = wave.shading;

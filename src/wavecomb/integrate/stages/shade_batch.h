@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 3c for one program: a batch of its records, in lanes.
+/// Wave stage 3c for one program: shades a batch of its records in packets.
 #pragma once
 
 #include "wavecomb/integrate/stages/record_packet.h"
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// The steps of a vertex: inlined into kernels of packets, a call of the reference's kernel in
-/// scalar lanes.
+/// Runs the steps of a vertex. Packet kernels inline them; scalar kernels call the function of the
+/// reference integrator.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v) {
   if constexpr (kIsScalar<F>)
@@ -18,8 +18,9 @@ WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v) {
     return take_steps<Bsdf, F>(v);
 }
 
-/// Shades records [begin, end) of the queue's order, all of variant `Bsdf`, W at a time. A path's
-/// next ray takes the place of its last in the pool; what became of it is noted by arrival.
+/// Shades records [begin, end) of the shading order, all of variant `Bsdf`, one packet at a time.
+/// The next ray of a path overwrites its last ray in the pool, and outcomes are stored in arrival
+/// order.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A batch of the records of one program, of paths from lights, in lanes.
+/// Shades a batch of light path vertices of one program, in packets.
 #pragma once
 
 #include "wavecomb/integrate/light_vertex.h"
@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// The steps of a vertex of a path from a light, as shade_one.
+/// Runs the steps of a light path vertex, inlined as in shade_one().
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeatures>& v,
                                                         const LightPathSetup& setup,
@@ -18,9 +18,9 @@ WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeature
     return take_light_steps<Bsdf, F>(v, setup, target);
 }
 
-/// Shades records [begin, end) of the queue's order, as shade_batch does those of camera paths, for
-/// what Wave::light_use says. The words of a shadow ray's row that say whose light it brings hold
-/// its place on the film.
+/// Shades records [begin, end) of the shading order for the purpose in Wave::light_use, as
+/// shade_batch() does for camera paths. The words `group` and `set` of the ShadowRow hold the film
+/// position (x, y) of the contribution.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                        uint32_t depth, size_t begin, size_t end) {

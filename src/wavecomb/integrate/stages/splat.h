@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 4 of paths from lights: what their unblocked vertices bring to the film.
+/// Wave stage 4 of light paths: adds the contributions of vertices that the camera sees to the
+/// film.
 #pragma once
 
 #include "wavecomb/integrate/aim_lessons.h"
@@ -8,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Adds light of a path's sample that arrives at (x, y) of the film to the sums of the pixels
-/// around. Integers: the order does not matter.
+/// Adds a contribution of sample `sample` at position (x, y) of the film, in pixels, to the sums of
+/// the surrounding pixels. The sums are integers, so that the order does not matter.
 inline void add_splat(const WaveContext& context, SplatList& list, uint32_t sample, float x,
                       float y, const Color<float>& c) {
   Film& film = *context.film;
@@ -20,12 +21,12 @@ inline void add_splat(const WaveContext& context, SplatList& list, uint32_t samp
   });
 }
 
-/// The number of the path in a slot of a wave.
+/// Returns the number of the light path in a slot of a wave.
 inline uint32_t light_path_in(const WaveContext& context, const WaveTask& task, uint32_t slot) {
   return light_path_number(*context.settings, task.pixels[slot / task.samples]);
 }
 
-/// Notes where the paths of a wave met something first, where they teach.
+/// Records the first hits of the light paths in a wave as training samples.
 inline void note_first_places(const Wave& wave, const WaveContext& context, const WaveTask& task) {
   const RayQueue& rays = wave.rays;
   for (size_t i = 0; i < rays.size; ++i) {
@@ -35,7 +36,7 @@ inline void note_first_places(const Wave& wave, const WaveContext& context, cons
   }
 }
 
-/// The task's paths are done.
+/// Reports the finished light paths of a task to the film.
 inline void count_light_paths(const WaveContext& context, const WaveTask& task) {
   if (context.lessons) return;
   for (uint32_t p = 0; p < task.pixel_count; ++p)
@@ -43,7 +44,8 @@ inline void count_light_paths(const WaveContext& context, const WaveTask& task) 
                                 task.first_sample, task.samples);
 }
 
-/// Asks which vertices the camera sees, and gives the film what they bring, or those who learn.
+/// Tests which vertices the camera sees. Adds their contributions to the film or, in training, to
+/// the training samples.
 template <typename F>
 void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_t depth) {
   const ShadowQueue& q = wave.shadows;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stage 2: what the rays hit. Stage 4: what the shadow rays meet.
+/// Wave stage 2 finds the closest hits of rays, and wave stage 4 tests shadow rays.
 #pragma once
 
 #include "wavecomb/integrate/media.h"
@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// Brings what the rows of the queue's slots begin with side by side, a column each.
+/// Copies the first fields of the queued slots' rows into columns.
 template <template <typename> class Head, template <typename> class Row, typename F, typename Queue,
           size_t C>
 void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
@@ -18,14 +18,14 @@ void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
   }
 }
 
-/// Brings the rays of the listed slots side by side.
+/// Copies the rays of the queued slots into columns.
 template <typename F>
 void fetch_rays(Wave& wave) {
   RayQueue& q = wave.rays;
   fetch<RayHead, PathRow, F>(q, wave.pool.paths, {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz});
 }
 
-/// Brings the shadow rays of the listed slots side by side.
+/// Copies the shadow rays of the queued slots into columns.
 template <typename F>
 void fetch_shadows(Wave& wave) {
   ShadowQueue& q = wave.shadows;
@@ -33,7 +33,8 @@ void fetch_shadows(Wave& wave) {
                                   {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
 }
 
-/// Times of the listed slots' paths side by side; null where the scene stands still.
+/// Copies the shutter times of the queued slots' paths into a column. Returns null if the scene has
+/// no motion.
 template <typename F, typename Queue>
 const float* fetch_times(Wave& wave, const Queue& q) {
   float* times = wave.times.floats(0);
@@ -46,8 +47,8 @@ const float* fetch_times(Wave& wave, const Queue& q) {
   return times;
 }
 
-/// Keys of presence for rays of `depth`; shadow rays draw other numbers than the rays themselves.
-/// `linked`: and stop at the geometry of their own set.
+/// Returns the presence keys of rays at `depth`. Shadow rays use different random numbers than path
+/// rays. With `linked`, each shadow ray hits only the geometry in its shadow set.
 inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow,
                                   bool linked = false) {
   const auto* path = reinterpret_cast<const PathRow<float>*>(pool.paths);
@@ -61,7 +62,8 @@ inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool sha
   return keys;
 }
 
-/// Closest hits of the ray queue into the hit buffer. `times`: of fetch_times.
+/// Traces the ray queue and stores the closest hits in the hit buffer. `times` is the result of
+/// fetch_times().
 inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar,
                   const float* times, bool coherent) {
   const RayQueue& q = wave.rays;
@@ -77,7 +79,7 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
-/// Asks which shadow rays are free. `linked`: of presence_keys.
+/// Tests the shadow rays for occlusion. `linked` is passed to presence_keys().
 template <typename F>
 void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool linked) {
   const ShadowQueue& q = wave.shadows;
@@ -93,8 +95,8 @@ void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool linked
   wave.counts.add_shadow_rays(depth, q.size);
 }
 
-/// Adds what the unblocked shadow rays bring to their slots, as much of it as comes through what
-/// lies on the way. A slot has at most one, so the order of the queue cannot matter.
+/// Adds the contributions of unblocked shadow rays to their slots, attenuated by volumes and media.
+/// A slot has at most one shadow ray, so the order of the queue does not matter.
 template <typename F, typename Media>
 void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
             [[maybe_unused]] const Media& media) {
@@ -122,7 +124,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
       }
     }
     if (wave.pool.shades) [[unlikely]] {
-      // Shadows of a colour: what is in the way leaves some of the light.
+      // Coloured shadows: a blocked ray keeps a fraction of the light.
       const Mask<F> blocked = first_lanes<F>(q.size - i) & not_(active);
       const Color<F> shade = load_row<RadianceRow, F>(wave.pool.shades, slot, blocked).sum;
       c = select<F>(blocked, c * shade, c);

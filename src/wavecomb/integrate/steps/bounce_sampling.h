@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// How bounces are sampled: by the BSDF's own lobes, or, with the setting cosine_sampling, all that
-/// are not deltas by cosine (the dissertation's way).
+/// Sampling of bounces: by the lobes of the BSDF or, with the setting cosine_sampling, by a cosine
+/// distribution for all but delta lobes (as in the dissertation that Wavecomb started from).
 ///
-/// A delta lobe keeps the probability q of its choice, so that the density of a bounce by cosine is
+/// A delta lobe keeps its selection probability q, so the density of a cosine bounce is
 ///   p(wi) = (1 - q) |cos theta_i| / pi
-/// on wo's side. It is for programs whose lobes stay there.
+/// on the side of wo. Only programs without transmission use it.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -14,13 +14,13 @@
 
 namespace wavecomb {
 
-/// Whether bounces of program `Bsdf` are sampled by cosine.
+/// Returns whether bounces of program `Bsdf` use cosine sampling.
 template <typename Bsdf, typename V>
 inline bool samples_by_cosine(const V& vertex) {
   return V::has(kExperiments) && vertex.settings.cosine_sampling && !Bsdf::kTransmits;
 }
 
-/// Density of a bounce by cosine.
+/// Returns the solid angle density of a cosine bounce along `wi`.
 template <typename Bsdf, typename F, typename View>
 inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const View& seen,
                            const Vec3<F>& wi) {
@@ -28,14 +28,14 @@ inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const View& seen
   return select(F(wo.z * wi.z) > 0.f, F(rest * cosine_hemisphere_pdf(abs(wi.z))), F(0.f));
 }
 
-/// Density with which a bounce would have gone along wi, where the BSDF is `e`.
+/// Returns the density of bounces along `wi`, where `e` is the evaluated BSDF.
 template <typename Bsdf, typename F, typename V, typename View>
 WAVECOMB_INLINE F bounce_pdf(const V& v, const Bsdf& bsdf, const Vec3<F>& wo, const View& seen,
                              const Vec3<F>& wi, const BsdfEval<F>& e) {
   return samples_by_cosine<Bsdf>(v) ? cosine_bounce_pdf(bsdf, wo, seen, wi) : e.pdf;
 }
 
-/// A bounce, by the numbers of `r`.
+/// Samples a bounce with the sample values `r`.
 template <typename Bsdf, typename F, typename V, typename View>
 WAVECOMB_INLINE BsdfSample<F> sample_bounce(const V& vertex, const Bsdf& bsdf, const Vec3<F>& wo,
                                             const View& seen, const Sample4<F>& r) {

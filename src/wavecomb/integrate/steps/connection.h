@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Connections of a vertex with a light or with another vertex: origin, direction, distance and
+/// Connections from a vertex to a light or to another vertex: origin, direction, distance and
 /// density.
 ///
-/// A ray that leaves the surface at p starts at one of two origins, of which its side decides:
+/// A ray that leaves the surface at p starts at one of two origins, depending on its side:
 ///   o+ = p + terminator + offset n  outside,   o- = p - offset n  inside   (surface/surface.h).
 /// Bounces therefore estimate two integrals over solid angle, one about each origin,
-///   sum over s of  int_{s} f(wo, wi) |cos theta_i| L(o_s, wi) dwi,
-/// and emission that a bounce meets is weighted with the density of a light sample as seen from o_s
+///   sum over s of  int_{s} f(wo, wi) |cos theta_i| L(o_s, wi) dwi.
+/// Emission that a bounce hits is weighted with the density of a light sample as seen from o_s
 /// (PathState::o). Light sampling estimates the same two integrals: a sample belongs to the side s
-/// that it lies on as seen from o_s. Direction, distance, density and shadow ray are those of o_s,
-/// so that densities of both techniques are of the same measure and their weights add up to 1.
+/// on which it lies as seen from o_s. Its direction, distance, density and shadow ray start at o_s,
+/// so that the densities of both techniques have the same measure and their weights add up to 1.
 ///
-/// Where p is not lifted the two origins differ by the rounding of p alone. One sample, from the
-/// viewer's side, then serves both, and only the length of its shadow ray depends on its side.
-/// Where p is lifted, the same random numbers are used from both origins. Both samples may lie on
-/// their sides; then one of them, chosen evenly, counts twice.
+/// If p has no terminator offset, the two origins differ only by rounding. One sample, taken from
+/// the viewer's side, then serves both sides, and only the length of its shadow ray depends on the
+/// side. If p has a terminator offset, the same random numbers are used from both origins. If both
+/// samples lie on their own sides, one of them is chosen with probability 1/2 and counts twice.
 ///
-/// A vertex of a light path at p' arrives at p, not at o_s. It uses the connection from o_s to p',
-/// as a camera path's bounce does which meets p': light paths start at p', without its terminator.
+/// A vertex of a light path at p' arrives at p instead of o_s. It uses the connection from o_s to
+/// p', like a bounce of a camera path that hits p': light paths start at p' without its terminator
+/// offset.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -26,15 +27,15 @@
 
 namespace wavecomb {
 
-/// A ray from the surface of a vertex to a point.
+/// Ray from the surface of a vertex to a point.
 template <typename F>
 struct Connection {
   Vec3<F> o, d;
   F distance2;
-  Mask<F> valid;  ///< the point lies on the same side of the surface as seen from `o`
+  Mask<F> valid;  ///< whether the point lies on the same side of the surface as seen from `o`
 };
 
-/// The connection of the vertex `at` with the point `to`.
+/// Returns the connection from the vertex `at` to the point `to`.
 template <typename F, typename Interaction>
 WAVECOMB_INLINE Connection<F> connect_to_point(const Interaction& at, const Vec3<F>& to) {
   const Vec3<F> from_surface = to - at.s.p;
@@ -49,15 +50,15 @@ WAVECOMB_INLINE Connection<F> connect_to_point(const Interaction& at, const Vec3
   return c;
 }
 
-/// A light sample and the origin of its shadow ray, from which its direction, distance and density
-/// are seen.
+/// Light sample and the origin of its shadow ray. Direction, distance and density are relative to
+/// that origin.
 template <typename F>
 struct LightConnection {
   LightSample<F> light;
   Vec3<F> origin;
 };
 
-/// A random number of a vertex that the sampler does not give.
+/// Returns a random number of a vertex that is independent of the sampler.
 template <typename F>
 inline F candidate_number(const SampleKey<F>& key, uint32_t depth) {
   using U = UInt<F>;
@@ -83,8 +84,8 @@ inline LightSample<F> select_light(const Mask<F>& m, const LightSample<F>& a,
 
 }  // namespace detail
 
-/// Chooses a light and a point of it by the numbers `r`. `receiver.p` is the origin of rays towards
-/// the viewer.
+/// Samples a light and a point on it with the sample values `r`. `receiver.p` is the ray origin on
+/// the viewer's side.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE LightConnection<F> connect_to_light(const Vertex<F, kFeatures>& v,
                                                     const Interaction& at,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The step `emit`: light that a path meets by itself.
+/// The step `emit`: emission that a path hits.
 ///
-/// With throughput T_k at x_k, where emission Le is met by a bounce of density p_bsdf (0: a mirror
-/// or the camera), which light sampling would have found with p_light:
+/// With throughput T_k at x_k, a bounce with density p_bsdf (0 for a mirror or the camera) that
+/// hits emission Le adds its contribution, weighted against light sampling with density p_light:
 ///   L += T_k Le(x_k) w,   w = p_bsdf / (p_bsdf + p_light)   (balance heuristic, Veach 1997, 9.2)
 #pragma once
 
@@ -12,14 +12,16 @@
 
 namespace wavecomb {
 
-/// Balance heuristic for the technique with density `a` against `b`; 1 where a was a delta (a = 0).
+/// Returns the balance heuristic weight of a bounce against a light sample; 1 for a delta bounce
+/// (bsdf_pdf = 0).
 template <typename F>
 inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
   return select(bsdf_pdf > 0.f,
                 F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
-/// What a path gets of surfaces that glow with `glow`, before MIS, where there are mesh lights.
+/// Returns the radiance of emissive surfaces before MIS in scenes with mesh lights. `glow` is the
+/// emission of their materials.
 template <typename F>
 [[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
                                                const UInt<F>& geom, const Color<F>& glow,
@@ -33,9 +35,10 @@ template <typename F>
                                 not_(path.pdf > 0.f), from_camera, path.diffuse, active);
 }
 
-/// Emission of textures and graphs at their finest level, as light samples and light paths read it,
-/// in `lanes`; in others `filtered`. Filtered values have another mean wherever emission is cut
-/// off, by an edge of the mesh or by the weights of multiple importance sampling.
+/// Returns the emission of textures and graphs at their finest level in `lanes`, as light samples
+/// and light paths use it, and `filtered` in other lanes. Filtered emission has a different mean
+/// wherever emission is cut off, by an edge of the mesh or by the weights of multiple importance
+/// sampling.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> finest_emission(const SceneView& scene, const MeshHit<F>& hit,
                                                       const Surface<F>& s, const Vec3<F>& dir,
@@ -50,7 +53,7 @@ template <typename F>
                    filtered);
 }
 
-/// Radiance of a light's own shape met by a path.
+/// Returns the contribution of a light's own shape that a path hits, including its MIS weight.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
                                uint32_t depth, const UInt<F>& light, const F& t,
@@ -69,7 +72,7 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
   return clean<F>(path.throughput * hit.radiance * w, clamp_limit(settings, depth));
 }
 
-/// What a path gets of the surface at a vertex that glows itself. Notes the emitter for AOVs.
+/// Returns the contribution of the emissive surface at a vertex. Records the emitter for AOVs.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
                               const SurfaceInteraction<Bsdf, F>& at) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light that a path meets where it leaves the scene.
+/// Light of the environment that a path receives when it leaves the scene.
 #pragma once
 
 #include "wavecomb/integrate/light_groups.h"
@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Radiance of the environment met by a path that left the scene.
+/// Returns the contribution of the environment to a path that leaves the scene.
 template <typename F>
 inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings& settings,
                                      uint32_t depth, const PathState<F>& path,

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Bounces by a mixture of BSDF and field (learn/guide.h):
+/// Bounces sampled from a mixture of BSDF and guiding distribution (learn/guide.h):
 ///
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi) [wi is on the side of wo]
 ///
-/// p_bsdf is the density of the technique that the field is mixed with: of the BSDF's lobes, or of
-/// the cosine, where bounces are sampled by cosine (bounce_sampling.h).
-/// The field says nothing of the far side of a surface, so what is transmitted is the BSDF's alone;
-/// a delta lobe is chosen with a times its own probability. Both halves of MIS see p.
+/// where a is GuidePlace::bsdf_share, and p_bsdf is the density of unguided bounces: by the lobes
+/// of the BSDF, or by the cosine with cosine sampling (bounce_sampling.h). The guiding distribution
+/// covers only the viewer's side of a surface, so only the BSDF samples transmission. A delta lobe
+/// is selected with a times its own probability. MIS uses p for bounces and for light samples.
 #pragma once
 
 #include "wavecomb/integrate/steps/bounce_sampling.h"
@@ -15,11 +15,11 @@
 
 namespace wavecomb {
 
-/// Whether vertices of program `Bsdf` may be guided.
+/// Whether bounces of program `Bsdf` can be guided.
 template <typename Bsdf>
 inline constexpr bool kGuided = Bsdf::kHasNonDelta && Bsdf::kOnSurface;
 
-/// Where a vertex is in the field.
+/// Looks up the guiding distribution at a vertex.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE GuidePlace<F> guide_place(const Vertex<F, kFeatures>& v, const Interaction& at,
                                           const Frame<F>& frame, const Vec3<F>& wo) {
@@ -35,8 +35,8 @@ WAVECOMB_INLINE GuidePlace<F> guide_place(const Vertex<F, kFeatures>& v, const I
   return {};
 }
 
-/// Density of a bounce along `world` (`wi`, where z is along the normal), which the BSDF has with
-/// `p_bsdf`.
+/// Returns the density of the mixture for a bounce along `world` (`wi` in the frame whose z axis is
+/// the normal), which the BSDF samples with density `p_bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
                             const Vec3<F>& world, const Vec3<F>& wi, const Vec3<F>& wo,
@@ -52,8 +52,9 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidePlace<F>& 
   return p_bsdf;
 }
 
-/// Makes of `b`, a bounce by the BSDF, one by the mixture; r.w says who samples. What roughness
-/// the ray cone sees is the sampled lobe's in either case. Notes for who learns.
+/// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects the
+/// technique. The ray cone always uses the roughness of the sampled BSDF lobe. Writes the training
+/// data of the bounce to `out`.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interaction& at,
                                   const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
@@ -68,7 +69,7 @@ WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interacti
     if (none(guided)) return;
     const F& a = place.bsdf_share;
     const Mask<F> by_guide = guided & (r.w >= a);
-    // f |cos|, and the density without the field.
+    // f |cos|, and the density without guiding.
     Color<F> f_cos = b.weight * b.pdf;
     F p_bsdf = b.pdf;
     if (any(by_guide)) {
@@ -83,7 +84,7 @@ WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interacti
       b.eta = select(by_guide, F(1.f), b.eta);
     }
     const F mixed = mixed_pdf<Bsdf, F>(v, place, frame.to_world(b.wi), b.wi, wo, p_bsdf);
-    // A delta lobe's pdf is the probability of its choice.
+    // The pdf of a delta lobe is its selection probability.
     const F pdf = select(b.is_delta, F(a * p_bsdf), mixed);
     b.weight = select<F>(guided, f_cos * F(1.f / select(pdf > 0.f, pdf, F(1.f))), b.weight);
     out.bsdf_pdf = p_bsdf;

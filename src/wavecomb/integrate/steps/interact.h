@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The step `interact`: from what a path has met to a place with a BSDF, and the frame that it is
-/// seen in.
+/// The step `interact`: turns a hit into a shading point with a BSDF and a shading frame.
 ///
-/// Where the way to x_k leads through what absorbs, with extinction sigma over the length t of the
-/// ray, T_k <- T_k exp(-sigma t) (Beer and Lambert). Where paths know what they are inside of
-/// (medium/interiors.h) that is done by now, and the surface bends by the quotient of the indices
-/// on its two sides.
+/// If the ray to x_k, of length t, passes through an absorbing material with extinction sigma, then
+/// T_k <- T_k exp(-sigma t) (Beer and Lambert). With nested dielectrics (medium/interiors.h),
+/// absorption was applied earlier, and the surface refracts by the ratio of the indices of
+/// refraction on its two sides.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -19,35 +18,34 @@
 
 namespace wavecomb {
 
-/// Slots that a vertex of program `Bsdf` reads: those of its BSDF, and emission.
+/// Material inputs that a vertex of program `Bsdf` reads: those of its BSDF, and emission.
 template <typename Bsdf>
 inline constexpr uint32_t kVertexInputs =
     Bsdf::kInputs | (Bsdf::kEmits ? input_bit(Input::kEmission) : 0u);
 
-/// Where a path has met a surface. Texture coordinates are worked out only where a texture or an
-/// AOV asks for them.
+/// Hit point of a path. Computes texture coordinates only if a texture or an AOV needs them.
 template <typename Bsdf, typename F>
 struct SurfacePlace {
   UInt<F> textured_inputs;  ///< MaterialRecord::textured_inputs
-  Mask<F> reads_texture;    ///< lanes that need uv and a frame along it
-  bool textured;            ///< whether any does
+  Mask<F> reads_texture;    ///< lanes that need uv and a tangent along u
+  bool textured;            ///< whether any lane does
   Surface<F> s;
 
   template <uint32_t kFeatures>
   explicit SurfacePlace(const Vertex<F, kFeatures>& v);
 };
 
-/// What it is made of.
+/// Material lookup at a hit point.
 template <typename Bsdf, typename F>
 struct SurfaceLook {
   Bsdf bsdf;
-  Color<F> throughput;  ///< of the path, up to the surface
-  Color<F> emission;    ///< where the program emits
-  Vec3<F> normal;       ///< in tangent space, where the program reads textures
+  Color<F> throughput;  ///< throughput on arrival at the surface
+  Color<F> emission;    ///< if the program emits
+  Vec3<F> normal;       ///< in tangent space, if the program reads textures
 };
 
-/// A surface as a path has met it. Steps after this one know of it `bsdf`, `throughput` and the
-/// functions, which whatever else a path meets has, too; `emit` alone is for surfaces.
+/// Shading point on a surface. Later steps use only `bsdf`, `throughput` and the member functions,
+/// which volume events also provide. The step `emit` is for surfaces only.
 template <typename Bsdf, typename F>
 struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   using SurfacePlace<Bsdf, F>::s;
@@ -56,43 +54,44 @@ struct SurfaceInteraction : SurfacePlace<Bsdf, F>, SurfaceLook<Bsdf, F> {
   template <uint32_t kFeatures>
   explicit SurfaceInteraction(const Vertex<F, kFeatures>& v);
 
-  /// What the BSDF's directions are local to: z is the shading normal.
+  /// Returns the frame of the BSDF's local directions, in which z is the shading normal.
   template <uint32_t kFeatures>
   Frame<F> frame(const Vertex<F, kFeatures>& v) const;
-  /// The same as paths from the lights have it, which do not know yet who looks: with the normal
-  /// that nobody's look has bent.
+  /// Returns the shading frame for light subpaths, whose viewing direction is unknown: uses the
+  /// normal without the view-dependent adjustment.
   template <uint32_t kFeatures>
   Frame<F> unbent_frame(const Vertex<F, kFeatures>& v) const;
-  /// Lanes where the normal is bent towards who looks along `dir`. What is seen there is the
-  /// camera's paths' to find.
+  /// Returns the lanes whose shading normal is adjusted to the viewing direction `dir`. Only camera
+  /// paths find light there.
   template <uint32_t kFeatures>
   Mask<F> bends(const Vertex<F, kFeatures>& v, const Frame<F>& unbent, const Vec3<F>& dir) const;
-  /// Notes for AOVs what is seen here, where they are wanted.
+  /// Records albedo, normal and texture coordinates for AOVs that need them.
   template <uint32_t kFeatures>
   void note(const Vertex<F, kFeatures>& v, const Frame<F>& frame) const;
-  /// The class that linking knows it by.
+  /// Returns the link class of the surface.
   template <uint32_t kFeatures>
   UInt<F> link_class(const Vertex<F, kFeatures>& v) const;
-  /// Where a ray starts that leaves along `dir`.
+  /// Returns the origin of a ray that leaves along `dir`.
   Vec3<F> origin(const Vec3<F>& dir) const;
-  /// Where a ray of a light path starts that leaves along `dir` (steps/connection.h).
+  /// Returns the origin of a light path's ray that leaves along `dir` (steps/connection.h).
   Vec3<F> light_path_origin(const Vec3<F>& dir) const;
-  /// Whether a direction is on the side of the surface that the BSDF thinks it is on; or light
-  /// leaks.
+  /// Returns whether a direction is on the same side of the geometric normal as of the shading
+  /// normal. Other directions would leak light.
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
 
  private:
-  /// Lanes whose normal is of a map.
+  /// Returns the lanes with a normal map.
   template <uint32_t kFeatures>
   Mask<F> mapped(const Vertex<F, kFeatures>& v) const;
-  /// The normal of the map, about the normal `n`.
+  /// Returns the mapped normal, given the shading normal `n`.
   Vec3<F> bumped(const Vec3<F>& n, const Vec3<F>& tangent) const;
   Vec3<F> tangent() const { return select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f))); }
 };
 
-/// How textures are seen whose footprint is `width` wide: whole by the camera, where a texel alone
-/// would be noise in the picture, and by one texel after a bounce, where the path is noisier than
-/// the texture.
+/// Returns the footprint of a texture lookup `width` wide. Camera rays, and all rays with
+/// filters_textures_whole, filter the whole footprint, since single texels would be noise in the
+/// image. Other lookups after a bounce read one random texel, since the path is noisier than the
+/// texture.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
   using U = UInt<F>;
@@ -110,7 +109,8 @@ WAVECOMB_INLINE UInt<F> textured_inputs_of(const Vertex<F, kFeatures>& v) {
                           v.active);
 }
 
-/// What is made of parameters is made here, so that kernels keep none that they do not read.
+/// Looks up the material and constructs the BSDF in one function, so that kernels keep no
+/// parameters that they do not read.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, const Surface<F>& s,
                                              bool textured) {
@@ -121,7 +121,7 @@ WAVECOMB_INLINE SurfaceLook<Bsdf, F> look_at(const Vertex<F, kFeatures>& v, cons
     footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(cos_seen)));
   }
   const auto make_point = [&](const Mask<F>& lanes) {
-    // Copies, as everything is that only graphs are given.
+    // Copies, so that the originals can stay in registers. Only value graphs use them.
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;
@@ -166,7 +166,7 @@ WAVECOMB_INLINE SurfaceInteraction<Bsdf, F>::SurfaceInteraction(const Vertex<F, 
     : SurfacePlace<Bsdf, F>(v),
       SurfaceLook<Bsdf, F>(detail::look_at<Bsdf, F>(v, s, this->textured)) {}
 
-/// What program `Bsdf` has met.
+/// Returns the shading point or volume event of program `Bsdf`.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE auto interact(const Vertex<F, kFeatures>& v) {
   if constexpr (Bsdf::kOnSurface)
@@ -188,8 +188,8 @@ WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::bumped(const Vec3<F>& n,
   return normalize(make_frame<F>(n, tangent, s.handedness).to_world(this->normal));
 }
 
-/// The shading frame, along the texture where a lane reads one: a lane's frame depends on nothing
-/// but its own hit, whatever its neighbours are.
+/// Aligns the frame to the texture in lanes that read one. The frame of a lane depends only on its
+/// own hit, not on the other lanes.
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {

@@ -1,30 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-/// What camera paths carry where paths from the lights share in their weights
-/// (docs/light-paths.md).
+/// Ratio R that camera paths carry when light paths share their MIS weights (docs/light-paths.md).
 ///
-/// A path x_0 (lens) x_1 .. x_n x_L (light) can come of the camera's bounces, of its light sample
-/// at x_n, or of a path from the light that ends at x_1. With w_i the direction from x_i to the
-/// camera and l_i that to the light, g the geometric normal, p->_i the density of the bounce w_i ->
-/// l_i and p<-_i that of l_i -> w_i, all over solid angle, the third is as dense, over the first,
-/// as
+/// Three techniques sample a path x_0 (lens) x_1 .. x_n x_L (light): the bounces of a camera path,
+/// the light sample at x_n, and a light path that is connected to the camera at x_1. Let w_i be the
+/// direction from x_i towards the camera and l_i towards the light, g the geometric normal, p->_i
+/// the density of the bounce w_i -> l_i and p<-_i the density of l_i -> w_i, all over solid angle.
+/// The density of the third technique divided by that of the first is
 ///   R = N / G  prod_{i=1..n} |g l_i| / (|g w_i| p->_i)  prod_{i=2..n} p<-_i   times  D,
-/// G the camera's density (camera_connection.h), N how many paths start at lights for each of a
-/// pixel's, and D the light's (light/emission.h). R is one number, of which each vertex multiplies
-/// in its own. At a delta lobe the ratio of densities is that of the solid angles,
+/// where G is the density of camera paths (camera_connection.h), N the number of light paths in the
+/// image for each sample of a pixel, and D the density of the light (light/emission.h). Each vertex
+/// multiplies its factors into R. At a delta lobe the ratio of densities is the ratio of the solid
+/// angles,
 ///   p<- / p-> = |w z| / (|l z| eta^2),   z the shading normal, eta that of w -> l.
-/// R is 0 where paths from lights do not go: x_1 a mirror, a normal that is bent towards who looks,
-/// a fibre.
+/// R is 0 if light paths cannot make the connection: x_1 is specular, its shading normal is
+/// adjusted to the viewer, or it lies on a fibre.
 ///
-/// Where vertices are connected, R is the sum over that technique and the connections of x_i to
-/// x_i+1, of which each has, beside what it shares with R,
-///   E_i = d^2 / p->_i   (d their distance)   in place of   p<-_i+1  and all that R has before:
+/// With connections between vertices, R is the sum over the third technique and all connections of
+/// x_i to x_i+1. Such a connection has
+///   E_i = d^2 / p->_i   (d is the distance)
+/// in place of p<-_i+1 and of all earlier factors of R:
 ///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
-/// E is 0 where either of the two scatters as a delta, where x_i+1 is none that paths from lights
-/// go to, and where it is looked at out of what absorbs.
+/// E is 0 if one of the two vertices scatters as a delta, if light paths cannot reach x_i+1, or if
+/// the viewer is inside an absorbing material.
 ///
-/// Where vertices are merged, paths whose bounces were all deltas have another third technique: one
-/// that ends within r of x_k, the first vertex behind them that scatters otherwise, too. It begins
-/// with pi r^2 in place of 1 / (G |g w_k|). The bounce at x_k, if a delta, ends it.
+/// With merging, camera paths whose bounces were all deltas have a different third technique: a
+/// light path that ends within r of x_k, the first vertex with a non-delta lobe. Its R starts with
+/// pi r^2 in place of 1 / (G |g w_k|). A delta bounce at x_k sets R to 0.
 #pragma once
 
 #include "wavecomb/integrate/steps/connection.h"
@@ -35,7 +36,7 @@ namespace wavecomb {
 
 inline constexpr float kMostRatio = 1e30f;
 
-/// Whether light goes through delta lobes of program `Bsdf` alike in both directions.
+/// Returns the lanes whose delta transmission is not symmetric, as in layered materials.
 template <typename Bsdf, typename F>
 inline Mask<F> passes_one_way(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
   if constexpr (requires { bsdf.is_layered(); })
@@ -44,18 +45,19 @@ inline Mask<F> passes_one_way(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>
     return Mask<F>(false);
 }
 
-/// A vertex of a camera path: R up to the bounce before, 0 where paths from lights do not go.
+/// R at a vertex of a camera path. `ratio` is R up to the previous bounce, or 0 if light paths
+/// cannot reach the vertex.
 template <typename F>
 struct JointVertex {
   F ratio;
   F inverse_cos;   ///< 1 / |g w|
-  F linked;        ///< E of the vertex before and this one
-  Mask<F> merges;  ///< lanes where paths from lights may end (visible_point.h)
-  F radius2;       ///< within this distance, squared
+  F linked;        ///< E of the connection between the previous vertex and this one
+  Mask<F> merges;  ///< lanes where light paths may be merged (visible_point.h)
+  F radius2;       ///< squared merge radius
 
-  /// R with this vertex for a direction `world` to the light, `local` in the frame, which light
-  /// samples or bounces take with density 1: p<- |g l| / |g w|. Lanes outside of `wanted` hold
-  /// anything.
+  /// Returns R including this vertex for a direction `world` to the light (`local` in the frame),
+  /// as if light samples or bounces had density 1 there: R p<- |g l| / |g w|. Lanes outside
+  /// `wanted` are undefined.
   template <typename Bsdf, uint32_t kFeatures, typename Interaction>
   WAVECOMB_INLINE F towards(const Vertex<F, kFeatures>& v, const Interaction& at, const Vec3<F>& wo,
                             const Vec3<F>& world, const Vec3<F>& local,
@@ -89,7 +91,8 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
     if (Bsdf::kAbsorbs) links = links & (seen < 0.f);
     linked = select(links, F(F(v.t * v.t) / select(links, v.path.pdf, F(1.f))), F(0.f));
   }
-  // Who looks out of what absorbs: paths from lights do not know how far it is.
+  // For a viewer inside an absorbing material, light paths do not know the length of the absorbing
+  // segment.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
   JointVertex<F> joint{select(reached, v.path.joined(), F(0.f)),
                        F(1.f / select(seen != 0.f, abs(seen), F(1.f))), min(linked, F(kMostRatio)),
@@ -109,7 +112,7 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
   return joint;
 }
 
-/// Leaves a point where paths from lights may end.
+/// Stores the vertex as a point where light paths may be merged.
 template <typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interaction& at,
                                  const JointVertex<F>& joint) {
@@ -122,9 +125,10 @@ WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interactio
                     UInt<F>(v.depth)};
 }
 
-/// What the vertex offers to one of a path from a light: with w its direction there, all that
+/// Computes the connection that the vertex offers to a vertex of a light path. With w the direction
+/// to that vertex, the offer has the factors on the camera's side of the contribution
 ///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
-/// and its weight v (light_vertex.h) have of this side. Nothing is drawn.
+/// and of its weight v (light_vertex.h). Uses no random numbers.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Interaction& at,
                                       const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
@@ -144,7 +148,7 @@ WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Inter
     offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, wo, wi);
 }
 
-/// R after the bounce `b`, along `world`.
+/// Returns R after the bounce `b` along `world`.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& at,
                              const JointVertex<F>& joint, const Vec3<F>& wo, const Vec3<F>& world,

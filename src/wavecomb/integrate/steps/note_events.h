@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Notes for light path expressions how a vertex scatters. Run only where they are asked for.
+/// Classification of scatterings for light path expressions. Runs only if the render has
+/// expressions.
 ///
-/// A BSDF is a sum of lobes, of which a direction says nothing. What a scattering counts as is
-/// therefore split by colour: the share f_diffuse / f is diffuse, the rest glossy.
+/// A BSDF is a sum of lobes, and a direction does not say which lobe scattered the light. A
+/// scattering is therefore split by colour: the fraction f_diffuse / f counts as diffuse, the rest
+/// as glossy.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -14,8 +16,8 @@ namespace wavecomb {
 
 namespace detail {
 
-/// What scattering between `wo` and `wi` is, of whose diffuse and other parts the light shows
-/// `diffuse` and `specular`.
+/// Classifies the scattering between `wo` and `wi`. The light's contribution to the diffuse and the
+/// other lobes is scaled by `diffuse` and `specular`.
 template <typename Bsdf, typename F>
 inline ScatteringNote<F> note_scattering(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi,
                                          const F& diffuse, const F& specular) {
@@ -38,17 +40,17 @@ inline ScatteringNote<F> note_scattering(const Bsdf& bsdf, const Vec3<F>& wo, co
 
 }  // namespace detail
 
-/// What a vertex of a path from a light does with light from `l` that goes to `w`, or one of a
-/// camera path with light that a connection brings, from `l` to `w`: every lobe shows it whole.
+/// Classifies the scattering from `l` to `w` at a vertex of a light path, or of a connection at a
+/// vertex of a camera path. All lobes count fully, since such lights have no multipliers.
 template <typename Bsdf, typename F>
 [[gnu::noinline, gnu::cold]] ScatteringNote<F> note_event(const Bsdf bsdf, const Vec3<F> w,
                                                           const Vec3<F> l) {
   return detail::note_scattering<Bsdf, F>(bsdf, w, l, F(1.f), F(1.f));
 }
 
-/// Notes in `aovs` what the light sample, along `to_light`, and the bounce, along `next`, scatter
-/// at a place of `bsdf` that is seen from `wo`. Everything by value, so that shading need not keep
-/// in memory what it keeps in registers.
+/// Records in `aovs` how the light sample along `to_light` and the bounce along `next` scatter at a
+/// point with `bsdf` that is viewed from `wo`. The arguments are passed by value, so that shading
+/// can keep them in registers.
 template <typename Bsdf, typename F>
 [[gnu::noinline, gnu::cold]] void note_events(const LightView& lights, const Bsdf bsdf,
                                               const Frame<F> frame, const Vec3<F> wo,

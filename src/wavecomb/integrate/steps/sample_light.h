@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The step `sample_light`: next event estimation, one shadow ray a vertex.
+/// The step `sample_light`: next event estimation with one shadow ray for each vertex.
 ///
-/// A light, and a point of it in direction wi, chosen with density p_light over solid angle:
+/// A light and a point on it in direction wi are sampled with density p_light over solid angle:
 ///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bounce + p_light)
-/// (balance heuristic, Veach 1997, 9.2; w = 1 for deltas, which no bounce finds). V is the shadow
-/// ray's to find.
+/// (balance heuristic, Veach 1997, 9.2; w = 1 for delta lights, which no bounce hits). The shadow
+/// ray determines the visibility V.
 #pragma once
 
 #include <cmath>
@@ -19,7 +19,7 @@
 
 namespace wavecomb {
 
-/// Who light is chosen for; its place is set where light is sampled.
+/// Returns the receiver for light sampling. Its position is set when a light is sampled.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
                                                 const Frame<F>& frame, const Vec3<F>& wo) {
@@ -27,7 +27,7 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
   if (v.has(kMotion) && v.scene.lights.motions) [[unlikely]]
     receiver.time = v.hit.time;
   if (v.scene.lights.by_tree) {
-    // What reflects alone is lit on the side that it is seen from.
+    // A surface without transmission receives light only on the viewer's side.
     if (!Bsdf::kTransmits)
       receiver.normal = pack_normal<F>(select<F>(wo.z < 0.f, -frame.n, frame.n));
     receiver.seed =
@@ -36,9 +36,11 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
   return receiver;
 }
 
-/// Weight of the light sample `l` of `light` beside bounces, of density `p_bounce`, and paths from
-/// the light (join.h): with R up to this vertex and p_light in place of p_bounce,
-///   w = 1 / (1 + p_bounce / p_light + R D / p_light);   a point has p_light d^2 in the last.
+/// Returns the MIS weight of the light sample `l` of `light` against bounces with density
+/// `p_bounce` and light paths (join.h). If R includes this vertex with p_light in place of
+/// p_bounce,
+///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
+/// for a point light the last term has p_light d^2 in place of p_light.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE F joint_light_weight(const Vertex<F, kFeatures>& v, const Interaction& at,
                                      const JointVertex<F>& joint, const Vec3<F>& wo,
@@ -57,21 +59,21 @@ WAVECOMB_INLINE F joint_light_weight(const Vertex<F, kFeatures>& v, const Intera
 
 namespace detail {
 
-/// A point of a light that a vertex may ask for.
+/// Light sample that a vertex may use.
 template <typename F>
 struct LightCandidate {
   Vec3<F> origin;  ///< of the shadow ray
   Vec3<F> wi;
   F distance;
-  Color<F> c;     ///< what it brings if it is seen, over its density
-  F w;            ///< its MIS weight, which is in c
-  Mask<F> valid;  ///< it may bring something; else c is anything
+  Color<F> c;     ///< contribution if the light is visible, divided by the density
+  F w;            ///< MIS weight, included in c
+  Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
   UInt<F> light;
-  UInt<F> shadow_set;    ///< of linked lights
-  ShadowReach<F> reach;  ///< of lights with effects
+  UInt<F> shadow_set;    ///< for linked lights
+  ShadowReach<F> reach;  ///< for lights with shadow attributes
 };
 
-/// The point that the numbers `r` choose.
+/// Returns the light sample for the sample values `r`.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE LightCandidate<F> light_candidate(
     const Vertex<F, kFeatures>& v, const Interaction& at, const Frame<F>& frame, const Vec3<F>& wo,
@@ -108,24 +110,26 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
     set = shadow_set<F>(lights, light, lit);
   }
   Mask<F> valid = lit & l.valid & at.is_consistent(l.wi, wi);
-  // What enters a subsurface body there is the random walk's to find (medium/walk.h).
+  // The random walk finds light that enters a subsurface body (medium/walk.h).
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks)
     valid = valid & not_(at.bsdf.enters(wo, wi));
   return {c.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
           light,    set,  reach};
 }
 
-/// How many points of lights a vertex on a fibre looks at.
+/// Number of light samples that a vertex on a fibre evaluates.
 inline constexpr uint32_t kFibreCandidates = 3;
 
-/// One of several points, x_i, chosen by the brightness g of what each brings if it is seen, c_i:
+/// Selects one of several light samples x_i with a probability proportional to the luminance g_i of
+/// its unoccluded contribution c_i:
 ///   c = c_k sum_i g_i / (n g_k),   k with probability g_k / sum_i g_i
 /// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for
-/// Global Illumination", 2005). Its mean is that of one point for any densities and weights in c,
-/// so MIS keeps those of one. Where rays are dear, as among strands, a shadow ray to the lamp that
-/// counts is worth three evaluations (docs/decisions/light-candidates.md). `first` is of the
-/// numbers `r`; the others' are r moved: over all lights evenly, and on them by the lattice of R2
-/// (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+/// Global Illumination", 2005). The mean is that of a single light sample for any densities and
+/// weights in c, so the MIS weights stay those of a single sample. Where rays are expensive, as
+/// among strands, a shadow ray to an important light justifies three evaluations
+/// (docs/decisions/light-candidates.md). `first` belongs to the sample values `r`. The others use
+/// shifted values: evenly over all lights, and on each light by the R2 lattice (M. Roberts, "The
+/// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
 template <typename F, typename Candidate>
 WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
                                            const Candidate& candidate) {
@@ -146,7 +150,7 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
         Sample4<F>{moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
     const F h = brightness(other);
     sum += h;
-    // One number does for all: what is left of it is as even.
+    // One random number serves all selections: after rescaling it is uniform again.
     const F q = select(h > 0.f, F(h / select(h > 0.f, sum, F(1.f))), F(0.f));
     const Mask<F> takes = u < q;
     u = select(takes, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));
@@ -168,8 +172,7 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
 
 }  // namespace detail
 
-/// Chooses a point of a light and the shadow ray that asks whether it is seen. `out.next.link` is
-/// known.
+/// Samples a point on a light, and sets up its shadow ray. `out.next.link` must be set.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
                                   const Frame<F>& frame, const Vec3<F>& wo, const View& seen,

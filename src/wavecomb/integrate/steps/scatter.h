@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The step `scatter`: the bounce, and the ray that goes on.
+/// The step `scatter`: samples the bounce and the next ray.
 ///
 ///   T_{k+1} = T_k f(wo, wi) |cos theta_i| / p(wi)
 ///
-/// with p the BSDF's density, or that of the mixture with a field (guide_bounce.h).
+/// where p is the density of the BSDF, or of its mixture with the guiding distribution
+/// (guide_bounce.h).
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -14,7 +15,7 @@
 
 namespace wavecomb {
 
-/// Share of what the bounce `b` scatters that is diffuse; 0 of mirrors.
+/// Returns the diffuse fraction of the bounce `b`, by colour; 0 for specular bounces.
 template <typename F, typename Bsdf, typename View>
 WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen, const BsdfSample<F>& b) {
   const Color<F> diffuse = bsdf.diffuse_f_cos(seen, b.wi);
@@ -45,7 +46,7 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
     out.next.diffuse = diffuse_share<F>(at.bsdf, seen, b);
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
-    // What medium/walk.h looks for.
+    // Marks rays that enter a subsurface body for medium/walk.h.
     const Mask<F> enters = at.bsdf.enters(wo, b.wi);
     out.next.pdf = select(enters, F(-out.next.pdf), out.next.pdf);
     out.next.receiver =
@@ -54,7 +55,7 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
     out.next.cone_width =
         select(enters, bits_float<F>(pack_normal<F>(outwards)), out.next.cone_width);
   }
-  // A rough bounce spreads the cone: the lobe's half width is about alpha = roughness^2.
+  // A rough bounce widens the ray cone: the half width of the lobe is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)

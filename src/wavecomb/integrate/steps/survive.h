@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The step `survive`: Russian roulette.
 ///
-/// A path goes on with probability q, and then counts 1 / q times:
+/// A path continues with probability q, and its throughput is then divided by q:
 ///   T_{k+1} <- T_{k+1} / q
-/// so that its mean is what it would be without (Arvo and Kirk 1990).
+/// so that the mean stays the same (Arvo and Kirk 1990).
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -13,20 +13,21 @@
 
 namespace wavecomb {
 
-/// Roulette ends paths whose throughput is below 1 / kRouletteGain. With a gain of 1 it saves rays
-/// and costs more noise than they are worth: on Cornell, 3 has the least product of relMSE and rays
-/// (docs/decisions/roulette.md).
+/// Roulette terminates only paths whose throughput is below 1 / kRouletteGain. A gain of 1 saves
+/// rays but adds more noise than that justifies: on the Cornell box, 3 has the least product of
+/// relMSE and ray count (docs/decisions/roulette.md).
 inline constexpr float kRouletteGain = 3.f;
 
-/// Cost-aware roulette: the probability of shading a vertex that a path has reached.
+/// Returns the probability of shading a vertex that a path has reached, by cost-aware roulette.
 ///
-/// The efficiency 1 / (variance x cost) is greatest when a path goes on with a probability
+/// The efficiency 1 / (variance x cost) is greatest if the probability of continuing is
 /// proportional to
 ///   sqrt(E[contribution^2] / cost)
-/// of what comes next (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The contribution is
-/// throughput times an unknown incident radiance, taken to be alike everywhere, so that
+/// of the rest of the path (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The
+/// contribution is the throughput times an unknown incident radiance, which is assumed to be the
+/// same everywhere, so
 ///   q = kRouletteGain T / sqrt(cost of this material / mean cost),
-/// clamped to [0.05, 1]. Surfaces that shine are always shaded.
+/// clamped to [0.05, 1]. Emissive surfaces are always shaded.
 template <typename F>
 inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
                              const UInt<F>& material, const PathState<F>& path,
@@ -41,7 +42,8 @@ inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
   return select(active & not_(shines), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
 }
 
-/// The random number that cost_aware_survival is compared with; none of the sampler's.
+/// Returns the random number to compare with cost_aware_survival(). It is independent of the
+/// sampler.
 template <typename F>
 inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   using U = UInt<F>;
@@ -49,7 +51,7 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
 }
 
-/// Notes for AOVs the bounce that roulette lets go on with probability `q`.
+/// Records for AOVs a bounce that survives roulette with probability `q`.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void note_bounce(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
                                  const F& q, const VertexResult<F>& out) {
@@ -59,10 +61,11 @@ WAVECOMB_INLINE void note_bounce(const Vertex<F, kFeatures>& v, const GuidePlace
   v.aovs->survival = select(out.alive, q, F(-1.f));
 }
 
-/// Roulette after a vertex; `u` in [0, 1). By throughput; or, where it was learned what bounces are
-/// worth, by that (learn/worth.h). The throughput after a guided bounce says nothing of what it
-/// will bring: it is least where most light comes from. `arrived`: luminance of the throughput at
-/// the vertex.
+/// Applies roulette after a vertex, with the random number `u` in [0, 1). The survival probability
+/// depends on the throughput or, where training has estimated the expected contribution of bounces,
+/// on that estimate (learn/worth.h). The throughput after a guided bounce does not predict its
+/// contribution, since it is smallest in the directions that most light comes from. `arrived` is
+/// the luminance of the throughput at the vertex.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidePlace<F>& place,
                              const F& arrived, const F& u, VertexResult<F>& out) {
