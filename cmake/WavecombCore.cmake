@@ -98,7 +98,7 @@ function(wavecomb_kernel_units var kind set width)
         AND (NOT set STREQUAL "first" OR index EQUAL 0))
       set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
       configure_file("${PROJECT_SOURCE_DIR}/src/wavecomb/integrate/${kind}.lanes.cpp.in" "${unit}" @ONLY)
-      # Sanitized builds with WAVECOMB_BATCH have a unit for each program and width.
+      # With WAVECOMB_BATCH there is a unit for each program and width.
       set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}")
       list(APPEND units "${unit}")
     endif()
@@ -205,10 +205,8 @@ function(wavecomb_add_core name flags)
     target_compile_options(${lanes} PRIVATE ${core_warnings})
     target_link_libraries(${lanes} PRIVATE ${flags} embree TBB::tbb)
     target_sources(${name} PRIVATE $<TARGET_OBJECTS:${lanes}>)
-    if(WAVECOMB_SANITIZE)
-      # Elsewhere kernels stay alone, since GCC limits inlining by the size of a unit.
-      set_target_properties(${lanes} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP)
-    endif()
+    # The kernels of a program are compiled together: they instantiate the same templates.
+    set_target_properties(${lanes} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_MODE GROUP)
   endforeach()
   # Headers that units of kernels include, except programs and code specific to each kernel.
   set(kernel_pch ${wavecomb_pch} <wavecomb/integrate/shared_kernels.h> <wavecomb/integrate/wave.h>
