@@ -116,6 +116,7 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Print the files and tests that took the most CPU time."""
+    cpu_times.save()
     lines = cpu_times.table()
     if lines:
         terminalreporter.section("CPU time")

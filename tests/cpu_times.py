@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import json
 import os
+from pathlib import Path
 
+FILE = "WAVECOMB_CPU_TIMES"
+"""Environment variable with the name of a JSON file to write: seconds by test."""
 PROPERTY = "cpu_s"
 """Name of the property of a test report that holds the seconds."""
 _LEAST_S = 60.0
@@ -27,6 +31,13 @@ def since_last() -> float:
 def add(test: str, seconds: float) -> None:
     """Add the CPU time of one phase of a test."""
     _by_test[test] = _by_test.get(test, 0.0) + seconds
+
+
+def save() -> None:
+    """Writes the seconds of all tests to the file that the environment names, if it does."""
+    name = os.environ.get(FILE)
+    if name:
+        Path(name).write_text(json.dumps(_by_test, indent=1), encoding="utf-8")
 
 
 def table() -> list[str]:
