@@ -105,7 +105,7 @@ def _near_the_outside(
     if radii is not None:
         reached += radii[::step]
     whole = len(points) // _RUN * _RUN
-    # # NumPy reduces over the last axis quickly, so the coordinate axis comes first.
+    # NumPy reduces over the last axis quickly, so the coordinate axis comes first.
     runs = np.ascontiguousarray(points[:whole].T).reshape(3, -1, _RUN)
     low, high = runs.min(axis=2), runs.max(axis=2)
     most = 0.5 * (directions @ (low + high) + np.abs(directions) @ (high - low))
@@ -181,9 +181,8 @@ def fit(
     """Computes the position from which a pinhole camera frames the points.
 
     A point (x, y, z) in camera axes is inside the image where |x - cx| <= half (cz - z), and the
-    same
-    for y. This gives four planes; the tighter pair of opposite planes touches the points, and the
-    points are centred between both pairs.
+    same for y. This gives four planes; the tighter pair of opposite planes touches the points, and
+    the points are centred between both pairs.
 
     Args:
         points: (n, 3).

@@ -106,10 +106,8 @@ def read_map(path: str) -> list[list[float]]:
     """Reads an ST map as the ``lens_map`` argument of ``set_camera``.
 
     The red channel is s (rightwards) and the green channel is t (upwards). They give the position
-    in
-    the undistorted image that each pixel of the distorted image shows, from (0, 0) at the lower
-    left
-    corner to (1, 1) at the upper right corner.
+    in the undistorted image that each pixel of the distorted image shows, from (0, 0) at the lower
+    left corner to (1, 1) at the upper right corner.
 
     Raises:
         WavecombError: The file lacks these channels, or values are not finite.

@@ -38,8 +38,7 @@ def without_bad(
 
     Returns:
         Points with invalid ones replaced, faces that are not drawn, and a message about the faces
-        left
-        out, which is "" if no face uses an invalid point.
+        left out, which is "" if no face uses an invalid point.
 
     Raises:
         MeshError: No face remains, or counts and indices are inconsistent.

@@ -85,8 +85,8 @@ class Cage:
             kind = "faceVarying"
             corners = np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
         elif kind == "faceVarying" and index is not None:
-            # # Keep authored indices: corners with different indices are separate even if values
-            # are equal.
+            # Keep authored indices: corners with different indices are separate even if values are
+            # equal.
             corners, table = index, np.zeros((int(index.max()) + 1, values.shape[1]), np.float32)
             table[index] = values
             values = table

@@ -105,8 +105,7 @@ class CurveReader:
             prim: A UsdGeomCurves.
             matrix: Transform from the prim to its group; it has a ``uniform_scale``.
             uv_names: Primvars for texture coordinates, of which the first existing one is used;
-                empty if
-                no texture coordinates are needed.
+                empty if no texture coordinates are needed.
             inherited: Constant primvars of its ancestors.
             detail: Simplification that removes thin strands and widens others; the group is the
                 world then.
@@ -202,7 +201,7 @@ class CurveReader:
             return None
         normals = strands.controls(values, kind)
         length = np.einsum("ij,ij->i", normals, normals)
-        # # The comparisons are false for NaN, so NaN fails as well.
+        # The comparisons are false for NaN, so NaN fails as well.
         if not (float(length.min(initial=1.0)) > 0 and float(length.max(initial=0.0)) < 1e30):
             what = "normals of length zero or not finite: curves drawn as tubes"
             self.report.warn(what, prim.GetPath())

@@ -128,8 +128,7 @@ class MeshReader:
             prim: A UsdGeomMesh or UsdGeomTetMesh.
             matrix: Transform from the mesh to its group.
             uv_names: Primvars for texture coordinates, of which the first existing one is used;
-                empty if
-                no texture coordinates are needed.
+                empty if no texture coordinates are needed.
             names: Names of properties with authored opinions (``authored_names``).
             inherited: Constant primvars of its ancestors.
             displaced: Whether its points will be displaced.
@@ -272,8 +271,7 @@ class MeshReader:
         """Returns normals (n, 3) or (m, 3, 3); None for flat shading.
 
         Uses authored normals, else smooth ones for subdivision surfaces. Ignores authored normals
-        of meshes
-        that are subdivided, as UsdGeomMesh requires.
+        of meshes that are subdivided, as UsdGeomMesh requires.
         """
         if scheme not in SCHEMES:
             if scheme not in (None, "none"):
@@ -285,7 +283,7 @@ class MeshReader:
             return authored
         edges = None
         if "creaseIndices" in names:
-            # # If the mesh is subdivided, reading its cage reports invalid creases.
+            # If the mesh is subdivided, reading its cage reports invalid creases.
             report = LoadReport() if self.subdivide else self.report
             edges = sharp_edges(prim, topology.point_count, self.time, report)
         return smooth_normals(points, topology, edges)
@@ -309,7 +307,7 @@ class MeshReader:
             return None
         flat = normals.reshape(-1, 3)
         lengths = np.einsum("ij,ij->i", flat, flat)
-        # # The comparison is false for NaN, so NaN fails as well.
+        # The comparison is false for NaN, so NaN fails as well.
         if not float(np.maximum.reduce(lengths, axis=None, initial=0.0)) < 1e30:
             self.report.warn("normals that are not finite: ignored", prim.GetPath())
             return None

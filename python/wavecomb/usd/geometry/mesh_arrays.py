@@ -94,9 +94,8 @@ def plain(
     """Transforms and triangulates a mesh that consists only of triangles or only of quads.
 
     Returns points, bounds and topology in one call, which is faster for stages with a hundred
-    thousand
-    meshes. Returns None for any other or invalid mesh; ``triangulate`` and ``extent`` then report
-    errors.
+    thousand meshes. Returns None for any other or invalid mesh; ``triangulate`` and ``extent`` then
+    report errors.
     """
     is_identity = matrix == IDENTITY
     found = _core.plain_mesh(points, counts, indices, None if is_identity else matrix, limit=LIMIT)
@@ -147,7 +146,7 @@ def extent(positions: Array) -> Array:
     np.minimum.reduce(positions, axis=0, out=bounds[0])
     np.maximum.reduce(positions, axis=0, out=bounds[1])
     (a, b, c), (x, y, z) = bounds.tolist()
-    # # The comparisons are false for NaN, so NaN fails as well.
+    # The comparisons are false for NaN, so NaN fails as well.
     if not (a > -LIMIT and b > -LIMIT and c > -LIMIT and x < LIMIT and y < LIMIT and z < LIMIT):
         raise MeshError(_NOWHERE)
     return bounds

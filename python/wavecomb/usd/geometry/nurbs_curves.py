@@ -2,10 +2,9 @@
 """Converts UsdGeomNurbsCurves and UsdGeomHermiteCurves to Bezier segments.
 
 A polynomial span of order up to 4 becomes one cubic and is exact. Rational spans and spans of
-higher
-order become ``PARTS`` cubics each, with exact points and tangents at their ends. Basis functions
-follow formulas 2.5 and 2.7 of L. Piegl and W. Tiller, The NURBS Book (1997), vectorised over all
-samples.
+higher order become ``PARTS`` cubics each, with exact points and tangents at their ends. Basis
+functions follow formulas 2.5 and 2.7 of L. Piegl and W. Tiller, The NURBS Book (1997), vectorised
+over all samples.
 """
 
 from __future__ import annotations
@@ -179,7 +178,7 @@ def nurbs_strands(
     if not good.all():
         whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
         _say_left_out(prim, report, good, "; ".join(whys[:3]))
-    # # Curves that are left out are counted, so that primvar arrays for all curves still fit.
+    # Curves that are left out are counted, so that primvar arrays for all curves still fit.
     segments = np.array(
         [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
          for i, one in enumerate(found)], np.intp,
@@ -254,7 +253,7 @@ class Spline:
             raise MeshError(f"order {order} with {count} control points")
         if len(knots) != count + order:
             raise MeshError(f"{len(knots)} knots where {count + order} are needed")
-        # # The comparison is false for NaN, so NaN fails as well.
+        # The comparison is false for NaN, so NaN fails as well.
         if not (np.isfinite(knots).all() and bool((np.diff(knots) >= 0).all())):
             raise MeshError("its knots are not in order")
         low, high = float(knots[order - 1]), float(knots[count])
@@ -306,7 +305,7 @@ def rational(values: Floats, slopes: Floats, weights: Floats | None) -> tuple[Fl
         return values, slopes
     values, slopes = values * weights, slopes * weights
     total = values.sum(axis=1, keepdims=True)
-    # # The comparison is false for NaN, so NaN fails as well.
+    # The comparison is false for NaN, so NaN fails as well.
     if not bool((np.abs(total) > 1e-30).all()):
         raise MeshError("its pointWeights add up to nothing")
     values = values / total

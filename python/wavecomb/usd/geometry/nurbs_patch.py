@@ -251,7 +251,7 @@ def _surface(
     """
     at, by_u, by_v = _blend(axes, np.concatenate([points * heavy, heavy], axis=1))
     total = at[:, 3:]
-    # # The comparison is false for NaN, so NaN fails as well.
+    # The comparison is false for NaN, so NaN fails as well.
     if not bool((np.abs(total) > 1e-30).all()):
         raise MeshError("its pointWeights add up to nothing")
     place = at[:, :3] / total
@@ -281,7 +281,7 @@ def _together(points: Floats, normals: Array, near: float) -> Floats:
 
 
 def _joined(axes: tuple[_Axis, _Axis], place: Floats) -> Floats:
-    """Points that are one place get the same bits: both sides of an edge, ends of a closed form."""
+    """Makes points bit-identical along both sides of hard edges and at the ends of closed forms."""
     u, v = axes
     grid = place.reshape(len(v.at), len(u.at), 3)
     for axis, view in ((v, grid), (u, np.swapaxes(grid, 0, 1))):

@@ -124,8 +124,7 @@ class Motion:
         Args:
             prim: An Xformable prim.
             parent: Animated transform of its parent; None if the parent is static or if the prim
-                resets
-                the transform stack.
+                resets the transform stack.
             above: Transform of a static parent.
         """
         if parent is None and not UsdGeom.Xformable(prim).TransformMightBeTimeVarying():

@@ -42,7 +42,7 @@ class Skin:
             self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(self.prim))
 
     def varies(self) -> bool:
-        """Whether its animation, or the way from skeleton to mesh, may change over time."""
+        """Returns whether the animation or the skeleton-to-mesh transform may change."""
         animation = self.skeleton.GetAnimQuery()
         if animation and (
             animation.JointTransformsMightBeTimeVarying()
@@ -91,8 +91,7 @@ class Skin:
         """Returns deformed normals (n, 3).
 
         They belong to ``count`` points, or to corners whose points are ``corners``. All skinning
-        methods use
-        linear blending for normals; after normalisation the difference is small.
+        methods use linear blending for normals; after normalisation the difference is small.
 
         Raises:
             SkinError: The skinning data does not fit the mesh.
@@ -195,8 +194,8 @@ class Skeletons:
         return self._skins.get(prim.GetPath()) if self._skins else None
 
     def keeps_apart(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
-        """Whether an instance cannot share its prototype: its animation may be its own."""
-        # # The prototype's root prim has no type; the instance has it.
+        """Returns whether an instance needs a separate prototype because of its animation."""
+        # The prototype's root prim has no type; the instance has it.
         apart = (
             instance.GetTypeName() == "SkelRoot"
             or prototype.GetPath() in self._holders(prototype.GetStage())

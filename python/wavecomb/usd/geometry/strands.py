@@ -2,9 +2,8 @@
 """Layout of a prim's curves as Bezier segments, and simplification of thin strands.
 
 Every basis and wrap mode becomes runs of Bezier control points (or points of polylines) that
-adjacent
-segments share, so that the core supports a single kind of cubic. The change of basis is exact up to
-rounding.
+adjacent segments share, so that the core supports a single kind of cubic. The change of basis is
+exact up to rounding.
 """
 
 from __future__ import annotations
@@ -215,7 +214,7 @@ class Strands:
             kind = "varying"
         if len(values) == self.sizes.get(kind):
             return values, kind
-        # # A single value without authored interpolation is common and applies to all curves.
+        # A single value without authored interpolation is common and applies to all curves.
         if len(values) == 1:
             return values, "constant"
         raise PrimvarError(
@@ -224,7 +223,7 @@ class Strands:
         )
 
     def _bezier(self, values: NDArray[Any]) -> list[NDArray[np.float64]]:
-        """Values per authored point as control points 0 to 3 (1) of each segment, (count, c)."""
+        """Returns the Bezier (or line) points of each segment as 4 (or 2) arrays (count, c)."""
         curve, at = runs(self.segments)
         start, size = self.starts[curve], self.counts[curve]
         step = 3 if self.basis == "bezier" else 1
@@ -235,9 +234,8 @@ class Strands:
             if self.periodic:
                 return np.asarray(values[start + i % size], np.float64)
             out = np.asarray(values[start + np.clip(i, 0, size - 1)], np.float64)
-            # # Pinned curves get a reflected point before the first and after the last one, so that
-            # they reach
-            # # their end points.
+            # Pinned curves get a reflected point before the first and after the last one, so that
+            # they reach their end points.
             for outside, end, inner in ((i < 0, 0, 1), (i >= size, size - 1, size - 2)):
                 where = np.flatnonzero(outside)
                 if len(where):
@@ -330,11 +328,9 @@ class StrandDetail:
     """Simplifies thin strands for one view.
 
     Strands narrower than ``pixels`` are kept with a probability equal to width / ``pixels`` and
-    widened by
-    its inverse, which preserves coverage (stochastic simplification, Cook, Halstead, Planck and Ryu
-    2007). The choice depends on the strand's index in the prim, so that with distance the kept
-    strands
-    form a shrinking subset.
+    widened by its inverse, which preserves coverage (stochastic simplification, Cook, Halstead,
+    Planck and Ryu 2007). The choice depends on the strand's index in the prim, so that with
+    distance the kept strands form a shrinking subset.
     """
 
     def __init__(self, view: ViewSize, pixels: float, report: LoadReport) -> None:

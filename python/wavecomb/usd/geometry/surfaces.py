@@ -351,7 +351,7 @@ class Surfaces:
         """Describes polygons that are displaced without subdivision."""
         topology = cage.topology
         out: dict[str, Any] = {
-            # # These triangles already have the correct winding.
+            # These triangles already have the correct winding.
             "left_handed": False,
             "triangles": topology.triangles,
             "triangle_faces": np.ascontiguousarray(topology.face_ids(), np.uint32),

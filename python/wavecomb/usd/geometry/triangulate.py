@@ -97,7 +97,7 @@ def triangulate(
         raise MeshError(
             f"the face counts add up to {total}, but there are {len(indices)} face indices"
         )
-    # # Negative indices are large when read as unsigned.
+    # Negative indices are large when read as unsigned.
     if total and int(np.maximum.reduce(indices.view(np.uint32))) >= len(points):
         raise MeshError("a face index is out of range")
     has_holes = holes is not None and len(holes) > 0
@@ -183,7 +183,7 @@ def _split_rings(
         return pairs.reshape(-1, 2, 3), 0
     p = points.take(indices[ring], axis=0).astype(np.float64)
     p -= p[:, :1]
-    # # Newell's normal; a fan is valid if all of its triangles have the same orientation.
+    # Newell's normal; a fan is valid if all of its triangles have the same orientation.
     normal = cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
     areas = np.einsum("fkc,fc->fk", cross(p[:, 1:-1], p[:, 2:]), normal)
     bad = areas.min(axis=1) < -1e-9 * np.einsum("ij,ij->i", normal, normal)
@@ -216,8 +216,7 @@ def clip_ears(
     """Splits one simple polygon (k, 3) into triangles (k - 2, 3) by clipping ears.
 
     A polygon that crosses itself is split as well, with overlaps. The second result is the number
-    of
-    corners that were cut without a check after ``_EAR_STEPS`` steps.
+    of corners that were cut without a check after ``_EAR_STEPS`` steps.
     """
     drop = int(np.argmax(np.abs(normal)))
     axes = [(drop + 1) % 3, (drop + 2) % 3]
@@ -269,7 +268,7 @@ def smooth_normals(
         face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         where = index[3 * first : 3 * (first + _TRIANGLES)]
         for axis in range(3):
-            # # The order of additions is that of the triangles, independent of the block size.
+            # The order of additions is that of the triangles, independent of the block size.
             np.add.at(total[axis], where, np.repeat(face[:, axis], 3))
     normals = _unit(np.ascontiguousarray(total.T))
     return normals[index].reshape(-1, 3, 3) if sharp else normals
@@ -278,8 +277,8 @@ def smooth_normals(
 def _smoothing_groups(
     triangles: NDArray[np.int64], creases: NDArray[np.int64], point_count: int
 ) -> NDArray[np.int64]:
-    """(3 m,) label of each corner: equal where one point's corners meet across smooth edges."""
-    # # Corners at both ends of every half-edge: at the lower and at the higher point index.
+    """Returns corner labels (3 m,), equal for corners of a point that meet across smooth edges."""
+    # Corners at both ends of every half-edge: at the lower and at the higher point index.
     corner = np.arange(triangles.size).reshape(-1, 3)
     a, b = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     ca, cb = corner.ravel(), np.roll(corner, -1, axis=1).ravel()

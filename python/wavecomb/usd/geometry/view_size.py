@@ -35,7 +35,7 @@ class ViewSize:
         half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
         self.centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
         self.half = half
-        # # For pixels that are not square, use the finer direction, so that more is refined, not
+        # For pixels that are not square, use the finer direction, so that more is refined, not
         # less.
         shape = pixel_aspect(view.options, *size)
         self.pixels = size[0] / (2.0 * half[0]) * (shape if shape > 1.0 + 1e-5 else 1.0)
@@ -48,8 +48,7 @@ class ViewSize:
         """Returns the distances (n,) by which lengths at points (n, 3) of a prim appear reduced.
 
         For a perspective camera this is the depth in front of it, or the distance behind it. For a
-        latlong
-        camera it is the distance, and for an orthographic camera 1.
+        latlong camera it is the distance, and for an orthographic camera 1.
         """
         if self.projection == "orthographic":
             return np.ones(len(points))

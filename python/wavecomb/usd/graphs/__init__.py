@@ -2,6 +2,5 @@
 """Value graphs: typed expressions that are folded, shared and compiled to flat programs.
 
 ``values`` defines values and compiles them, ``surface`` maps them to surface parameters, and
-``bind``
-specialises them for one mesh.
+``bind`` specialises them for one mesh.
 """

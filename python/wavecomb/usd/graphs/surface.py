@@ -188,7 +188,7 @@ class Drivers:
         return self._read(parameter, lambda networks, kind: networks.input(shader, name, kind))
 
     def output(self, shader: UsdShade.Shader, output: str, parameter: str) -> Value | None:
-        """What a node's output gives, likewise."""
+        """Returns the value of a node's output; the rules of ``value`` apply."""
         return self._read(parameter, lambda networks, kind: networks.node(shader, output, kind))
 
     def _read(self, parameter: str, read: Callable[[Networks, str], Value | None]) -> Value | None:
@@ -237,7 +237,7 @@ class Drivers:
         )
 
     def graph(self) -> SurfaceGraph | None:
-        """The graphs of what neither constants nor textures drive; None where that is nothing.
+        """Returns the graph of parameters without constants or textures; None if there are none.
 
         Where a graph is too large, parameters are left out of it, the last one first, and said.
         """

@@ -21,8 +21,11 @@ PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
 """Parameter -> (index of its first component, number of components)."""
 
 POINT_SIZE = 3 * len(INPUTS) - 3
-"""Numbers of a point: uv, its width, then position, local position, normal, local normal, tangent,
-view and the three axes of normals, of three each."""
+"""Floats per evaluation point.
+
+They are uv and its filter width, then three each for position, local position, normal, local
+normal, tangent, view direction and the three normal axes.
+"""
 
 OF_SPACE = ("local_position", "local_normal", "normal_x", "normal_y", "normal_z")
 """Inputs that depend on object space."""
@@ -134,7 +137,10 @@ class Graph:
         return len(self.ops) // _OP.itemsize
 
     def run(self, points: Any, lanes: int = 1) -> Any:
-        """Its outputs at points (n, ``POINT_SIZE``), textures taken for white, without a mesh."""
+        """Evaluates the program at points (n, ``POINT_SIZE``) without a mesh.
+
+        Textures are taken as white.
+        """
         array = np.ascontiguousarray(points, np.float32)
         return _core.run_graph(
             self.ops, self.constants, self.images, self.outputs, self.names, array, lanes=lanes

@@ -149,7 +149,7 @@ class Assigner:
         self, draw: Draw, material: UsdShade.Material, surface: Surface
     ) -> Surface:
         values: dict[str, Any] = {}
-        # # A primvar may name another primvar; two rounds resolve one such level.
+        # A primvar may name another primvar; two rounds resolve one such level.
         for _ in range(2):
             new = [name for name in surface.object_reads if name not in values]
             if not new:
@@ -260,7 +260,7 @@ class Assigner:
                 made = bound(surface, matrix, values, varying)
             except GraphTooLarge:
                 made = surface
-            # # The key contains id(surface); storing the surface keeps that id from being reused.
+            # The key contains id(surface); storing the surface keeps that id from being reused.
             self._bound_graphs[key] = (surface, made)
         return self._bound_graphs[key][1]
 

@@ -18,7 +18,7 @@ LINEAR = OCIO_NAMES["rec709"]
 SRGB = "sRGB Encoded Rec.709 (sRGB)"
 RAW = "Raw"
 
-# # Names that are resolved without loading OpenColorIO, which takes 30 MB.
+# Names that are resolved without loading OpenColorIO, which takes 30 MB.
 _COMMON = {
     "raw": RAW,
     "data": RAW,
@@ -84,7 +84,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
         if pixels.dtype == np.uint8:
             rows /= np.float32(255)
         buffer = oiio.ImageBuf(np.ascontiguousarray(rows[..., :3]))
-        # # OpenImageIO's thread pool can deadlock here, so the conversion runs on this thread.
+        # OpenImageIO's thread pool can deadlock here, so the conversion runs on this thread.
         made = oiio.ImageBufAlgo.colorconvert(
             buffer, source, OCIO_NAMES[working], unpremult=False,
             colorconfig="ocio://default", nthreads=1,
@@ -120,12 +120,11 @@ def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
     """Returns an image (h, w, c) at half its size, rounded down, with the core's mip filter.
 
     Applies a box filter in linear light and keeps the type. ``srgb`` says that uint8 colours are
-    sRGB
-    encoded.
+    sRGB encoded.
     """
     height, width, channels = pixels.shape
     out = np.empty((max(height // 2, 1), max(width // 2, 1), channels), pixels.dtype)
-    # # Bands of even height can be filtered independently; an odd height needs the whole image.
+    # Bands of even height can be filtered independently; an odd height needs the whole image.
     band = 256 if height % 2 == 0 else height
     colours = (channels - 1) if channels % 2 == 0 else channels
     for first in range(0, height, band):

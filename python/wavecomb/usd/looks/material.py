@@ -79,7 +79,7 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     The kind is ``PREVIEW`` or a MaterialX shading model; "" if Wavecomb supports no surface output.
     """
     shader = material.ComputeSurfaceSource()[0]
-    # # If a material offers both, the MaterialX surface precedes the preview surface.
+    # If a material offers both, the MaterialX surface precedes the preview surface.
     others = (one for _, one in surface_outputs(material))
     for candidate in chain((material.ComputeSurfaceSource("mtlx")[0], shader), others):
         name = shader_id(candidate)
@@ -175,7 +175,7 @@ class MaterialTable:
             if is_cloudy(surface):
                 self.cloudy.append(surface.name)
             self._report.tally("materials")
-        # # The key is an id; storing the object keeps that id from being reused.
+        # The key is an id; storing the object keeps that id from being reused.
         self._by_object[id(material)] = material, surface
         return surface
 
@@ -222,7 +222,7 @@ class MaterialTable:
             what = f"shading network too large for primvars ({error}): left out"
             self._report.missing(what, surface.name)
             varied = surface
-        # # The key contains id(surface); storing the surface keeps that id from being reused.
+        # The key contains id(surface); storing the surface keeps that id from being reused.
         self._varied[id(surface), varying] = surface, varied
         return varied
 
@@ -248,7 +248,7 @@ class MaterialTable:
             if brightest > 0:
                 self._emitting.add(number)
                 self._emission[number] = (surface, 0.0)
-        # # The key is an id; storing the surface keeps that id from being reused.
+        # The key is an id; storing the surface keeps that id from being reused.
         self._surface_ids[id(surface)] = (surface, number)
         return number
 

@@ -142,7 +142,7 @@ def space_of(attribute: Usd.Attribute | None) -> str:
         return ""
     if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset or attribute.HasColorSpace():
         return str(attribute.GetColorSpace())
-    # # USD's own search ignores names that it does not know, such as srgb_texture.
+    # USD's own search ignores names that it does not know, such as srgb_texture.
     prim = attribute.GetPrim()
     while prim and not prim.IsPseudoRoot():
         if prim.HasAPI(Usd.ColorSpaceAPI):

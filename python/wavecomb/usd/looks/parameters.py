@@ -2,8 +2,7 @@
 """Editable parameters of materials and lights, with the attributes that hold them.
 
 ``wavecomb.usd.looks.material`` reads surfaces; this module finds the attribute behind each
-constant,
-so that programs such as the viewer can write a change back to the stage.
+constant, so that programs such as the viewer can write a change back to the stage.
 """
 
 from __future__ import annotations
@@ -53,8 +52,7 @@ class Parameter:
         attribute: Path of the attribute to author, which need not exist yet; None if there is none.
         type_name: Type of that attribute.
         driven_by: Driver of the value, such as "texture marble.png" or "primvar displayColor"; ""
-            for
-            a constant.
+            for a constant.
         reason: Why there is no attribute to author; "" if there is one.
         definition: MaterialX definition of the input; None for UsdPreviewSurface.
     """
@@ -232,8 +230,7 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
 
     The light must be outside of instances. Returns numbers, colours and switches by the names of
     ``wavecomb.light_table``: all parameters of this kind of light except its visibility. Returns
-    None if
-    the prim is not a supported light.
+    None if the prim is not a supported light.
     """
     if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
         return None

@@ -157,7 +157,7 @@ def _unpacked(data: Any, name: str) -> Iterator[str]:
         finally:
             os.close(descriptor)
         return
-    # # Packages may contain any file name, so only known extensions are used.
+    # Packages may contain any file name, so only known extensions are used.
     ending = ending if ending in _BY_ENDING else ""
     descriptor, file = tempfile.mkstemp(suffix=ending, prefix="wavecomb-")
     try:
@@ -204,11 +204,11 @@ def _read_file(
     path: str, stamp: Stamp | None, header_only: bool = False, called: str | None = None
 ) -> Image:
     """``called`` is the name of the file in messages."""
-    # # Imported only when an image is read, since loading the library takes 30 MB.
+    # Imported only when an image is read, since loading the library takes 30 MB.
     import OpenImageIO as oiio
 
     trail.note("decoding", called or path, "image")
-    # # Read colours as stored, not premultiplied by alpha.
+    # Read colours as stored, not premultiplied by alpha.
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(path, config)
@@ -312,8 +312,7 @@ class ReadAhead:
     """Reads images before they are needed.
 
     Contract: used by one thread. At most ``threads`` + 1 images are ready or being read, which
-    bounds
-    memory. An image that is requested but not being read yet is read at once.
+    bounds memory. An image that is requested but not being read yet is read at once.
     """
 
     def __init__(self, threads: int = 0, limit_bytes: int | None = None) -> None:
@@ -350,7 +349,7 @@ class ReadAhead:
         try:
             return future.result()
         finally:
-            # # The future's exception refers to this frame; the cycle would keep the stage open.
+            # The future's exception refers to this frame; the cycle would keep the stage open.
             del future
             self._start()
 

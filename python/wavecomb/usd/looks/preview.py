@@ -273,7 +273,7 @@ class PreviewReader:
         wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
         matrix = self._coordinates(shader, parameter)
         if not any((*matrix[:2], *matrix[3:5])):
-            # # All lookups read one texel, into which the border colour must not be blended.
+            # All lookups read one texel, into which the border colour must not be blended.
             wraps = ["clamp", "clamp"]
         self.textured[parameter] = {
             "texture": self.textures.add(
@@ -314,7 +314,7 @@ class PreviewReader:
         space = word(self._value(shader, "sourceColorSpace"))
         if space in ("raw", "sRGB"):
             return str(space)
-        # # An authored auto uses the file's metadata; the stage's colour space precedes a default
+        # An authored auto uses the file's metadata; the stage's colour space precedes a default
         # auto.
         return "auto" if space == "auto" else space_of(file and file.attribute) or "auto"
 
@@ -350,8 +350,7 @@ class PreviewReader:
         """Returns the 2 x 3 matrix from the mesh's to the texture's coordinates.
 
         Adds the name of the primvar to ``uv_names``, and to ``texture_uvs`` if it is not the first
-        one.
-        Without a connection the coordinates are constant, (0, 0) if nothing is authored.
+        one. Without a connection the coordinates are constant, (0, 0) if nothing is authored.
         """
         matrix: tuple[float, ...] = _IDENTITY_UV
         node, key = shader, "st"

@@ -122,15 +122,12 @@ class Surface:
             primvars: Primvar of the mesh by parameter; it overrides the constant if the mesh has
                 it.
             displacement: Displacement along normals: a length or a texture use; None for no
-                displacement.
-                It changes the mesh's geometry, not the material.
+                displacement. It changes the mesh's geometry, not the material.
             graph: Graph of parameters that are neither constants nor plain textures.
             stand_in: Whether this surface replaces a material that cannot be rendered. A display
-                colour of
-                the bound prim then takes precedence.
+                colour of the bound prim then takes precedence.
             object_reads: Primvars whose value on an object changes how textures are read. The
-                material is
-                read again for each value.
+                material is read again for each value.
     """
 
     name: str

@@ -139,10 +139,8 @@ class TextureTable:
         """``reuse`` holds textures to share if their files have not changed.
 
         ``store`` is the texture store of the builder. ``drops`` may be set to the number of finest
-        mip
-        levels that each texture leaves out, and ``origin`` to the world position of the scene's
-        origin, for
-        graphs. The table does not keep the context's stage, since it may outlive it.
+        mip levels that each texture leaves out, and ``origin`` to the world position of the scene's
+        origin, for graphs. The table does not keep the context's stage, since it may outlive it.
         """
         self.store = store
         self.working = context.options.working_space
@@ -150,7 +148,7 @@ class TextureTable:
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
         self._builder, self._report = context.builder, context.report
-        # # Images that are read ahead count as texture memory.
+        # Images that are read ahead count as texture memory.
         self._ahead = ReadAhead(
             context.options.threads, None if store is None else store.limit_bytes // 4
         )
@@ -250,8 +248,7 @@ class TextureTable:
             wrap_s: repeat, clamp, mirror or black; any other value means black, as in UsdUVTexture.
             wrap_t: The same for t.
             is_colour: Whether the texture holds colours, which are converted to the working space.
-                For
-                other data only an sRGB curve is decoded.
+                For other data only an sRGB curve is decoded.
             missing: Linear colour and alpha of UDIM tiles that do not exist.
         """
         if isinstance(image, TiledImage):
@@ -332,7 +329,7 @@ class TextureTable:
         return pixels
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # # Pixels are released once they are in the scene; a second use reads the file again.
+        # Pixels are released once they are in the scene; a second use reads the file again.
         here = image if image.is_here else read_image(path)
         pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
         if self.store is not None:
@@ -346,7 +343,7 @@ class TextureTable:
             raise WavecombError(str(error)) from None
         finally:
             if self.store is not None:
-                # # Without this the allocator would keep the memory of decoded images.
+                # Without this the allocator would keep the memory of decoded images.
                 del pixels
                 give_back_memory()
 

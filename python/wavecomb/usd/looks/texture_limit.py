@@ -2,9 +2,9 @@
 """Keeps the textures of a stage within a memory limit by leaving out mip levels.
 
 Before loading, reads the headers of all image files and computes the memory of their textures.
-While
-the sum exceeds the limit, removes the finest level of the texture with the most texels per image
-pixel. So a render never waits for a file, and the same stage, view and limit give the same image.
+While the sum exceeds the limit, removes the finest level of the texture with the most texels per
+image pixel. So a render never waits for a file, and the same stage, view and limit give the same
+image.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class Collections:
         collection = Usd.CollectionAPI(prim, name)
         try:
             query = collection.ComputeMembershipQuery()
-            # # The map is empty for an expression and complete for relationships.
+            # The map is empty for an expression and complete for relationships.
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:
@@ -56,7 +56,7 @@ class Collections:
             if rule in _RULES
         }
         root = prim.GetAttribute(f"collection:{name}:includeRoot")
-        # # Without the applied API schema, includeRoot has no fallback; for lights it is true.
+        # Without the applied API schema, includeRoot has no fallback; for lights it is true.
         if not root or not root.HasAuthoredValue() or root.Get():
             found.setdefault("/", "expand")
         if all(rule != "exclude" for rule in found.values()) and found.get("/") == "expand":
@@ -110,8 +110,7 @@ def _evaluated(
     """Evaluates a query at each prim and returns a rule for each change of membership.
 
     The second result says whether all prims were evaluated. A point instancer is a member with all
-    of
-    its instances, so its prototypes are not evaluated.
+    of its instances, so its prototypes are not evaluated.
     """
     rules: Rules = {}
     member: dict[Sdf.Path, bool] = {}

@@ -23,8 +23,7 @@ class Dependencies:
 
     Attributes:
         files: Absolute names of existing files: layers in all variants, textures and their tiles,
-            IES
-            profiles, and images that MaterialX files name.
+            IES profiles, and images that MaterialX files name.
         missing: Messages about files that the composed stage names but that do not exist.
     """
 

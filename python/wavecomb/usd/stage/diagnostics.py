@@ -125,7 +125,7 @@ def _pass_on(trap: Any, report: LoadReport) -> None:
     """Moves the messages of a trap to a report."""
     texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
     lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
-    # # Reworded messages are grouped in the report, so they do not count towards the limit.
+    # Reworded messages are grouped in the report, so they do not count towards the limit.
     known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
     for line in known:
         _tell(report, line)

@@ -26,10 +26,8 @@ def refused_fifos() -> Iterator[None]:
     """Aborts a block that opens layers if USD waits for a FIFO.
 
     While the process is idle, a thread checks the files that loaded layers name. An expendable
-    process
-    ends with one message. In other processes the thread opens the FIFO for writing and closes it,
-    so that
-    USD reads an empty layer; the block then raises.
+    process ends with one message. In other processes the thread opens the FIFO for writing and
+    closes it, so that USD reads an empty layer; the block then raises.
 
     Raises:
         WavecombError: A layer names a FIFO that USD waited for.
@@ -91,7 +89,7 @@ def _release(path: str, layer: str, found: _Found) -> None:
     if trail.is_expendable():
         patience.on_end(line)
         return
-    # # Opening fails if there is no reader, which means that USD is not waiting for this FIFO.
+    # Opening fails if there is no reader, which means that USD is not waiting for this FIFO.
     with contextlib.suppress(OSError):
         os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK))
         found.line = found.line or line

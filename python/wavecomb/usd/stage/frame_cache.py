@@ -95,8 +95,7 @@ class FrameCache:
     """Data that ``load_stage`` reuses from the previous frame and stores for the next one.
 
     ``has_same_levels`` returns whether another view, with another image size or None for the same
-    size,
-    needs the same subdivision levels.
+    size, needs the same subdivision levels.
 
     Contract: serves one open stage, of which only the time changes.
     """
@@ -118,7 +117,7 @@ class FrameCache:
         self.refined.end_frame()
 
 
-# # Prototypes of point instancers may be overs or classes.
+# Prototypes of point instancers may be overs or classes.
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 _PROXIES = Usd.TraverseInstanceProxies(_ANY)
 
@@ -139,7 +138,7 @@ class Varying:
     def __init__(self, stage: Usd.Stage) -> None:
         self._prims: dict[Sdf.Path, list[str]] = {}
         sources: set[Sdf.Path] = set()
-        # # Clips may provide values for attributes that are not authored otherwise.
+        # Clips may provide values for attributes that are not authored otherwise.
         clipped = any(prim.HasAuthoredMetadata("clips") for prim in _everything(stage))
         for prim in _everything(stage):
             names = []

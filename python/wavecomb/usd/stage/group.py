@@ -238,10 +238,9 @@ def light_what_is_drawn(world: Group, materials: MaterialTable) -> bool:
     """Returns whether emitters light at least half of the objects with irradiance ``LEAST``.
 
     Treats an emitter as a point light at its centre, at the distance of the object's centre but no
-    closer
-    than the object's radius. Ignores shadows and indirect light. The result does not depend on the
-    camera
-    or on the frame's samples, so that all frames of a shot and all tasks of a farm agree.
+    closer than the object's radius. Ignores shadows and indirect light. The result does not depend
+    on the camera or on the frame's samples, so that all frames of a shot and all tasks of a farm
+    agree.
     """
     boxes = np.array(world.shown[:MOST], np.float64)
     powers, centres = _placed_powers(world, materials)

@@ -66,12 +66,9 @@ class GroupBuilder:
         """Creates a builder for one load.
 
         ``cache`` stores mesh arrays between frames. ``progress`` is the progress callback.
-        ``detail``
-        simplifies curves that are in the world group. ``notes_emitters`` makes groups collect their
-        emissive
-        meshes; ``emits_otherwise`` then says whether there is emission from curves, points or
-        materials of
-        instances, which are not collected.
+        ``detail`` simplifies curves that are in the world group. ``notes_emitters`` makes groups
+        collect their emissive meshes; ``emits_otherwise`` then says whether there is emission from
+        curves, points or materials of instances, which are not collected.
         """
         self.notes_emitters = notes_emitters
         self.emits_otherwise = False
@@ -147,7 +144,7 @@ class GroupBuilder:
         prims = found.binding_prims()
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        # # Use one object per material, since tables find it faster by identity than by path.
+        # Use one object per material, since tables find it faster by identity than by path.
         known = self._known
         bound = found.bind(
             None if material is None else known.setdefault(material.GetPath(), material)
@@ -253,8 +250,7 @@ class GroupBuilder:
         """Adds a gprim as a separate instance with the transform ``matrix``.
 
         Used for rigid motion with transforms ``steps`` (s, 4, 4), for curves or points under
-        non-uniform scale,
-        and for rotated splats, whose colours depend on direction.
+        non-uniform scale, and for rotated splats, whose colours depend on direction.
         """
         path = draw.prim.GetPath()
         child = Group(str(path), self.report.place(path))

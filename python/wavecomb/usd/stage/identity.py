@@ -33,8 +33,7 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
     """Returns the light group of a light or emissive mesh; "" if it has none.
 
     ``primvars:wavecomb:lightGroup`` is inherited from ancestors like all primvars. Attributes of
-    other
-    renderers are read on the prim itself only.
+    other renderers are read on the prim itself only.
 
     Args:
         prim: The light or mesh.

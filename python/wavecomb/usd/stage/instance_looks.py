@@ -3,8 +3,7 @@
 
 Instances with equal materials and primvars share a prototype. If materials read primvars of the
 instances, or if a material bound to the instance reads primvars of the meshes inside, the prototype
-is
-read once per distinct set of values.
+is read once per distinct set of values.
 """
 
 from __future__ import annotations
@@ -89,7 +88,7 @@ class InstanceMaterials:
         return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
     def of_instancer(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
-        """(count,) ids for the instances of a point instancer: by its displayColor."""
+        """Returns material ids (count,) of a point instancer's instances from displayColor."""
         if scope.bound or scope.override:
             return np.full(count, INHERIT_MATERIAL, np.uint32)
         inherited = inherit(placed.prim, placed.inherited)

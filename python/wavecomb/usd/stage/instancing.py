@@ -37,7 +37,7 @@ class Instances:
 
 
 def rotations(quaternions: NDArray[Any]) -> Matrices:
-    """Rotation matrices (k, 3, 3) for row vectors of quaternions (k, 4), i, j, k, real."""
+    """Converts quaternions (k, 4) in i, j, k, real order to rotations (k, 3, 3) for row vectors."""
     q = np.asarray(quaternions, np.float64)
     length = np.sqrt(np.einsum("ij,ij->i", q, q))
     usable = (length > 0) & np.isfinite(length)

@@ -81,8 +81,7 @@ def load_stage(
             changed only if ``variants`` are given, and must not change during the call.
         options: Options of the load. Mask, payloads and session layer require a file.
         editable: Whether to keep equal materials separate and to keep ``textures``, for programs
-            that
-            edit the scene. Does not change the image.
+            that edit the scene. Does not change the image.
         reuse: ``textures`` of an earlier load; textures of unchanged files are shared.
         cache: Cache of an open stage that was read at another frame; unchanged data is shared. Does
             not change the image.
@@ -102,7 +101,7 @@ def load_stage(
     report, file = LoadReport(), _file_of(source)
     if cache is not None:
         reuse = cache.textures
-    # # Readers handle values that are not finite, so NumPy's warnings are disabled.
+    # Readers handle values that are not finite, so NumPy's warnings are disabled.
     with captured(report), np.errstate(all="ignore"):
         store = None
         if builder_factory is None:
@@ -296,7 +295,7 @@ class _Load:
             bounds, points = box.ComputeAlignedRange(), None
             if not bounds.IsEmpty():
                 ends = np.array([bounds.GetMin(), bounds.GetMax()])
-                # # Frame the ball inside the box, since the final view is never closer than that.
+                # Frame the ball inside the box, since the final view is never closer than that.
                 points = ends.mean(axis=0) + (corners(ends) - ends.mean(axis=0)) / np.sqrt(3.0)
             view = frame_points(points, c.up_axis, seen.lens, c.options.size)
         limit = float(c.options.texture_limit or 0) * MEGABYTE

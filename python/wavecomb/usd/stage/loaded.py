@@ -49,8 +49,7 @@ class LoadedStage:
         volumes: Description of each volume.
         catchers: Prims that are shadow catchers.
         origin: World position of the scene's origin, which is subtracted from world coordinates. It
-            is
-            0 unless the camera is far from the world's origin (docs/stages.md).
+            is 0 unless the camera is far from the world's origin (docs/stages.md).
     """
 
     scene: _core.Scene
@@ -79,8 +78,7 @@ class LoadedStage:
         """Yields a renderer of the scene for exclusive use, and whether it was built now.
 
         The most recently returned renderer is kept with its acceleration structures and light
-        statistics,
-        for the next render. `threads` is the number of threads for building a renderer.
+        statistics, for the next render. `threads` is the number of threads for building a renderer.
         """
         from wavecomb import _core
 

@@ -83,9 +83,8 @@ def open_render_settings(
         kept = {path for path in map(_prim_path, paths) if path is not None}
         mask = Usd.StagePopulationMask(sorted(kept))
         stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
-        # # Settings name products, products name vars, and both name cameras. ExpandPopulationMask
-        # is not
-        # # used, since it can deadlock with predicates written in Python.
+        # Settings name products, products name vars, and both name cameras. ExpandPopulationMask is
+        # not used, since it can deadlock with predicates written in Python.
         for _ in range(2):
             named = {path for path in _named_by(stage) if not mask.Includes(path)}
             if not named:
@@ -166,8 +165,7 @@ def open_stage(
             layer.
         mask: Paths of prims to keep with everything that they need (``populate``); empty means all.
         session_layer: File with opinions that are stronger than the stage's; ``variants`` are
-            stronger
-            still.
+            stronger still.
         payloads: Patterns of prims whose payloads are loaded (``load_payloads``); empty means all.
 
     Raises:
@@ -197,8 +195,7 @@ def open_editable(
     """Opens a stage that can be inspected and edited while another copy of it is loaded.
 
     Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
-    So
-    selecting them later changes no layer while another stage reads it on another thread.
+    So selecting them later changes no layer while another stage reads it on another thread.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
@@ -271,8 +268,7 @@ def change_layers(layers: Iterable[Sdf.Layer]) -> None:
     """Applies this process's path maps to layers and to all layers that they name.
 
     Changes layers in memory only, before they are composed: each absolute path of layers, textures
-    and
-    other files. Relative paths remain valid.
+    and other files. Relative paths remain valid.
     """
     pairs = own_maps()
     if not pairs:
@@ -287,7 +283,7 @@ def change_layers(layers: Iterable[Sdf.Layer]) -> None:
             UsdUtils.ModifyAssetPaths(layer, lambda path: mapped(path, pairs))
         for name in layer.GetCompositionAssetDependencies():
             if name and not name.lower().endswith(".mtlx"):
-                # # USD reports unreadable layers when it composes them.
+                # USD reports unreadable layers when it composes them.
                 with suppress(Tf.ErrorException):
                     other = Sdf.Layer.FindOrOpenRelativeToLayer(layer, name)
                     if other:

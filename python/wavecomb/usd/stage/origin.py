@@ -2,10 +2,8 @@
 """Chooses the origin of the scene and detects geometry that single precision cannot represent.
 
 The core computes in single precision: a million units from the origin, coordinates have steps of
-1/16
-unit. Therefore the scene of a stage whose camera is far away is built around a point near the
-camera.
-Transforms are in double precision until this translation has been applied.
+1/16 unit. Therefore the scene of a stage whose camera is far away is built around a point near the
+camera. Transforms are in double precision until this translation has been applied.
 """
 
 from __future__ import annotations
@@ -44,8 +42,7 @@ def find_origin(
     """Returns the origin of a scene: near the camera, or at the centre of drawn prims without one.
 
     It depends only on the stage, frame and camera, so that all regions, tiles and machines that
-    render one
-    image agree.
+    render one image agree.
 
     Args:
         stage: The stage.
@@ -63,7 +60,7 @@ def find_origin(
 
 
 def _places(stage: Usd.Stage, time: Usd.TimeCode, purposes: frozenset[str]) -> NDArray[np.float64]:
-    """World positions (n, 3) of drawn prims: of the middle of their authored extents, or of theirs.
+    """Returns world positions (n, 3) of drawn prims: centres of authored extents, else the origins.
 
     USD's own bounds need every point, and crash on arrays that do not fit together.
     """
@@ -147,8 +144,8 @@ def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> 
         return INSTANCED
     move = matrix.GetRow3(3)
     p, q, r = 0.5 * (a + x) - move[0], 0.5 * (b + y) - move[1], 0.5 * (c + z) - move[2]
-    # # Distance and size are both in units of the group, so their ratio is valid in object space.
-    # # Chained comparisons are used for speed, since this runs for every prim.
+    # Distance and size are both in units of the group, so their ratio is valid in object space.
+    # Chained comparisons are used for speed, since this runs for every prim.
     far = size * (_COARSE / _STEP)
     if -far <= p <= far and -far <= q <= far and -far <= r <= far:
         return None

@@ -25,8 +25,7 @@ def peek_products(
     """Reads the render settings of a file; returns one choice per product, at least one.
 
     Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
-    the
-    returned stage alive until then avoids reading its layers twice.
+    the returned stage alive until then avoids reading its layers twice.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.

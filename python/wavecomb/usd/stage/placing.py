@@ -58,7 +58,7 @@ class GroupPlacer:
         numbers: NDArray[np.uint32] | None = None,
         motion: Matrices | None = None,
     ) -> None:
-        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
+        """Adds k instances of a group, from k prims or from numbered instances of one instancer.
 
         ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
         """

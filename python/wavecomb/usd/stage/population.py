@@ -2,10 +2,8 @@
 """Subsets of a stage: population masks, payloads, and prims of a kind.
 
 Patterns of prim paths are OpenUSD's path expressions, such as ``/World/set/*`` or ``//lamp?``:
-``*``
-stands for any characters of a name, ``?`` for one character, ``[ab]`` for one of those characters,
-and
-``//`` for any number of path elements.
+``*`` stands for any characters of a name, ``?`` for one character, ``[ab]`` for one of those
+characters, and ``//`` for any number of path elements.
 """
 
 from __future__ import annotations
@@ -29,8 +27,7 @@ def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
     """Restricts a stage to the prims at and below some paths, their ancestors, and what they need.
 
     They need materials, prototypes of point instancers and sources of shader connections. All
-    cameras,
-    lights and render settings are kept, except those inside instances that are left out.
+    cameras, lights and render settings are kept, except those inside instances that are left out.
 
     ``paths`` may be patterns for prims that are not inside instances.
 
@@ -69,7 +66,7 @@ def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
 
 
 def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:
-    """The path, or that of the instance around it: masks know no prims inside of instances."""
+    """Returns a path, or that of the enclosing instance, inside which masks cannot name prims."""
     for prefix in path.GetPrefixes():
         if stage.GetPrimAtPath(prefix).IsInstance():
             return prefix
@@ -96,7 +93,7 @@ def _always(stage: Usd.Stage) -> Iterator[Sdf.Path]:
 
 
 def _needed(prims: Iterable[Usd.Prim]) -> Iterator[Sdf.Path]:
-    """Prims that those at and below some prims, or above them, point to."""
+    """Yields prims that some prims, their descendants and their ancestors refer to."""
     for top in prims:
         if not top:
             continue
@@ -112,7 +109,7 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
     for relation in prim.GetAuthoredRelationships():
         if relation.GetName().startswith(_FOLLOWED):
             for target in relation.GetTargets():
-                # # Collections are skipped: being a member does not make a prim necessary.
+                # Collections are skipped: being a member does not make a prim necessary.
                 if target.IsPrimPath():
                     yield target
     for attribute in prim.GetAuthoredAttributes():
@@ -129,8 +126,7 @@ def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:
     """Loads payloads of a stage that was opened without any.
 
     Loads payloads of prims that match a pattern, of their descendants, and of ancestors that a
-    pattern's
-    literal names pass through.
+    pattern's literal names pass through.
 
     Args:
         stage: A stage opened with ``Usd.Stage.LoadNone``.

@@ -28,7 +28,7 @@ _PURPOSES = ("default", "render", "proxy", "guide")
 def find_settings(
     stage: Usd.Stage, wanted: str | None, report: LoadReport
 ) -> UsdRender.Settings | None:
-    """The settings asked for, else those that the stage names, else the only ones under /Render.
+    """Returns the settings ``wanted``, else those the stage names, else the only ones in /Render.
 
     Raises:
         WavecombError: There are none of that path or name.

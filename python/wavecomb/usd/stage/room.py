@@ -18,7 +18,7 @@ acceleration structure.
 """
 
 _SHARE = 8
-"""Meshes are weighed where the stage's layers are larger than one part in so many of the room."""
+"""The check is skipped if layers are smaller than 1 / ``_SHARE`` of the available memory."""
 
 
 class Room:
@@ -34,7 +34,7 @@ class Room:
         self.is_asked = patience.loaded_layers()[1] > memory.room() // _SHARE
 
     def check(self, draws: Iterable[Draw]) -> None:
-        """Raises WavecombError where meshes, which are not read yet, need more than there is."""
+        """Raises WavecombError if meshes that are not read yet need more memory than available."""
         if not self.is_asked:
             return
         points = 0

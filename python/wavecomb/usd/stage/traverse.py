@@ -61,7 +61,7 @@ class Gathered:
     stand_ins: list[Draw] = field(default_factory=list)
 
     def binding_prims(self) -> list[Usd.Prim]:
-        """All prims whose bindings count, in the order in which ``bind`` takes materials."""
+        """Returns all prims with material bindings, in the order that ``bind`` expects."""
         prims = [draw.prim for draw in (*self.draws, *self.volumes)]
         prims += [placed.prim for placed in self.instances]
         return prims + [subset for draw in self.draws for subset in draw.subsets]
@@ -75,7 +75,7 @@ class Gathered:
             placed.material = next(materials)
         for draw in self.draws:
             if draw.subsets:
-                # # USD resolves a subset without a binding to the material of its mesh.
+                # USD resolves a subset without a binding to the material of its mesh.
                 draw.subset_materials = [next(materials) for _ in draw.subsets]
         bound = [m for draw in self.draws for m in (draw.material, *draw.subset_materials)]
         return bound + [placed.material for placed in self.instances]
@@ -155,9 +155,8 @@ class Traversal:
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
-        # # Prim, transform and animated transform of its parent, purpose, inherited primvars,
-        # predicate
-        # # for its children, its parent, draw mode.
+        # Prim, transform and animated transform of its parent, purpose, inherited primvars,
+        # predicate for its children, its parent, draw mode.
         stack: list[
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]

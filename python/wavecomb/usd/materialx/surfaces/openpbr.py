@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's surface shaders as parameters of the program "openpbr".
+"""Converts MaterialX surface shaders to parameters of the program "openpbr".
 
-These are standard_surface, open_pbr_surface and gltf_pbr. A parameter is an input times a number;
+Supports standard_surface, open_pbr_surface and gltf_pbr. A parameter is an input times a number;
 the input is a constant, a plain texture, or driven by a value graph. ``layers_of`` computes the
-other parameters. docs/decisions/materialx-graphs.md says why Standard Surface is not converted by
-MaterialX's graph ``standard_surface_to_open_pbr_surface``.
+other parameters. docs/decisions/materialx-graphs.md explains why Standard Surface is not converted
+by MaterialX's graph ``standard_surface_to_open_pbr_surface``.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ _MEDIUM = {
     "transmission_scatter_anisotropy": Row("transmission_scatter_anisotropy", 0.0, driven=False),
     "nested_priority": Row("dielectric_priority", 0.0, driven=False),
 }
-"""The medium inside, which standard_surface and open_pbr_surface describe by the same inputs."""
+"""Inputs of the interior medium, which standard_surface and open_pbr_surface share."""
 
 MODELS: dict[str, Model] = {
     "standard_surface": Model(
@@ -224,7 +224,9 @@ def _read(row: Row, inputs: LayerInputs) -> Any:
 def _standard_surface(i: LayerInputs, found: dict[str, Any]) -> dict[str, Any]:
     specular = found["specular_weight"]
     if specular < 1.0 and i.number("metalness", 0.0) >= 1.0:
-        specular = 1.0  # dims only the edge of a metal; OpenPBR's weight would dim all of it
+        # In Standard Surface this dims only the edge tint of a metal; OpenPBR's weight would dim
+        # all of it.
+        specular = 1.0
     return {"specular_weight": specular, "film_weight": float(found["film_thickness"] > 0)}
 
 
@@ -330,7 +332,8 @@ class MaterialXReader(SurfaceReader):
         inputs = LayerInputs(self, shader, model_name)
         layers = self.parameters["openpbr"] = layers_of(model_name, inputs)
         if layers["anisotropy"] or any("anisotropy" in name for name in inputs.driven):
-            self.drivers.networks.uv_names.append("st")  # the direction of brushing
+            # Anisotropy needs UVs for the direction of the tangent.
+            self.drivers.networks.uv_names.append("st")
         drive_layers(model_name, layers, inputs.driven, self.drivers)
         for name in inputs.driven:
             self.missing(f"MaterialX {model_name} input {name} by a node (one value for all)")
