@@ -111,7 +111,7 @@ def model_of(identifier: str) -> str:
 
 
 def hair_bsdf(shader: UsdShade.Shader) -> UsdShade.Shader | None:
-    """Returns the ``chiang_hair_bsdf`` that a ``surface`` node or the shader itself is, or None."""
+    """Returns a shader that is a ``chiang_hair_bsdf``, or that of a ``surface`` node; else None."""
     identifier = shader_id(shader)
     if identifier == "ND_surface":
         source = source_of(shader, "bsdf", Usd.TimeCode.Default())

@@ -79,7 +79,7 @@ class Surface:
         draw: Its prim and bindings.
         cage: Its polygons.
         bounds: (2, 3) bounds in the space of its group.
-        worn: Its materials and the primvars that they read.
+        worn: Material ids and the primvars that the materials read.
         group: Its group.
         moves: Displacements: lengths or texture uses.
         face_moves: (faces,) index into ``moves`` of each face; -1 means no displacement.
