@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a stage is read: one table, whose rows are the fields of ``LoadOptions``.
+"""Load options of a stage: one table whose rows are the fields of ``LoadOptions``.
 
-Keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, options of the commands and
-what checkpoints keep follow from it.
+They determine the keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, the
+options of commands, and values in checkpoints.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ CATCH = ("through", "lit", "bare")
 
 @dataclass(frozen=True)
 class Row:
-    """How an option of loading stands in commands and files.
+    """Description of a load option for commands and files.
 
     Attributes:
-        help: What it is, a sentence.
-        kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), "not" (a
-            flag that says no).
-        unset: What holds where it is not given.
-        option: Of commands; empty: none.
-        metavar: Of its value.
-        choices: The values that there are.
-        many: May be given again.
+        help: Description, one sentence.
+        kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), or "not"
+            (a flag that disables something).
+        unset: Description of the default.
+        option: Option of commands; "" if there is none.
+        metavar: Placeholder of its value.
+        choices: Valid values.
+        many: Whether the option may be repeated.
         least: Smallest number.
         most: Largest number.
-        above: Whether ``least`` itself is too little.
-        unit: Of numbers.
+        above: Whether ``least`` itself is excluded.
+        unit: Unit of numbers.
     """
 
     help: str
@@ -55,7 +55,7 @@ class Row:
     unit: str = ""
 
     def check(self, name: str, value: Any) -> None:
-        """Raises WavecombError, which says ``name``, for a value that is none; None is no value."""
+        """Raises WavecombError with ``name`` for an invalid value; None is always valid."""
         if value is None:
             return
         for one in value if self.many and self.choices else (value,):
@@ -95,7 +95,7 @@ class Row:
 
     @property
     def key(self) -> str:
-        """Its name among the arguments of a command, and in checkpoints."""
+        """Name among a command's arguments and in checkpoints."""
         return self.option.removeprefix("--").replace("-", "_") + "s" * (
             self.many and self.option not in ("--mask", "--payloads")
         )
@@ -107,50 +107,52 @@ def _row(default: Any, text: str, kind: str, option: str = "", **more: Any) -> A
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """How a stage is read; None: as the stage says.
+    """Load options of a stage; None means that the stage decides.
 
     Attributes:
-        camera: Path or unique name of a camera prim; None: of the render settings, else the stage's
-            first, else one that sees everything.
-        frame: Time code; None: the stage's start, else default values.
-        purposes: Of the geometry: "default", "render", "proxy", "guide"; None: as the render
-            settings say, else the first two.
-        variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
-        mask: Prims to draw, with all below them, and what they need, by paths or patterns
-            (docs/stages.md); by default all.
-        payloads: Patterns of the prims whose payloads are loaded, or "none" alone; by default all.
-        holdouts: Prims that the camera sees as holes, with all below them: black, and alpha 0.
-        catchers: Prims of which only the shadows on them show, with all below them
+        camera: Path or unique name of a camera prim; None uses the camera of the render settings,
+            else the first of the stage, else one that frames everything.
+        frame: Time code; None means the stage's start, else default values.
+        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses those
+            of the render settings, else the first two.
+        variants: Variant selections: {"/World/Car{paint}": "red"}; a set without a path is one of
+            the default prim.
+        mask: Paths or patterns (docs/stages.md) of prims to render, with their descendants and
+            everything they need; by default all.
+        payloads: Patterns of prims whose payloads are loaded, or "none" alone; by default all.
+        holdouts: Prims that, with their descendants, cut holes into the image: black, with alpha 0.
+        catchers: Prims that, with their descendants, show only the shadows on them
             (docs/visibility.md).
-        catch: Which of the renders of a stage with catchers it is read for: "through", the picture,
-            whose camera does not see them, or those of the catchers alone, "lit" as they are and
-            "bare" as if nothing else were there.
+        catch: Purpose of the load for a stage with catchers: "through" for the main render, whose
+            camera does not see catchers, or "lit" and "bare" for the renders of catchers with and
+            without other objects.
         session_layer: File with opinions that are stronger than the stage's.
-        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
-            size of their edges in the picture (docs/subdivision.md).
-        strand_pixels: Curves that are narrower in the picture are thinned out, and the others
-            widened, to no more than that (docs/hair.md); 0: none.
-        shutter: When it opens and closes, time codes from the frame; None: the camera's.
-        motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
-            render settings disable it.
-        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
-        depth_of_field: Whether the camera's lens blurs; None: unless the render settings disable
-            it.
-        projection: "perspective", "orthographic" or "latlong"; None: the camera's.
-        exposure: Whether the camera's exposure multiplies light in the picture.
-        lens_settings: Of the camera's lens: {"lens_k1": "-0.1", "rolling_shutter": "top"}; they go
-            before its attributes (docs/cameras.md).
-        st_map: Picture that says how the lens distorts, in place of coefficients.
-        render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
-            else the only ones under /Render (docs/cameras.md).
-        product: Path or name of one of their products; None: the first.
-        texture_limit: MB (10^6 bytes) that all textures and grids of volumes may take; None: any.
-            What does not fit of textures waits in a temporary file (docs/textures.md).
-        working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
-        lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
-            (docs/decisions/light-shapes.md).
-        size: Width and height of the picture that automatic levels are for.
-        threads: For images, textures and subdivision; 0: all.
+        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto" to choose
+            levels by the size of edges in the image (docs/subdivision.md).
+        strand_pixels: Width in pixels below which curves are thinned out and the remaining ones
+            widened up to this width (docs/hair.md); 0 disables it.
+        shutter: Opening and closing time relative to the frame, in time codes; None uses the
+            camera's shutter.
+        motion_blur: Whether to render motion blur; None enables it unless the render settings
+            disable it.
+        motion_steps: Steps of every motion, 2 to 64; None chooses up to 8 as needed.
+        depth_of_field: Whether to render depth of field; None enables it unless the render settings
+            disable it.
+        projection: "perspective", "orthographic" or "latlong"; None uses the camera's projection.
+        exposure: Whether the camera's exposure scales the image.
+        lens_settings: Lens settings such as {"lens_k1": "-0.1", "rolling_shutter": "top"}, which
+            override the camera's attributes (docs/cameras.md).
+        st_map: ST map image of the lens distortion, in place of coefficients.
+        render_settings: Path or name of a RenderSettings prim; None uses those that the stage
+            names, else the only ones under /Render (docs/cameras.md).
+        product: Path or name of one of their products; None uses the first.
+        texture_limit: Memory limit of textures and volume grids in MB (10^6 bytes); None means no
+            limit. Textures beyond it are swapped to a temporary file (docs/textures.md).
+        working_space: Working colour space: "rec709" or "acescg" (docs/textures.md).
+        lights: "visible", or "hidden" to make the shapes of lights invisible to all rays while they
+            still emit (docs/decisions/light-shapes.md).
+        size: Width and height of the image for which automatic levels are chosen.
+        threads: Threads for images, textures and subdivision; 0 means all.
     """
 
     camera: str | None = _row(
@@ -279,34 +281,34 @@ class LoadOptions:
 
     @property
     def chooses_what_opens(self) -> bool:
-        """Whether it has options that only a file can have, which is opened by them."""
+        """Whether options are set that apply only while a file is opened."""
         return bool(self.mask or self.payloads or self.session_layer is not None)
 
     def as_dict(self) -> dict[str, Any]:
-        """By name."""
+        """Returns the options by name."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def check(self) -> None:
-        """Raises WavecombError for what no stage can have."""
+        """Raises WavecombError for values that are invalid for every stage."""
         for one in fields(self):
             row = row_of(one)
             row.check(row.option[2:].replace("-", " ") or one.name, getattr(self, one.name))
 
 
 def row_of(option: Field[Any]) -> Row:
-    """How a field of ``LoadOptions`` stands in commands."""
+    """Returns the description of a field of ``LoadOptions``."""
     return cast(Row, option.metadata["row"])
 
 
 def rows() -> dict[str, Row]:
-    """The rows of options that commands have, by the name of the field."""
+    """Returns the rows of all options that commands have, by field name."""
     return {one.name: row_of(one) for one in fields(LoadOptions) if row_of(one).option}
 
 
 def split(
     options: Mapping[str, Any], without: Iterable[str] = ()
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Keywords that are options of loading, and the others.
+    """Splits keywords into load options and others.
 
     >>> split({"camera": "/Cam", "seed": 3})
     ({'camera': '/Cam'}, {'seed': 3})
@@ -317,10 +319,10 @@ def split(
 
 
 def given(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of a command's arguments, by ``Row.key``, as fields: those that are given.
+    """Converts a command's arguments, by ``Row.key``, to fields; omits those that are not given.
 
     Raises:
-        WavecombError: A value is no good.
+        WavecombError: A value is invalid.
     """
     out: dict[str, Any] = {}
     for name, row in rows().items():
@@ -347,7 +349,7 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
 def _named_values(
     option: str, parts: Iterable[tuple[str, str, str]], form: str = "NAME=VALUE"
 ) -> dict[str, str]:
-    """Texts, parted at an equals sign, as a mapping. Raises WavecombError."""
+    """Converts texts that are split at an equals sign to a mapping; raises WavecombError."""
     values: dict[str, str] = {}
     for name, equals, value in parts:
         if not (name and equals and value):
@@ -357,6 +359,6 @@ def _named_values(
 
 
 def selections(variants: Sequence[str]) -> dict[str, str]:
-    """PRIM{SET}=NAME ... as a mapping. Raises WavecombError."""
+    """Parses PRIM{SET}=NAME texts to a mapping; raises WavecombError."""
     parts = (text.rpartition("=") for text in variants)
     return _named_values("--variant", parts, "PRIM{SET}=NAME or SET=NAME")

@@ -15,7 +15,7 @@ DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
 """Default layers of an image."""
 
 GUIDES = ("guide_albedo", "guide_normal")
-"""For denoisers: of what is seen, also in mirrors and through clear glass."""
+"""Denoiser guides: features of surfaces seen directly, in mirrors or through clear glass."""
 ERRORS = ("error", "variance")
 DEEP = "deep"
 """Not a layer but a separate deep image, which ``--deep`` writes."""
@@ -145,7 +145,7 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
 
 
 def splat_layers(aovs: Iterable[str], light_groups: int) -> int:
-    """Layers beside the beauty that keep what paths from the lights bring by itself."""
+    """Returns the number of non-beauty layers that store light path contributions."""
     chosen = set(aovs)
     return len({"direct", "indirect"} & chosen) + _many_layers(chosen, light_groups)
 

@@ -45,8 +45,7 @@ CHATTER = (
     "failed call to posix_madvise",
     "UnicodeDecodeError: 'utf-8'",
 )
-"""What libraries print of files that they refuse, and USD of names that are no text; a warning
-says it better."""
+"""Starts of library output that is dropped, since a warning reports the problem in more detail."""
 _NO_VALUE = "No to_python (by-value) converter"
 """Boost.Python's message about a value that USD cannot read."""
 
@@ -197,7 +196,7 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
         if group is not None:
             group.close()
     code = os.waitstatus_to_exitcode(status)
-    # bubblewrap reports a signal as 128 and its number; our own exit codes above that are 130, 143.
+    # bubblewrap reports a signal as 128 plus its number; Wavecomb itself exits with 130 or 143.
     if code > 128 and code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
         code = 128 - code
     _end(code, sent, page, words)

@@ -111,7 +111,7 @@ def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
         raise MtlxError("it is not UTF-8") from None
     except MtlxError:
         raise
-    # The MaterialX bindings raise exception types of their own.
+    # The MaterialX bindings raise library-specific exception types.
     except Exception as error:
         raise MtlxError(" ".join(str(error).split())[:200]) from None
     return document

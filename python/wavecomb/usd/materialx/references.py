@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Supports references, payloads and sublayers to MaterialX files, which usd-core cannot read.
 
-USD opens only layers of its own formats. Therefore layers that name a .mtlx file are changed in
+USD opens layers only in its built-in formats. Therefore layers that name a .mtlx file are changed in
 memory to name a translated layer instead. See docs/decisions/materialx-layers.md for the reasons.
 """
 
@@ -206,7 +206,7 @@ def translate(file: str) -> tuple[Sdf.Layer, LoadReport]:
             Materials(document, prims, graphs).all()
             graphs.all()
         write_looks(document, layer, tell)
-    # The MaterialX bindings raise exception types of their own.
+    # The MaterialX bindings raise library-specific exception types.
     except Exception as error:
         raise MtlxError(" ".join(str(error).split())[:200]) from None
     return layer, report
