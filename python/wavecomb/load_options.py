@@ -257,7 +257,7 @@ class LoadOptions:
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
-        """Options with others in place of some, as Python callers give them.
+        """Returns options with some values replaced, converted from Python callers' types.
 
         Raises:
             TypeError: There is no such option.

@@ -83,7 +83,7 @@ def _grid_bytes(grid: Mapping[str, Any], names: set[str], offset: int) -> bytes:
     head = _text(_unique(grid["name"], names)) + _text(
         f"Tree_{kind}_HalfFloat" if is_half else f"Tree_{kind}"
     )
-    # The grid shares no voxels with another grid.
+    head += _text("")  # The grid shares no voxels with another grid.
     at_grid = offset + len(head) + 24
     before = struct.pack("<I", _ACTIVE_MASK | _ZIP) + _metadata(grid["name"], tree, is_half)
     before += _transform(np.asarray(grid["index_to_object"], np.float64))
@@ -191,7 +191,7 @@ class _Node:
         return made
 
     def prune(self) -> None:
-        """Makes tiles of children of one value, and drops those in which nothing is active."""
+        """Converts children with a single value to tiles, and removes empty children."""
         for number, child in list(self.children.items()):
             if isinstance(child, _Node):
                 child.prune()

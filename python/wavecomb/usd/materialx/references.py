@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Supports references, payloads and sublayers to MaterialX files, which usd-core cannot read.
 
-USD opens layers only in its built-in formats. Therefore layers that name a .mtlx file are changed in
-memory to name a translated layer instead. See docs/decisions/materialx-layers.md for the reasons.
+USD opens layers only in its built-in formats. Therefore layers that name a .mtlx file are changed
+in memory to name a translated layer instead. See docs/decisions/materialx-layers.md for the
+reasons.
 """
 
 from __future__ import annotations
