@@ -156,34 +156,32 @@ class LoadOptions:
     """
 
     camera: str | None = _row(
-        None, "Camera prim.", "text", "--camera", metavar="PATH",
+        None, "Camera prim to render from.", "text", "--camera", metavar="PATH",
         unset="of the render settings, else the first",
     )  # fmt: skip
     frame: float | None = _row(
-        None, "Time code.", "number", "--frame", metavar="T", unset="the stage's start"
+        None, "Time code of the frame.", "number", "--frame", metavar="T", unset="the stage's start"
     )
     purposes: tuple[str, ...] | None = _row(
-        None, "Geometry to take, may be given again.", "choice", "--purpose", many=True,
+        None, "Purpose of geometry to render; may be repeated.", "choice", "--purpose", many=True,
         choices=PURPOSES, unset="of the render settings, else default and render",
     )  # fmt: skip
     variants: Mapping[str, str] | None = _row(
-        None, "Variant to select, may be given again; SET=NAME is of the default prim.", "text",
+        None, "Variant to select; may be repeated. SET=NAME applies to the default prim.", "text",
         "--variant", many=True, metavar="PRIM{SET}=NAME",
     )  # fmt: skip
     lights: str = _row(
-        "visible", "Whether rays meet the shapes of lights; hidden ones shine all the same.",
+        "visible", "Whether the shapes of lights are visible; hidden lights still emit.",
         "choice", "--lights", choices=LIGHT_SHAPES, unset="visible",
     )  # fmt: skip
     shutter: tuple[float, float] | None = _row(
-        None, "When the shutter opens and closes, time codes from the frame.", "pair", "--shutter",
-        metavar="OPEN CLOSE", unset="the camera's",
+        None, "Opening and closing time of the shutter, in time codes from the frame.", "pair",
+        "--shutter", metavar="OPEN CLOSE", unset="the camera's",
     )  # fmt: skip
-    motion_blur: bool | None = _row(
-        None, "What moves is drawn as it is at the frame.", "not", "--no-motion-blur"
-    )
+    motion_blur: bool | None = _row(None, "Disable motion blur.", "not", "--no-motion-blur")
     motion_steps: int | None = _row(
-        None, "Steps of every motion over the shutter.", "integer", "--motion-steps", metavar="N",
-        least=2, most=64, unset="as many as it needs, 2 to 8",
+        None, "Number of motion steps over the shutter.", "integer", "--motion-steps", metavar="N",
+        least=2, most=64, unset="as needed, 2 to 8",
     )  # fmt: skip
     render_settings: str | None = _row(
         None, "Render settings prim, by path or name.", "text", "--render-settings", metavar="PATH",
@@ -191,69 +189,76 @@ class LoadOptions:
     )  # fmt: skip
     product: str | None = _row(
         None, "Render product, by path or name.", "text", "--product", metavar="PATH",
-        unset="of render all, else the first",
+        unset="all for render, else the first",
     )  # fmt: skip
     projection: str | None = _row(
-        None, "latlong: all directions in one picture.", "choice", "--camera-projection",
-        choices=PROJECTIONS, unset="the camera's",
+        None, "Projection of the camera; latlong shows all directions in one image.", "choice",
+        "--camera-projection", choices=PROJECTIONS, unset="the camera's",
     )  # fmt: skip
     exposure: bool = _row(
-        True, "The camera's exposure multiplies light in the picture.", "switch",
+        True, "Whether the camera's exposure scales the image.", "switch",
         "--camera-exposure", unset="on",
     )  # fmt: skip
     depth_of_field: bool | None = _row(
-        None, "What is out of focus is blurred, as the camera's fStop says.", "switch",
+        None, "Whether to render depth of field, by the camera's fStop.", "switch",
         "--depth-of-field", unset="unless the render settings disable it",
     )  # fmt: skip
     lens_settings: Mapping[str, str] | None = _row(
-        None, "Distortion, aperture or rolling shutter of the camera; may be given again.", "text",
+        None, "Distortion, aperture or rolling shutter of the camera; may be repeated.", "text",
         "--lens-setting", many=True, metavar="NAME=VALUE", unset="the camera's",
     )  # fmt: skip
     st_map: str | None = _row(
-        None, "ST map: how the lens distorts.", "file", "--st-map", metavar="FILE.exr"
+        None, "ST map of the lens distortion.", "file", "--st-map", metavar="FILE.exr"
     )
     mask: tuple[str, ...] = _row(
-        (), "Prim to draw, with all below it and what it needs, or a pattern of such; may be given "
-        "again.", "text", "--mask", many=True, metavar="PATH", unset="all",
+        (), "Prim or pattern to render, with its descendants and everything it needs; may be "
+        "repeated.", "text", "--mask", many=True, metavar="PATH", unset="all",
     )  # fmt: skip
     payloads: tuple[str, ...] = _row(
-        (), "Pattern of prims whose payloads are loaded, or none; may be given again.", "text",
+        (), "Pattern of prims whose payloads are loaded, or none; may be repeated.", "text",
         "--payloads", many=True, metavar="PATTERN", unset="all",
     )  # fmt: skip
     holdouts: tuple[str, ...] = _row(
-        (), "Prim that the camera sees as a hole, black with alpha 0, and all below it; may be "
-        "given again.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
+        (), "Prim that, with its descendants, cuts a hole into the image (black, alpha 0); may be "
+        "repeated.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
     catchers: tuple[str, ...] = _row(
-        (), "Prim of which only the shadows on it show, as alpha, and all below it; may be given "
-        "again.", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
+        (), "Prim that, with its descendants, shows only the shadows on it, as alpha; may be "
+        "repeated.", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
-    catch: str = _row("through", "Which render of a stage with catchers.", "choice", choices=CATCH)
+    catch: str = _row(
+        "through",
+        "Render of a stage with catchers for which it is loaded.",
+        "choice",
+        choices=CATCH,
+    )
     session_layer: str | None = _row(
         None, "Layer with opinions stronger than the stage's.", "file", "--session-layer",
         metavar="FILE",
     )  # fmt: skip
     texture_limit: float | None = _row(
-        None, "Memory of textures and grids; what does not fit waits in a temporary file.",
+        None, "Memory limit of textures and grids; textures beyond it use a temporary file.",
         "number",
         "--texture-limit", metavar="MB", least=0, above=True, unit="MB", unset="any",
     )  # fmt: skip
     working_space: str = _row(
-        "rec709", "Linear colours that the picture is computed in.", "choice", "--working-space",
+        "rec709", "Linear colour space of the render.", "choice", "--working-space",
         choices=WORKING_SPACES, unset="rec709",
     )  # fmt: skip
     subdivision: str | int = _row(
         "auto",
-        "Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their size in the "
-        "picture.",
+        "Subdivision surfaces: off (polygons), refined LEVEL times (0 to 10), or auto, by their "
+        "size in the image.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
     strand_pixels: float = _row(
-        0.0, "Curves narrower than that in the picture are thinned out, the others widened; 0: "
-        "none.", "number", "--strand-pixels", metavar="X", least=0, unset="0",
+        0.0, "Width in pixels below which curves are thinned out and the rest widened; 0 disables "
+        "it.", "number", "--strand-pixels", metavar="X", least=0, unset="0",
     )  # fmt: skip
-    size: tuple[int, int] = _row((600, 600), "Width and height of the picture.", "pair", least=1)
-    threads: int = _row(0, "Threads that read; 0: all.", "integer", least=0)
+    size: tuple[int, int] = _row(
+        (600, 600), "Width and height of the image in pixels.", "pair", least=1
+    )
+    threads: int = _row(0, "Threads for reading; 0 means all.", "integer", least=0)
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:

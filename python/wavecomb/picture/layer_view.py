@@ -35,7 +35,7 @@ _UNITS = {
     "depth": "depth, scene units",
     "half_depth": "depth to half opacity, scene units",
     "guided_share": "share of bounces that are guided",
-    "survival": "probability that roulette lets go on",
+    "survival": "survival probability of roulette",
 }
 _LOGARITHMIC = ("cost", "error", "variance")
 SCALARS = tuple(_UNITS)

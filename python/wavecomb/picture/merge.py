@@ -95,7 +95,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
             if seed in seeds:
                 raise WavecombError(
                     f"{source.name}: has seed {seed}, as {seeds[seed]} has: the same samples twice "
-                    "are no better; render it with another --seed"
+                    "do not reduce noise; render it with another --seed"
                 )
             seeds[seed] = source.name
     sums: dict[str, NDArray[Any]] = {}
@@ -128,7 +128,7 @@ def _overscan(source: _Source) -> int:
     edges = [source.settings.get(name) for name in ("width", "height")]
     if isinstance(beyond, int) and all(isinstance(e, int) and 0 <= 2 * beyond < e for e in edges):
         return beyond
-    raise WavecombError(f"{source.name}: its overscan is no good: the file is damaged")
+    raise WavecombError(f"{source.name}: its overscan is invalid: the file is damaged")
 
 
 def _source(name: str) -> _Source:

@@ -156,12 +156,12 @@ def _check_header(header: dict[str, Any]) -> None:
     """Raises ArchiveError unless all header entries exist with valid types."""
     for key, types in _PARTS.items():
         if not isinstance(header.get(key, ()), types):
-            raise ArchiveError(f"its {key} is no good")
+            raise ArchiveError(f"its {key} is invalid")
     texts = [*header["aovs"], *header["scene"].values()]
     if not all(isinstance(text, str) for text in texts):
-        raise ArchiveError("its names are no text")
+        raise ArchiveError("its names are not text")
     if not 0 <= header["seconds"] < math.inf:
-        raise ArchiveError("its seconds are no time")
+        raise ArchiveError("its seconds are invalid")
     from wavecomb import _core
 
     settings = header["settings"]
@@ -179,19 +179,19 @@ def _check_header(header: dict[str, Any]) -> None:
         aov_names.expand(header["aovs"])
         _core.Settings(**settings).check()
     except (TypeError, ValueError, OverflowError, RuntimeError, WavecombError) as error:
-        raise ArchiveError(f"its settings are no good: {error}") from error
+        raise ArchiveError(f"its settings are invalid: {error}") from error
 
 
 def _check_state(state: dict[str, Any]) -> int:
     """Returns the current pass; raises ArchiveError unless arrays have the saved form."""
     if not {"pass.target", "pass.active"} <= state.keys():
-        raise ArchiveError("it lacks a part")
+        raise ArchiveError("an entry is missing")
     target = state["pass.target"]
     if target.shape != () or target.dtype.kind not in "iu" or not 0 <= int(target) < 1 << 32:
-        raise ArchiveError("its pass is no number")
+        raise ArchiveError("its pass is not a number")
     for name, array in state.items():
         if name != "pass.target" and (array.dtype != np.uint8 or array.ndim != 1):
-            raise ArchiveError(f"its {name} is no row of bytes")
+            raise ArchiveError(f"its {name} is not an array of bytes")
     return int(target)
 
 
@@ -204,7 +204,7 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         load_checkpoint(target)
     except WavecombError:
         raise WavecombError(
-            f"{os.fspath(path)}: is there and is no checkpoint; give --checkpoint another name"
+            f"{os.fspath(path)}: exists and is not a checkpoint; give --checkpoint another name"
         ) from None
 
 
@@ -220,7 +220,7 @@ def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
     if parts:
         what = ", ".join(parts[:-1]) + " and " * (len(parts) > 1) + parts[-1]
         raise WavecombError(
-            f"{name}: was made of {old['stage'] or 'a scene'} when it looked otherwise: "
+            f"{name}: was made of {old['stage'] or 'a scene'} in another state: "
             f"{what} differ{'s' * (len(parts) == 1)}; give the stage as it was, or start anew"
         )
     before, now = dict(old["settings"]), dict(header["settings"])

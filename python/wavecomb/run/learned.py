@@ -54,7 +54,9 @@ def check_taught(settings: Settings, option: str) -> None:
     """Raises WavecombError if a render with these settings trains no guiding field."""
     chosen = settings.to_dict()
     if chosen["guiding"] == "off" and chosen["roulette"] != "efficient":
-        raise WavecombError(f"{option}: nothing is learned here; give --guiding auto or on, too")
+        raise WavecombError(
+            f"{option}: this render trains no guiding field; give --guiding auto or on as well"
+        )
 
 
 def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
@@ -90,13 +92,13 @@ def load_learned(path: str | os.PathLike[str]) -> bytes:
 
     name = os.fspath(path)
     try:
-        advice = "learn anew, by --learn-to"
+        advice = "create it again with --learn-to"
         _, arrays = read_kind(name, _KIND, _FORMAT, "--learn-to", advice)
         field = arrays.get("field")
         if field is None or field.dtype != np.uint8 or field.ndim != 1:
             raise ArchiveError("it has no field")
     except ArchiveError as error:
-        raise WavecombError(f"{name}: holds nothing learned, or is damaged: {error}") from error
+        raise WavecombError(f"{name}: holds no guiding field, or is damaged: {error}") from error
     return field.tobytes()
 
 

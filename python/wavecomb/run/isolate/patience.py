@@ -80,10 +80,11 @@ def _watch(file: Path, done: threading.Event) -> None:
         layers, size = loaded_layers()
         allowed = allowed_s(size)
         if busy >= allowed and not done.is_set():
+            more = 10 * max(1, round(allowed))
             on_end(
-                f"{file}: USD has composed for {busy:.0f} s, and its layers ({layers}, "
-                f"{size / 1e6:.3g} MB) give no reason: prims refer to each other without end, or "
-                f"multiply; mend that, or allow more by --load-limit {10 * max(1, round(allowed))}"
+                f"{file}: USD has composed for {busy:.0f} s, and the size of its layers ({layers}, "
+                f"{size / 1e6:.3g} MB) does not explain it: prims refer to each other without end, "
+                f"or multiply; fix that, or allow more by --load-limit {more}"
             )
             return
 

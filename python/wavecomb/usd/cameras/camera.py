@@ -173,7 +173,7 @@ def read_camera(
     wide = number(camera.GetHorizontalApertureAttr().Get(time), 20.955)
     high = number(camera.GetVerticalApertureAttr().Get(time), 15.2908)
     if frame is None or focal <= 0 or wide <= 0 or high <= 0:
-        report.warn("camera left out: its transform, focal length or aperture is no good", path)
+        report.warn("camera left out: its transform, focal length or aperture is invalid", path)
         return None
     x = number(camera.GetHorizontalApertureOffsetAttr().Get(time), 0.0)
     y = number(camera.GetVerticalApertureOffsetAttr().Get(time), 0.0)
@@ -230,7 +230,7 @@ def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadRepo
     iso, seconds = value("exposure:iso", 100.0), value("exposure:time", 1.0)
     stop, response = value("exposure:fStop", 1.0), value("exposure:responsivity", 1.0)
     if min(iso, seconds, response) < 0 or stop <= 0 or abs(stops) > MAX_STOPS:
-        report.warn("camera exposure left out: a value of it is no good", prim.GetPath())
+        report.warn("camera exposure left out: one of its values is invalid", prim.GetPath())
         return 1.0
     scale = 2.0**stops * seconds * iso / 100.0 * response / (stop * stop)
     if not scale <= MAX_EXPOSURE:
@@ -249,7 +249,7 @@ def _clip_planes(
         if np.isfinite(numbers).all() and any(numbers[:3]):
             found.append(numbers)
         else:
-            report.warn("clipping plane of a camera left out: it is none", camera.GetPath())
+            report.warn("clipping plane of a camera left out: it is invalid", camera.GetPath())
     if len(found) > MAX_CLIP_PLANES:
         report.warn(f"camera has more than {MAX_CLIP_PLANES} clipping planes", camera.GetPath())
     return found[:MAX_CLIP_PLANES]

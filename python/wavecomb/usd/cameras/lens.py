@@ -70,7 +70,7 @@ def _authored(prim: Usd.Prim, name: str, time: Usd.TimeCode | None, report: Load
             continue
         value = _value(name, given)
         if value is None:
-            report.warn(f"{attribute} of a camera left out: it is none", prim.GetPath())
+            report.warn(f"{attribute} of a camera left out: it is invalid", prim.GetPath())
         return value
     return None
 

@@ -15,7 +15,7 @@ from wavecomb.usd.geometry.triangulate import MeshError
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
-WHY = "points of theirs are not finite or absurdly far away"
+WHY = "they have points that are not finite or absurdly far away"
 
 
 def bad_points(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:

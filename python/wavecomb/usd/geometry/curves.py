@@ -327,7 +327,7 @@ def read_uvs(
         primvar = first_primvar(prim, names, inherited, time)
         if primvar is None:
             if names is not UV_NAMES:
-                what = f"no primvar {names[0]!r} for the textures of curves: made up"
+                what = f"no primvar {names[0]!r} for the textures of curves: generated"
                 report.warn(what, prim.GetPath())
             return None
         values, kind = strands.fit(primvar, 2)

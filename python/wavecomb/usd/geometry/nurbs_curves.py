@@ -143,7 +143,7 @@ def nurbs_strands(
         if values is None:
             return np.empty((0, columns))
         if values.shape[1] != columns:
-            raise MeshError(f"its {name} are no numbers")
+            raise MeshError(f"its {name} are not numbers")
         return values.astype(np.float64)
 
     orders = numbers("order", 1)[:, 0].astype(np.intp)
@@ -307,6 +307,6 @@ def rational(values: Floats, slopes: Floats, weights: Floats | None) -> tuple[Fl
     total = values.sum(axis=1, keepdims=True)
     # The comparison is false for NaN, so NaN fails as well.
     if not bool((np.abs(total) > 1e-30).all()):
-        raise MeshError("its pointWeights add up to nothing")
+        raise MeshError("its pointWeights add up to 0")
     values = values / total
     return values, slopes / total - values * (slopes.sum(axis=1, keepdims=True) / total)

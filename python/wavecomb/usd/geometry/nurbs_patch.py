@@ -253,7 +253,7 @@ def _surface(
     total = at[:, 3:]
     # The comparison is false for NaN, so NaN fails as well.
     if not bool((np.abs(total) > 1e-30).all()):
-        raise MeshError("its pointWeights add up to nothing")
+        raise MeshError("its pointWeights add up to 0")
     place = at[:, :3] / total
     normals = np.cross(
         by_u[:, :3] - place * by_u[:, 3:], by_v[:, :3] - place * by_v[:, 3:]

@@ -205,7 +205,7 @@ class Skeletons:
             return False
         self._apart += 1
         if self._apart > MOST_APART:
-            what = f"more than {MOST_APART} instances with skeletons: the rest as the first of each"
+            what = f"more than {MOST_APART} skeletal instances: the rest use the first one's pose"
             self.report.warn(what, instance.GetPath())
             return False
         return True

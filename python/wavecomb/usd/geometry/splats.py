@@ -133,7 +133,7 @@ class SplatReader:
         """
         values = self._values(prim, name, len(otherwise))
         if values is not None and len(values) > count:
-            self.report.warn(f"more {name} than splats: the first count", prim.GetPath())
+            self.report.warn(f"more {name} than splats: the first ones are used", prim.GetPath())
         if values is not None and len(values) < count:
             self.report.warn(f"fewer {name} than splats: ignored", prim.GetPath())
             values = None
@@ -154,7 +154,7 @@ class SplatReader:
             self.report.warn(what, prim.GetPath())
             values = None
         elif len(values) > wanted:
-            what = f"more harmonics of splats than degree {degree} asks for: the first count"
+            what = f"more harmonics of splats than degree {degree} needs: the first ones are used"
             self.report.warn(what, prim.GetPath())
         if values is None:
             return np.zeros((count, 1, 3), np.float32)
@@ -194,7 +194,7 @@ class PointReader:
         layout = lay_out_points(len(positions))
         bad = bad_points(positions)
         if bad.all():
-            raise MeshError("their places are not finite or absurdly far away")
+            raise MeshError("their positions are not finite or absurdly far away")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
         widths, _ = read_widths(prim, layout, self.time, self.report)

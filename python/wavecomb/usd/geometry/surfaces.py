@@ -286,7 +286,7 @@ class Surfaces:
             total += count + now
             if surface.level > surface.lowest:
                 heapq.heappush(heap, (-now, i))
-        what = "subdivided less than the picture asks for, to bound memory"
+        what = "subdivided less than the image needs, to limit memory"
         for i in sorted(lowered):
             self.report.note(what, chosen[i].draw.prim.GetPath())
 

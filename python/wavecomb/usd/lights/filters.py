@@ -216,7 +216,7 @@ class FilterReader:
         Edges use the same scale.
         """
         if inputs.value("invert", "invertblockers", "invert_blockers"):
-            self._report.missing("inverted light doors (as they are)", inputs.prim.GetPath())
+            self._report.missing("inverted light doors (not inverted)", inputs.prim.GetPath())
         away, size = self._cone(inputs, light)
         sides = []
         for flap, (x, y) in _FLAPS.items():

@@ -65,7 +65,7 @@ def parse_ies(text: str) -> IesProfile:
     rows, columns = _count(numbers, "vertical angles"), _count(numbers, "horizontal angles")
     kind = _TYPES.get(int(_take(numbers, 1, "head")[0]))
     if kind is None:
-        raise IesError("its photometric type is none of 1, 2 and 3")
+        raise IesError("its photometric type is not 1, 2 or 3")
     _, _, _, _, ballast, lamp, _ = _take(numbers, 7, "head")
     if rows * columns > _MOST_VALUES:
         raise IesError(f"it says that it has {rows} x {columns} values")
@@ -92,7 +92,7 @@ def _numbers(text: str) -> Iterator[float]:
         try:
             yield float(word)
         except ValueError:
-            raise IesError(f"{word[:20]!r} is no number") from None
+            raise IesError(f"{word[:20]!r} is not a number") from None
 
 
 def _take(numbers: Iterator[float], n: int, what: str) -> Floats:

@@ -58,7 +58,7 @@ class MeshLights:
             return None
         path = draw.prim.GetPath()
         if kind not in ("mesh", "patch", "shape"):
-            self._report.missing(f"{kind} as lights (they shine by their material alone)", path)
+            self._report.missing(f"{kind} as lights (only their materials emit)", path)
             return None
         sync = word(draw.prim.GetAttribute("light:materialSyncMode").Get(), NO_RESPONSE)
         if sync not in SYNC_MODES:
@@ -77,7 +77,7 @@ class MeshLights:
 
     def say_moving(self, path: Sdf.Path) -> None:
         """Reports features that do not work for a moving light that only light sampling finds."""
-        what = "shadows of their own and the sync mode independent of moving mesh lights"
+        what = "shadow settings and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)
 
     def _lamp(self, hidden: bool) -> int:

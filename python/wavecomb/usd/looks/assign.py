@@ -189,7 +189,7 @@ class Assigner:
         if isinstance(mesh, MeshArrays):
             what = "hair on a mesh (as tubes along its texture's u)"
         elif mesh.kind.endswith("ribbon"):
-            what = "hair on ribbons (each point as of a round fibre)"
+            what = "hair on ribbons (shaded as round fibres)"
         else:
             return
         self.report.missing(what, draw.prim.GetPath())
@@ -205,7 +205,7 @@ class Assigner:
             index = as_integers(subset.GetAttribute("indices").Get(self.time), np.int64)
             inside = (index >= 0) & (index < topology.face_count)
             if not inside.all():
-                self.report.warn("subset names faces that are not there", subset.GetPath())
+                self.report.warn("subset refers to faces that do not exist", subset.GetPath())
                 index = index[inside]
             surface = self._surface(draw, material)
             shown = self._display(primvars, None) if surface.stand_in else None

@@ -347,7 +347,8 @@ class MaterialTable:
         elif not material.GetSurfaceOutputs():
             self._report.warn(f"material without a surface: {_INSTEAD}", prim.GetPath())
         else:
-            self._report.warn(f"material whose surface leads nowhere: {_INSTEAD}", prim.GetPath())
+            what = f"material whose surface output is not connected: {_INSTEAD}"
+            self._report.warn(what, prim.GetPath())
         return _stand_in(prim)
 
 

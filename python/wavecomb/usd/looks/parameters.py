@@ -39,7 +39,7 @@ from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
-IN_INSTANCE = "it is inside an instance, where USD takes no opinions"
+IN_INSTANCE = "it is inside an instance, where USD does not accept opinions"
 
 
 @dataclass(frozen=True)

@@ -375,7 +375,7 @@ class PreviewReader:
                 self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
                 self._note_uv("st", parameter)
                 return matrix
-        self.report.warn("texture coordinates that run in a circle", self.material.GetPath())
+        self.report.warn("texture coordinates with a cyclic connection", self.material.GetPath())
         return (0.0,) * 6
 
     def _note_uv(self, name: str, parameter: str) -> None:

@@ -76,6 +76,6 @@ class RenderChoice:
         if x0 >= x1 or y0 >= y1:
             raise WavecombError(
                 f"{self.product or self.settings}: dataWindowNDC holds no pixel of the picture; "
-                "mend it or give --region"
+                "fix it or give --region"
             )
         return None if (x0, y0, x1, y1) == (0, 0, width, height) else (x0, y0, x1, y1)

@@ -30,7 +30,7 @@ def plain(text: str) -> str:
 _FORMS = (
     (
         re.compile(r"Found material bindings on prim at path \((\S+)\) but MaterialBindingAPI"),
-        "material binding without MaterialBindingAPI applied (used all the same)",
+        "material binding without MaterialBindingAPI applied (used anyway)",
     ),
     (re.compile(r"Could not open asset @([^@]*)@"), "cannot open layer"),
     (re.compile(r"^In <([^>]*)>: (.*)$"), ""),

@@ -278,7 +278,7 @@ class _Load:
         if c.options.strand_pixels <= 0:
             return None
         if view is None:
-            what = "strands are not thinned out: there is no camera to say how thin they are"
+            what = "strands are not thinned out: their width in pixels is unknown without a camera"
             c.report.note(what)
             return None
         return StrandDetail(ViewSize(view, c.options.size), c.options.strand_pixels, c.report)
@@ -316,7 +316,7 @@ class _Load:
             if place.steps is not None:
                 options["motion"] = np.ascontiguousarray(place.steps)
                 if changes_size(place.steps):
-                    what = "lights that change their size: as large as in mid-shutter"
+                    what = "lights that change their size (constant, as at mid-shutter)"
                     c.report.missing(what, options["name"])
             if "portals" in options:
                 options["portals"] = options["portals"] @ transform
@@ -329,7 +329,7 @@ class _Load:
             c.report.note("no visible light; the scene is lit by emissive materials or not at all")
             return ()
         if self._materials.glows:
-            what = "no light but emissive materials that light too little: added a soft dome"
+            what = "no light except emissive materials that are too dim: added a soft dome"
             c.report.note(f"{what} (a light of intensity 0 keeps it off)")
         else:
             c.report.note("no light: added a soft dome")

@@ -117,10 +117,10 @@ _COARSE = 1e-3
 
 STORED = (
     "points are stored too far from the prim's own origin: their single precision is coarser than "
-    "a thousandth of what they make; store them nearer and move the prim by a transform"
+    "a thousandth of the shape; store them nearer and move the prim by a transform"
 )
 INSTANCED = (
-    "shapes are too far from the origin of what is instanced: single precision there is coarser "
+    "shapes are too far from the origin of their prototype: single precision there is coarser "
     "than a thousandth of them; move the instances instead"
 )
 POSITIONS = (

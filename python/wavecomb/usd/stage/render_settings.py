@@ -125,7 +125,7 @@ def _read(
             got = attribute.Get()
             if good(got):
                 return got
-            report.warn(f"{name} of render settings is no good: left out", prim.GetPath())
+            report.warn(f"{name} of render settings is invalid: left out", prim.GetPath())
         return None
 
     resolution = value("resolution", _is_size)

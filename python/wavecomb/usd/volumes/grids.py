@@ -156,7 +156,7 @@ class GridTable:
         found = vdb.read(field.file, head, background_is_zero=is_dark, whole=not is_dark)
         named = f"{field.file}: grid {head.name!r}"
         if found.not_finite:
-            numbers = f"{found.not_finite:,} numbers that are infinite or none"
+            numbers = f"{found.not_finite:,} values that are infinite or NaN"
             raise WavecombError(f"{named} has {numbers}: clean it where it was made")
         if found.box is None or not len(found.origins):
             self._report.note(f"empty grid {head.name!r}: left out", field.prim)
@@ -174,7 +174,7 @@ class GridTable:
             self._report.missing("numbers as velocity (left out)", field.prim)
             return None
         if use == "velocity" and found.kind == "staggered":
-            what = f"staggered grid {head.name!r}: taken for one of the middles of its voxels"
+            what = f"staggered grid {head.name!r}: treated as values at voxel centres"
             self._report.note(what, field.prim)
         self._check_sign(found, named, use, field)
         if use == "colour" and found.greatest > 1:
@@ -213,7 +213,7 @@ class GridTable:
             return min(max(found.background[0], 0.0), 1.0) if same else 0.0
         if any(found.background):
             values = " ".join(f"{value:g}" for value in found.background)
-            what = f"grid {head.name!r} of background {values}: 0 outside of what is active"
+            what = f"grid {head.name!r} of background {values}: 0 outside of active voxels"
             self._report.note(what, field.prim)
         return 0.0
 

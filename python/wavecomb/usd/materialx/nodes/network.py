@@ -155,7 +155,7 @@ class Networks:
         if key in self._done:
             return self._done[key]
         if key in self._path or len(self._path) > MAX_DEPTH:
-            what = "shading network that runs in a circle or is too deep (cut there)"
+            what = "shading network that is cyclic or too deep (cut there)"
             self.report.warn(what, shader.GetPath())
             return None
         most = MAX_NODES // 10 if self._instances.are_there else MAX_NODES
