@@ -265,7 +265,7 @@ class LoadOptions:
         """Returns options with some values replaced, converted from Python callers' types.
 
         Raises:
-            TypeError: There is no such option.
+            TypeError: An option does not exist.
         """
         known = {one.name for one in fields(cls)}
         unknown = [name for name in changes if name not in known]

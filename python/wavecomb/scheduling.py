@@ -17,11 +17,12 @@ COLUMNS = ("throughput", "position_key", "texture_key")
 
 
 class SchedulingPolicy:
-    """Defines the order in which the hits of a queue are shaded. Subclass it and pass an object.
+    """Base of policies, which define the order in which the hits of a queue are shaded.
 
-    ``order`` receives ids, keys and estimated costs, and writes one 64-bit key per record. Records
-    are shaded in ascending key order, with equal keys in order of arrival. No policy can change the
-    image; docs/writing-a-policy.md has an example.
+    Pass an object of a subclass to ``wavecomb.render``. ``order`` receives ids, keys and estimated
+    costs, and writes one 64-bit key per record. Records are shaded in ascending key order, with
+    equal keys in order of arrival. No policy can change the image; docs/writing-a-policy.md has an
+    example.
 
     Attributes:
         name: Name in statistics.

@@ -28,7 +28,7 @@ _CONTROL = re.compile(
 
 
 def clean(text: str) -> str:
-    r"""Text with its control characters as escapes, but for tabs and newlines.
+    r"""Escapes the control characters of a text except tabs and newlines.
 
     >>> clean("a\x1b[31mb"), clean("a\udcffb"), clean("\u202egpj.exe")
     ('a\\x1b[31mb', 'a\\xffb', '\\u202egpj.exe')

@@ -130,7 +130,7 @@ def _transform(matrix: NDArray[np.float64]) -> bytes:
 
 
 class _Output:
-    """Encodes values of nodes in the form of a file."""
+    """Encoder of node values in the form of a file."""
 
     def __init__(self, is_half: bool) -> None:
         self._dtype = "<f2" if is_half else "<f4"

@@ -67,13 +67,13 @@ def heat_map(
 ) -> NDArray[np.float32]:
     """Shows differences of image A to the reference B as colours, with title and colour bar.
 
-    - "absolute": of luminance, on a logarithmic scale from the largest down over four decades;
-      smaller ones have the darkest colour.
-    - "signed": of luminance, the same scale to both sides: orange where A is brighter, blue where
-      it is darker, black from four decades below the largest.
-    - "flip-ldr", "flip-hdr": FLIP from 0 to 1; ``perceptual.flip`` says what it is.
+    - "absolute" shows differences of luminance on a logarithmic scale. It covers four decades
+      below the largest difference; smaller differences have the darkest colour.
+    - "signed" applies this scale to both signs: A is brighter in orange pixels and darker in blue
+      ones. Differences below the four decades are black.
+    - "flip-ldr" and "flip-hdr" show FLIP from 0 to 1; see ``perceptual.flip``.
 
-    Equal pixels are black, pixels with a NaN or an infinity are cyan.
+    Equal pixels are black; pixels with a NaN or an infinity are cyan.
 
     Returns:
         Linear Rec.709, (height + bar, width, 3), at least ``LEAST_WIDTH`` wide.

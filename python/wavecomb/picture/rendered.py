@@ -112,11 +112,11 @@ class Picture:
     def with_denoised(self, *, threads: int = 0) -> Picture:
         """Returns the image with the layer ``denoised`` (Open Image Denoise); beauty is unchanged.
 
-        Guided by the AOVs guide_albedo and guide_normal, which see through mirrors and clear glass,
-        or else by albedo and normal.
+        The AOVs guide_albedo and guide_normal guide the denoiser, or albedo and normal if the image
+        lacks them. The former describe the surfaces that mirrors and clear glass show.
 
         Raises:
-            WavecombError: The extra ``denoise`` is missing; says how to install it.
+            WavecombError: The extra ``denoise`` or an AOV is missing.
         """
         from wavecomb.errors import WavecombError
         from wavecomb.picture.denoise import denoise

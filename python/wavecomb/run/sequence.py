@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Frames:
-    """Reads and renders frames of a stage; each is bit-identical to a separate render.
+    """Frames of an open stage; each image is bit-identical to that of a separate render.
 
     If only views change, keeps the scene with its acceleration structures and reads the camera.
     Otherwise traverses the stage again, but reuses unchanged meshes and textures of the previous

@@ -85,7 +85,7 @@ def uniform_scale(matrix: Gf.Matrix4d) -> float | None:
 
 
 class CurveReader:
-    """Reads the curves of one stage."""
+    """Reader of the curves of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time

@@ -40,7 +40,7 @@ COUNTS = {
 
 
 class GprimReader:
-    """Reads the gprims of one stage at one time."""
+    """Reader of the gprims of one stage at one time."""
 
     def __init__(
         self,

@@ -74,7 +74,7 @@ _NORMALS = ("primvars:normals", "normals")
 
 
 class MeshReader:
-    """Reads the meshes and implicit shapes of one stage."""
+    """Reader of the meshes and implicit shapes of one stage."""
 
     def __init__(
         self,
@@ -345,7 +345,7 @@ class MeshReader:
     ) -> Primvar | None:
         """Returns the primvar for texture coordinates.
 
-        All (0, 0) if a named primvar does not exist.
+        If the materials name primvars and the mesh has no coordinates at all, they are (0, 0).
         """
         try:
             primvar = first_primvar(prim, names, inherited, self.time)

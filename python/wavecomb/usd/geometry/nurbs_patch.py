@@ -80,7 +80,7 @@ def _axis(spline: Spline, closed: bool, parts: int) -> _Axis:
 
 
 class PatchReader:
-    """Reads the NURBS patches of one stage."""
+    """Reader of the NURBS patches of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time

@@ -142,10 +142,7 @@ class Motion:
         return self.fitting(sorted(inside), least)
 
     def fitting(self, samples: Sequence[float], least: int = 2) -> list[float]:
-        """Returns the fewest step times that include all ``samples``.
-
-        8 steps if no smaller number does.
-        """
+        """Returns the fewest step times that include all ``samples``; 8 if fewer do not suffice."""
         if self._steps is not None:
             return self.times(self._steps)
         share = (np.asarray(samples, np.float64) - self.open) / (self.close - self.open)

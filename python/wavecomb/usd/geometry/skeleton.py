@@ -16,7 +16,7 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number
 
 if TYPE_CHECKING:
-    from pxr import UsdSkel  # 8 ms, where there is a skeleton only
+    from pxr import UsdSkel  # takes 8 ms; functions import it for stages with skeletons
 
     from wavecomb.usd.geometry.shutter import Track
 

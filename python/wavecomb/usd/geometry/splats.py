@@ -56,7 +56,7 @@ class SplatArrays(CurveArrays):
 
 
 class SplatReader:
-    """Reads the Gaussian splats of one stage."""
+    """Reader of the Gaussian splats of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time
@@ -170,7 +170,7 @@ def _plain(values: NDArray[Any]) -> Array:
 
 
 class PointReader:
-    """Reads the points of one stage."""
+    """Reader of the points of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time

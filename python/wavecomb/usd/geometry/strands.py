@@ -325,7 +325,7 @@ LEAST_SHARE = 1.0 / 256.0
 
 
 class StrandDetail:
-    """Simplifies thin strands for one view.
+    """Simplification of thin strands for one view.
 
     Strands narrower than ``pixels`` are kept with a probability equal to width / ``pixels`` and
     widened by its inverse, which preserves coverage (stochastic simplification, Cook, Halstead,

@@ -167,7 +167,7 @@ def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
 
 
 class Drivers:
-    """Collects the values that drive the parameters of one surface."""
+    """The values that drive the parameters of one surface."""
 
     def __init__(self, networks: Networks) -> None:
         self.networks = networks
@@ -239,7 +239,7 @@ class Drivers:
     def graph(self) -> SurfaceGraph | None:
         """Returns the graph of parameters without constants or textures; None if there are none.
 
-        Where a graph is too large, parameters are left out of it, the last one first, and said.
+        If the graph is too large, reports and leaves out parameters, the last one first.
         """
         left = dict(self._outputs)
         while left:

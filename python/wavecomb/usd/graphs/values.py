@@ -157,7 +157,7 @@ def assemble(outputs: dict[int, Part]) -> Graph:
 
 
 class _Assembler:
-    """Assigns registers to nodes and writes operations."""
+    """Compiler state: the registers of nodes, and the operations written so far."""
 
     def __init__(self, outputs: dict[int, Part]) -> None:
         self._outputs = outputs
@@ -273,7 +273,7 @@ _POINTS = {"noise2": 2, "noise3": 3, "fractal3": 3, "cell2": 2, "cell3": 3, "wor
 
 
 class Expressions:
-    """Creates nodes, each only once, and folds constants."""
+    """Factory of nodes that creates equal nodes only once and folds constants."""
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[Any, ...], Node] = {}
@@ -302,9 +302,9 @@ class Expressions:
         return self.op(node.code, *operands, number=node.number, width=node.width)
 
     def attribute(self, name: str, width: int, fallback: Value) -> Value:
-        """Returns a primvar read at hits.
+        """Returns a primvar that is read at hits.
 
-        ``fallback`` if the mesh has none with enough components.
+        Its value is ``fallback`` on a mesh without such a primvar or with fewer components.
         """
         return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 

@@ -29,10 +29,10 @@ Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.
 
 
 class DomeReader:
-    """Reads the dome lights of one stage."""
+    """Reader of the dome lights of one stage."""
 
     def __init__(self, context: LoadContext, textures: TextureTable | None) -> None:
-        """``textures`` None skips images."""
+        """Creates a reader; images are not read if ``textures`` is None."""
         self.time, self.report = context.time, context.report
         self.up_axis = context.up_axis
         self.textures = textures
@@ -76,9 +76,9 @@ class DomeReader:
         return form
 
     def portals(self, prim: Usd.Prim, local: Matrices) -> Matrices | None:
-        """Returns transforms (k, 4, 4) from the unit square to dome space, one per portal, or None.
+        """Returns the transforms (k, 4, 4) from the unit square to dome space, one per portal.
 
-        ``local``: From ``pole``. None: there are none.
+        Returns None if the light has no valid portal. ``local`` is the result of ``pole``.
         """
         relation = prim.GetRelationship("portals")
         found = []

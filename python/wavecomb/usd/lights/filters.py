@@ -81,7 +81,7 @@ def add_filters(
 
 
 class FilterReader:
-    """Reads the light filters of one stage."""
+    """Reader of the light filters of one stage."""
 
     def __init__(self, context: LoadContext, textures: TextureTable | None) -> None:
         self._time, self._report = context.time, context.report
@@ -162,7 +162,7 @@ class FilterReader:
     def _doors(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
         """Reads Arnold barn doors over the square around a spot light's cone.
 
-        0 is left or top, 1 opposite.
+        Door positions are 0 at the left or top edge of the square and 1 at the opposite edge.
         """
         away, size = self._cone(inputs, light)
         usual = {"top": 0.0, "left": 0.0, "bottom": 1.0, "right": 1.0}

@@ -201,7 +201,7 @@ def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) 
 
 
 class IesTable:
-    """Adds IES profiles to the scene, each file once."""
+    """The IES profiles of a scene; each file is added once."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder, self._report = context.builder, context.report

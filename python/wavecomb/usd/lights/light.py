@@ -90,7 +90,7 @@ def blackbody(kelvin: float) -> tuple[float, float, float]:
 
 
 class LightReader:
-    """Reads the lights of one stage."""
+    """Reader of the lights of one stage."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class LightReader:
         profiles: Profiles | None = None,
         links: LinkTable | None = None,
     ) -> None:
-        """None for ``textures``, ``profiles`` or ``links`` reads lights without them."""
+        """Creates a reader; None for ``textures``, ``profiles`` or ``links`` skips that kind."""
         self.time, self.report = context.time, context.report
         self.hidden = context.hides_lights
         self.textures = textures
@@ -308,7 +308,7 @@ class LightReader:
 
 
 class LinkTable:
-    """Adds sets of linked geometry to the scene and merges equal ones."""
+    """The sets of linked geometry of a scene; equal sets are merged."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder = context.builder
@@ -316,10 +316,7 @@ class LinkTable:
         self._known: dict[tuple[tuple[str, str], ...], int] = {}
 
     def set_of(self, prim: Usd.Prim, name: str) -> int | None:
-        """Returns the geometry set of a light's lightLink or shadowLink.
-
-        Returns None means all geometry.
-        """
+        """Returns the geometry set of a light's lightLink or shadowLink; None for all geometry."""
         rules = self._collections.rules(prim, name)
         return None if rules is None else self._set(rules)
 

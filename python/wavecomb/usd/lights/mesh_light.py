@@ -37,7 +37,7 @@ class MeshLight:
 
 
 class MeshLights:
-    """Adds the mesh lights of one stage.
+    """The mesh lights of one stage, which it adds to the scene.
 
     Attributes:
         any: Whether there is a mesh light.

@@ -86,7 +86,7 @@ class Worn:
 
 
 class Assigner:
-    """Assigns materials to gprims and collects the primvars that they read."""
+    """Assignment of materials to gprims, with the primvars that the materials read."""
 
     def __init__(self, context: LoadContext, table: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
@@ -312,7 +312,7 @@ def is_alike(surface: Surface) -> bool:
 
 
 class _Primvars:
-    """Finds each primvar of a gprim once and reports invalid ones."""
+    """The primvars of a gprim; each is read once, and invalid ones are reported."""
 
     def __init__(
         self, draw: Draw, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport

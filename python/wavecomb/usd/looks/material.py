@@ -93,7 +93,7 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
 
 
 class BindingScan:
-    """Finds bindings on a prim or its ancestors that affect prims inside an instance."""
+    """Search for bindings on a prim or its ancestors that affect prims inside an instance."""
 
     def __init__(self) -> None:
         self._cache: dict[Sdf.Path, tuple[bool, bool]] = {}
@@ -121,7 +121,7 @@ class BindingScan:
 
 
 class MaterialTable:
-    """Adds materials to the scene and merges equal ones."""
+    """The materials of a scene; equal materials are merged."""
 
     def __init__(self, context: LoadContext, textures: TextureTable, apart: bool = False) -> None:
         """``apart`` keeps materials of different prims separate even if they are equal."""

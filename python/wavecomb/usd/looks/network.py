@@ -219,7 +219,7 @@ def shader_name(shader: UsdShade.Shader) -> str:
 
 
 class InputValues:
-    """Reads inputs that have one value per object, such as the scale of a texture.
+    """Reader of inputs that have one value per object, such as the scale of a texture.
 
     Resolves values through node graphs, interfaces, primvar readers and constant nodes.
 

@@ -89,7 +89,7 @@ def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Paramet
 
 
 class _Tracer:
-    """Finds the attributes behind the inputs of one surface shader."""
+    """Search for the attributes behind the inputs of one surface shader."""
 
     def __init__(self, prim: Usd.Prim, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
         self._prim = prim
@@ -218,7 +218,7 @@ def _is_triple(type_name: Sdf.ValueTypeName) -> bool:
 
 
 class _AnyProfile:
-    """Replaces the table of IES profiles and accepts every profile."""
+    """Substitute for the table of IES profiles that accepts every profile."""
 
     def add(self, path: str, prim: Sdf.Path) -> int:
         """Returns a dummy profile id."""

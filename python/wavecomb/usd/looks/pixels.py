@@ -203,7 +203,7 @@ def _encoded(spec: Any) -> bool | None:
 def _read_file(
     path: str, stamp: Stamp | None, header_only: bool = False, called: str | None = None
 ) -> Image:
-    """``called`` is the name of the file in messages."""
+    """Reads an image file; ``called`` is its name in messages."""
     # Imported only when an image is read, since loading the library takes 30 MB.
     import OpenImageIO as oiio
 
@@ -309,7 +309,7 @@ def is_finite(pixels: NDArray[Any]) -> bool:
 
 
 class ReadAhead:
-    """Reads images before they are needed.
+    """Queue that reads images before they are needed.
 
     Contract: used by one thread. At most ``threads`` + 1 images are ready or being read, which
     bounds memory. An image that is requested but not being read yet is read at once.

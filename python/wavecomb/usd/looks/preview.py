@@ -87,7 +87,7 @@ def constant(parameter: str, value: Any, default: Any) -> Any:
 
 
 class PreviewReader:
-    """Reads one UsdPreviewSurface network."""
+    """Reader of one UsdPreviewSurface network."""
 
     def __init__(
         self,

@@ -18,7 +18,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 class _NoTextures:
-    """Replaces the scene's textures: every file exists and none is opened."""
+    """Substitute for the scene's textures: every file exists and none is opened."""
 
     working = "rec709"
 

@@ -128,7 +128,7 @@ def texture_store(
 
 
 class TextureTable:
-    """Adds textures to the scene and merges equal ones."""
+    """The textures of a scene; equal textures are merged."""
 
     def __init__(
         self,

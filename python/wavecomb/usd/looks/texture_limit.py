@@ -114,7 +114,7 @@ class _Plan(TextureTable):
 
 
 class _NoBuilder:
-    """Assigns ids but creates no textures."""
+    """Substitute for the scene builder that assigns ids but creates no textures."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -209,9 +209,9 @@ def _note_materials(context: LoadContext, plan: _Plan, view: ViewSize) -> None:
 
 
 def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Yields visible prims.
+    """Yields active, defined prims, and the prototypes of point instancers once.
 
-    Those in instances once per instance, up to a multiple of ``MAX_PRIMS``.
+    Includes prims in native instances once per instance. Ends after ``4 * MAX_PRIMS`` prims.
     """
     proxies = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     seen: set[Any] = set()

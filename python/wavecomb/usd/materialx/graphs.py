@@ -61,7 +61,7 @@ def is_closed(graph: Any) -> bool:
 
 
 class Graphs:
-    """Writes node graphs, each only once."""
+    """Writer of node graphs; each is written once."""
 
     def __init__(self, document: Document, prims: Prims) -> None:
         self._document = document

@@ -43,7 +43,7 @@ def write_looks(document: Document, layer: Sdf.Layer, tell: Tell) -> None:
 
 
 class _Looks:
-    """Writes collections and looks, each only once."""
+    """Writer of collections and looks; each is written once."""
 
     def __init__(self, root: Any, stage: Usd.Stage, tell: Tell) -> None:
         self._root = root
@@ -205,7 +205,7 @@ SHADERS = Sdf.Path("/MaterialX/Shaders")
 
 
 class Materials:
-    """Writes materials.
+    """Writer of materials.
 
     Shader inputs become inputs of the material, so that stronger layers can change them. Sources of
     a shader are referenced below the material. Shaders are in ``SHADERS``.

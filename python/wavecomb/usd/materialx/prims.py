@@ -38,7 +38,7 @@ def child(path: Sdf.Path, name: str) -> Sdf.Path:
 
 
 class Prims:
-    """Writes prims into a layer.
+    """Writer of prims into a layer.
 
     Attributes:
         layer: The layer.

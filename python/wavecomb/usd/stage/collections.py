@@ -23,7 +23,7 @@ _RULES = {
 
 
 class Collections:
-    """Reads collections of a stage as rules for paths."""
+    """Reader of a stage's collections as rules for paths."""
 
     def __init__(self, report: LoadReport) -> None:
         self._report = report

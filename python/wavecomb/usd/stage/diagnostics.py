@@ -138,7 +138,7 @@ def _pass_on(trap: Any, report: LoadReport) -> None:
 
 
 class Listening:
-    """Captures messages that USD's C++ code emits on this thread while the program runs.
+    """Capture of messages that USD's C++ code emits on this thread while the program runs.
 
     Does nothing with USD versions that have no ``Tf.DiagnosticTrap``.
     """

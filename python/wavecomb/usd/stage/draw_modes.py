@@ -50,7 +50,7 @@ class StandIn:
 
 
 class DrawModes:
-    """Creates stand-ins for the models of one stage."""
+    """Factory of stand-ins for the models of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self._time = time

@@ -49,7 +49,7 @@ MAX_NESTING = 100
 
 
 class GroupBuilder:
-    """Converts prims to groups of the scene."""
+    """Builder of the scene's groups from prims."""
 
     def __init__(
         self,

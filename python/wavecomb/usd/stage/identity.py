@@ -85,7 +85,7 @@ def _is_asset(prim: Usd.Prim) -> bool:
 
 
 class Assets:
-    """Finds the asset that contains a prim: its nearest ancestor of kind component."""
+    """The assets that contain prims: their nearest ancestors of kind component."""
 
     def __init__(self) -> None:
         self._known: dict[Sdf.Path, int] = {Sdf.Path.absoluteRootPath: 0}

@@ -55,7 +55,7 @@ def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int
 
 
 class InstanceMaterials:
-    """Finds the materials of native instances and of point instancers."""
+    """The materials of native instances and of point instancers."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
@@ -155,7 +155,7 @@ PLAIN = Look()
 
 
 class InstanceLooks:
-    """Finds the materials and primvars that instances pass to their prototypes."""
+    """The materials and primvars that instances pass to their prototypes."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
         self._time, self._report = context.time, context.report

@@ -165,7 +165,7 @@ def _opened(source: str | Path | Usd.Stage, options: LoadOptions) -> Usd.Stage:
 
 
 class _Load:
-    """Reads one stage into a scene builder.
+    """One load of a stage into a scene builder.
 
     Attributes:
         textures: Textures of the scene.

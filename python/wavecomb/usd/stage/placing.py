@@ -23,7 +23,7 @@ from wavecomb.usd.stage.instancing import sound
 
 
 class GroupPlacer:
-    """Creates groups in the scene and instances them."""
+    """Factory of the scene's groups that also instances them."""
 
     def __init__(self, context: LoadContext, mesh_lights: MeshLights) -> None:
         self.builder, self.report = context.builder, context.report
@@ -60,7 +60,7 @@ class GroupPlacer:
     ) -> None:
         """Adds k instances of a group, from k prims or from numbered instances of one instancer.
 
-        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
+        ``motion`` holds (k, s, 4, 4) transforms at equal steps over the shutter.
         """
         usable = sound(transforms)
         if motion is not None:

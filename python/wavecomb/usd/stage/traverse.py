@@ -82,7 +82,7 @@ class Gathered:
 
 
 class Traversal:
-    """Collects the prims to render, one group at a time."""
+    """Traversal that collects the prims to render, one group at a time."""
 
     def __init__(self, context: LoadContext, lights: LightReader, rays: RayVisibility) -> None:
         """``rays`` reads prims that author ray visibility."""
@@ -176,7 +176,7 @@ class Traversal:
                 listed = tuple(prim.GetAuthoredPropertyNames())
                 names = self._names.get(listed) or self._names.setdefault(
                     listed, frozenset(listed)
-                )  # most prims share theirs
+                )  # most prims share a set of names
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"

@@ -71,7 +71,10 @@ def seen_on(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> Seen:
 
 
 def _blur(options: LoadOptions, wanted: bool) -> Blur:
-    """``wanted`` is the render settings' value; a given shutter also enables motion blur."""
+    """Returns the motion blur options; a given shutter enables blur.
+
+    ``wanted`` says whether the render settings enable it.
+    """
     blurs = options.motion_blur
     if blurs is None:
         blurs = wanted or options.shutter is not None

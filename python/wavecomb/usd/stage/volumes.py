@@ -20,7 +20,7 @@ MAX_VOLUMES = 4096
 
 
 class VolumePlacer:
-    """Reads volumes into groups."""
+    """Reader of volumes that adds them to groups."""
 
     def __init__(self, context: LoadContext) -> None:
         self._reader = VolumeReader(context)

@@ -50,7 +50,7 @@ class Grid:
 
 
 class GridTable:
-    """Reads the volume grids of one scene."""
+    """Reader of the volume grids of one scene."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder, self._report = context.builder, context.report

@@ -58,7 +58,7 @@ class Medium:
 
 
 class ClosureReader:
-    """Reads the MaterialX volume shader of one material."""
+    """Reader of the MaterialX volume shader of one material."""
 
     def __init__(self, inputs: Inputs, metres_per_unit: float) -> None:
         self._inputs = inputs
@@ -267,7 +267,7 @@ _READERS = {
 
 
 class Inputs:
-    """Reads inputs of the shaders of one material."""
+    """Reader of the inputs of one material's shaders."""
 
     def __init__(self, material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> None:
         self.material = material

@@ -45,7 +45,7 @@ class Volume:
 
 
 class VolumeReader:
-    """Reads the volumes of one stage.
+    """Reader of the volumes of one stage.
 
     Attributes:
         glow: Whether a volume may light the scene by its emission.
@@ -168,7 +168,7 @@ class Velocity:
 
 
 class VelocityReader:
-    """Finds the velocity grids of the volumes of one stage."""
+    """Reader of the velocity grids of the volumes of one stage."""
 
     def __init__(self, context: LoadContext) -> None:
         per_second, motion = context.stage.GetTimeCodesPerSecond(), context.motion

@@ -50,7 +50,7 @@ def _cubic(m: Expressions, x: Value, factors: tuple[float, ...]) -> Value:
 
 @_node("blackbody")
 def _blackbody(n: NodeCall) -> Value:
-    """Black-body colour at luminance 1.
+    """Returns the colour of a black body at luminance 1.
 
     Source: Kang et al. 2002, "Design of Advanced Color Temperature Control System".
     """
@@ -89,7 +89,7 @@ def _blend(formula: Formula, width: int = 0) -> Handler:
 
 
 def _layered(formula: Formula) -> Handler:
-    """Compositing of premultiplied colours by Porter and Duff 1984."""
+    """Returns a handler that composites premultiplied colours (Porter and Duff 1984)."""
     return _blend(formula, 4)
 
 
@@ -165,7 +165,7 @@ def _from_color(n: NodeCall) -> Value:
 
 @_node("deon_hair_absorption_from_melanin")
 def _from_melanin(n: NodeCall) -> Value:
-    """Hair absorption from melanin.
+    """Computes hair absorption from melanin.
 
     Source: E. d'Eon et al., "An Energy-Conserving Hair Reflectance Model", 2011.
     """

@@ -101,7 +101,7 @@ class _TooManyNodes(Exception):
 
 
 class Networks:
-    """Compiles the networks of one material to values, each node only once."""
+    """Compiler of the networks of one material to values; each node is compiled once."""
 
     def __init__(
         self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
@@ -295,7 +295,7 @@ Compile = Callable[[UsdShade.Shader, str, str], Value | None]
 
 
 class InstancedGraphs:
-    """Resolves connections in a material that contains instanced node graphs.
+    """Resolver of connections in a material that contains instanced node graphs.
 
     A short document can nest graphs so deeply that there are many more paths than graphs. Instances
     of a prototype whose inputs have the same sources have the same value, which is compiled once.

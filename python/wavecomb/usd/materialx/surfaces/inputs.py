@@ -23,7 +23,7 @@ _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness"
 
 
 class _ReadInputs(LayerInputs):
-    """Records which inputs are read; the value 1 makes ``layers_of`` read all of them."""
+    """Record of the inputs that are read; the value 1 makes ``layers_of`` read all of them."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
