@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sequences of ``wavecomb render``: --frames and --skip-existing."""
+"""Frame sequences of ``wavecomb render``, with --frames and --skip-existing."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 frame_options = add_options(
     option(
         "--frames RANGE", "text",
-        "Frames: 1-48, 1-48x2, 1,5,9. Names of files say where the frame goes: "
+        "Frames to render, such as 1-48, 1-48x2 or 1,5,9. File names need a placeholder: "
         "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
     ),
-    option("--skip-existing", "flag", "With --frames: leave frames out whose files are there."),
+    option("--skip-existing", "flag", "With --frames: skip frames whose files exist."),
 )  # fmt: skip
-"""--frames and --skip-existing."""
+"""Options --frames and --skip-existing."""
 
 
 def check_frames(
     text: str | None, skip: bool, source: StageOptions, names: Names, purpose: PurposeOptions
 ) -> tuple[float, ...] | None:
-    """The frames; None where no sequence is asked for. Raises WavecombError."""
+    """Returns the frames of a sequence, or None for a single image. Raises WavecombError."""
     if text is None:
         if skip:
             raise WavecombError("--skip-existing is for sequences: give --frames, too")
@@ -75,11 +75,12 @@ def render_sequence(
     purpose: PurposeOptions,
     skip: bool,
 ) -> tuple[Done | None, list[str]]:
-    """Renders frames one after another; what came of the last, and all files that were written.
+    """Renders frames one after another.
 
-    Raises:
-        WavecombError: A frame failed; it is named, and those before it are written.
-        click.exceptions.Exit: Somebody stopped it; whole frames are written.
+    Returns: The result of the last frame, and all files that were written.
+
+    Raises: WavecombError: A frame failed. The message names it; earlier frames are written.
+    click.exceptions.Exit: The user stopped the render; completed frames are written.
     """
     wanted = list(frames)
     if skip:
@@ -124,7 +125,7 @@ def render_sequence(
 
 
 def open_frames(job: Job, source: StageOptions) -> Frames:
-    """The stage of a job, to be read at several frames or through several cameras."""
+    """Opens the stage of a job for rendering several frames or cameras."""
     from wavecomb.api import import_usd
 
     import_usd()

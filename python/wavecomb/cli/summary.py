@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ``wavecomb render`` says at the end."""
+"""Summary that ``wavecomb render`` prints at the end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadReport
 
 MOST_MATERIALS = 6
-"""Rows of the table of materials; the statistics file has all."""
+"""Rows of the table of materials. The statistics file has all materials."""
 
 MOST_DEPTHS = 8
 MOST_LIGHTS = 5
@@ -54,7 +54,7 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
 
 
 def _memory(parts: Mapping[str, int]) -> str:
-    """What the peak holds: arrays of the render, and Embree's hierarchy."""
+    """Returns the sizes of the render's arrays and of Embree's BVH, in MB, or ""."""
     arrays = sum(parts.values()) - parts["accelerator"]
     if not arrays:
         return ""
@@ -62,7 +62,7 @@ def _memory(parts: Mapping[str, int]) -> str:
 
 
 def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
-    """Lines about adaptive, timed and resumed renders."""
+    """Returns lines about adaptive, timed, resumed and guided renders."""
     from wavecomb.run.progress import count_text, time_text
     from wavecomb.run.stats import rendered_pixels
 
@@ -113,7 +113,7 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
 
 
 def _transport_line(chosen: Mapping[str, Any]) -> str:
-    """What ``--transport auto`` chose, and why."""
+    """Returns a line with the choice of ``--transport auto`` and its reason."""
     line = f"transport {chosen['chosen']}"
     if chosen["chosen"] == "light":
         line += f", {chosen['light_paths']:g} light paths for each camera path"
@@ -125,7 +125,7 @@ def _transport_line(chosen: Mapping[str, Any]) -> str:
 
 
 def _aiming_line(aiming: Mapping[str, Any]) -> str:
-    """Where paths from lights went."""
+    """Returns a line about the targets of light paths."""
     from wavecomb.run.progress import count_text, time_text
 
     found = f"{aiming['targets']} places" if aiming["targets"] else "nothing, which brought light"
@@ -136,7 +136,7 @@ def _aiming_line(aiming: Mapping[str, Any]) -> str:
 
 
 def light_line(calibration: Mapping[str, Any]) -> str | None:
-    """The lights that are chosen most often, by ``light_calibration`` of the statistics."""
+    """Returns a line with the most frequently sampled lights, from ``light_calibration``."""
     from wavecomb.run.progress import count_text
 
     if not calibration["paths"]:
@@ -248,7 +248,7 @@ def _programs_and_materials(console: Console, stats: Mapping[str, Any]) -> None:
 
 
 def _table(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A plain table, numbers to the right; nothing where there are no rows."""
+    """Prints a plain table with right-aligned numbers, or nothing if there are no rows."""
     from rich.markup import escape
     from rich.table import Table
 
