@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a result folder: one HTML page that needs nothing else, and figure files."""
+"""Report of a result folder: a self-contained HTML page, and figure files."""
 
 from __future__ import annotations
 
@@ -39,22 +39,19 @@ if TYPE_CHECKING:
 
 LARGEST_SVG = 150_000
 LARGEST_PNG = 120_000
-"""Bytes of a figure beside a Markdown page; a repository keeps every version of them."""
+"""Largest size in bytes of a PNG beside a Markdown page, because a repository keeps every
+version."""
 _HERE = Path(__file__).parent
 
 
 def build(folder: Path, markdown: Path | None = None) -> Path:
     """Writes DIR/report.html and DIR/figures, each figure as SVG and PNG.
 
-    Args:
-        folder: DIR.
-        markdown: A .md file to write too, with a folder of figures beside it. It has the same
-            text, tables and figures, without viewers and folded parts.
+    Args: folder: DIR. markdown: Also write this .md file, with a folder of figures beside it. It
+    has the same text, tables and figures, without viewers and folded parts.
 
-    Raises:
-        WavecombError: The folder holds no results, or a file in it is damaged; or a library of the
-            extra "bench" is missing.
-        OSError: It cannot be written.
+    Raises: WavecombError: The folder holds no results, a file in it is damaged, or a library of the
+    extra "bench" is missing. OSError: The report cannot be written.
     """
     environment = _environment()
     results = load(folder)
@@ -88,7 +85,7 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
 
 
 def _environment() -> Any:
-    """Jinja2 with the filters of the templates; text is escaped in HTML."""
+    """Returns a Jinja2 environment with the filters of the templates, which escapes HTML."""
     jinja2 = needed("jinja2", "the report")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE),
@@ -101,12 +98,12 @@ def _environment() -> Any:
 
 
 def _prose(text: str) -> str:
-    """Keeps numbers beside their unit."""
+    """Inserts no-break spaces between numbers and units."""
     return text.replace(" %", "\u00a0%").replace("n = ", "n\u00a0=\u00a0")
 
 
 def _markdown(text: str) -> str:
-    """Text on one line that a Markdown table can hold."""
+    """Converts text to one line that can be put into a Markdown table."""
     return " ".join(text.split()).replace("<", "&lt;").replace("|", "\\|")
 
 
@@ -117,7 +114,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
-    """Copies the figures of all sections and returns their files: SVG, or if too large PNG."""
+    """Copies the figures of all sections; returns their files, as SVG or, if too large, PNG."""
     folder.mkdir(parents=True, exist_ok=True)
     files = {}
     for part in (part for section in out.sections for part in section.parts):
@@ -134,7 +131,7 @@ def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
 
 
 def _small_png(source: Path, target: Path) -> None:
-    """Writes the image with 256 colours, and smaller until its file is small enough."""
+    """Writes the image with 256 colours, and scales it down until its file is small enough."""
     from PIL import Image
 
     with Image.open(source) as opened:
@@ -222,7 +219,7 @@ def _about(out: Writer, results: Results) -> None:
 
 
 def _settings(results: Results) -> Table:
-    """The settings of each configuration as they were used, folded."""
+    """Returns a folded table of the settings used by each configuration."""
     names = ["spp", "threads", "lanes", "wave_size", "max_depth"]
     by_config = results.runs.groupby("config", sort=False)
     used = by_config[["width", "height", *names]].first().assign(runs=by_config.size())
@@ -258,7 +255,8 @@ WORDS = {
 }
 
 
-# ---- Warnings of a report, and facts about its machine -------------------------------------------
+# ---- Warnings of a report, and facts about its machine
+# ---------------------------------------------
 
 
 FEW_ROUNDS = 5
@@ -270,7 +268,7 @@ _EQUAL_IN = [
 
 
 def warnings_of(results: Results) -> list[str]:
-    """Returns reasons to read the figures with care, most serious first."""
+    """Returns reasons to read the figures with care, the most serious first."""
     lines: list[str] = []
     machine, runs, failed = results.machine, results.runs, results.failed
     _, different = equality(runs)
@@ -300,10 +298,10 @@ def warnings_of(results: Results) -> list[str]:
 
 
 def equality(runs: pd.DataFrame) -> tuple[int, list[str]]:
-    """Counts groups of runs that must have equal images, and names those that have not.
+    """Counts groups of runs that must have equal images, and names those that differ.
 
-    A group agrees in the seed and all settings except those that only order or distribute the
-    work. Runs with a time limit are left out, since no two of them take the same samples.
+    A group agrees in the seed and all settings except those that only order or distribute the work.
+    Runs with a time limit are left out, since their sample counts differ.
     """
     ours = runs[(runs["renderer"] == "wavecomb") & (runs["picture_sha256"] != "")]
     ours = ours[ours["time_limit"].fillna(0) == 0]
@@ -319,7 +317,7 @@ def equality(runs: pd.DataFrame) -> tuple[int, list[str]]:
 
 
 def machine_parts(machine: Mapping[str, Any]) -> list[Part]:
-    """Describes the machine, and which hardware counters it lacks for which reason."""
+    """Describes the machine, and gives the reasons for missing hardware counters."""
     counters = machine.get("counters")
     missing = (counters.get("missing") if isinstance(counters, Mapping) else None) or {}
     reasons: dict[str, list[str]] = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sections about one experiment each."""
+"""Sections of the report about single experiments and about the suite."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
     factor = str(runs["factor"].iloc[0])
     if factor and runs["factor_value"].notna().all():
-        # The stage's name ends with the value of a factor of the stage.
+        # The name of such a stage ends with the value of its varied option.
         bases = runs["stage"].map(lambda stage: stage.partition(f"-{factor}-")[0])
         curves(bases, "factor_value", factor.replace("_", " "), "curve")
         return
@@ -139,7 +139,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
 
 def _errors(out: Writer, runs: pd.DataFrame) -> None:
-    """Shows variance and efficiency, where images were compared with golden ones."""
+    """Shows variance and efficiency of images that were compared with golden ones."""
     if runs["rel_mse"].isna().all():
         return
     factor = "renderer" if runs["renderer"].nunique() > 1 else "policy"
@@ -174,7 +174,7 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     title = "Times by policy, ratio of means to none"
     out.add(ratio_table(title, metrics, "policy", note))
     if (runs["factor"] != "").any():
-        return  # curves over the factor say more
+        return  # the curves over the factor show the same
     key = key_of(name)
     for words, end in (("shade", "shade"), ("shade + order", "policies")):
         title = f"{words.capitalize()} time by policy"
@@ -224,7 +224,7 @@ def _order_findings(name: str, order: pd.DataFrame) -> list[str]:
 
 
 def _bound_words(part: pd.DataFrame) -> str:
-    """States the gain of the oracles; "" without placebo and oracle."""
+    """States the gain of the oracles, or returns "" without placebo and oracle."""
     known = part.dropna(subset=["placebo_ratio"]).set_index("policy")
     words = {
         BEST: "The best order of runs that a trace with true costs gives",
@@ -245,11 +245,12 @@ def _bound_words(part: pd.DataFrame) -> str:
     return text
 
 
-# ---- Sections about a suite as a whole: roulette, effects, costs ---------------------------------
+# ---- Sections about a whole suite: roulette, effects, costs
+# ----------------------------------------
 
 
 def suite(out: Writer, results: Results) -> None:
-    """Writes the sections that go across experiments."""
+    """Writes the sections that cover all experiments."""
     ours = results.runs[results.runs["renderer"] == "wavecomb"]
     flat = ours[ours["factor"] == ""]
     if flat["roulette"].nunique() > 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of the report, from the tables of the analysis."""
+"""Tables of the report, built from the tables of the analysis."""
 
 from __future__ import annotations
 
@@ -25,11 +25,8 @@ def ratio_table(
 ) -> Table | None:
     """Shows ratios of several metrics side by side.
 
-    Args:
-        caption: Title of the table.
-        metrics: Titles and tables of ``ratios``; the verdict is that of the last one.
-        level_words: Heading of the level column.
-        note: Text below.
+    Args: caption: Title of the table. metrics: Titles and tables of ``ratios``; the last one
+    provides the verdict. level_words: Heading of the level column. note: Text below.
     """
     found = {words: entry for words, entry in metrics.items() if not entry.empty}
     if not found:
@@ -53,7 +50,7 @@ def ratio_table(
 
 
 def order_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows the verdict on order."""
+    """Shows the verdict on each order."""
     rows = []
     for row in found.itertuples():
         none = row.policy == "none"
@@ -107,7 +104,7 @@ def regret_table(found: pd.DataFrame, caption: str) -> Table:
 
 
 def effects_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows all effects of a factorial, folded."""
+    """Shows all effects of a factorial experiment, folded."""
     rows: list[list[Cell | str]] = [
         [
             str(row.kind),
@@ -128,7 +125,7 @@ def effects_table(found: pd.DataFrame, caption: str) -> Table:
 def mean_table(
     found: pd.DataFrame, caption: str, level_words: str, columns: Mapping[str, str], note: str = ""
 ) -> Table | None:
-    """Shows plain means, by title and column; columns without a value are left out."""
+    """Shows means by title and column. Omits columns without a value."""
     kept = {words: name for words, name in columns.items() if found[name].notna().any()}
     rows = [
         [
