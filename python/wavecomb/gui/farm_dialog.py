@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render > Send to a farm: a job of what the window shows, and how far it is."""
+"""Dialog of Render > Send to a farm, which submits a job and shows its progress."""
 
 from __future__ import annotations
 
@@ -28,23 +28,20 @@ from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
-"""From an output file to what ``farm.from_json`` takes; raises WavecombError."""
+"""Function that describes a job for ``farm.from_json``, given its output file. Raises
+WavecombError."""
 
 
 class FarmDialog(QDialog):
-    """Asks where to, sends, and watches.
+    """Dialog that asks for output and workers, submits the job and shows its progress.
 
-    Attributes:
-        folder: Of the job; None: there is none yet.
+    Attributes: folder: Folder of the job; None before it is submitted.
     """
 
     def __init__(self, describe: Describe, output: str, parent: QWidget | None = None) -> None:
-        """Nothing is sent yet.
+        """Creates the dialog without submitting anything.
 
-        Args:
-            describe: What is to be rendered.
-            output: A file to begin with.
-            parent: The window.
+        Args: describe: Describes the job. output: Initial output file. parent: The window.
         """
         super().__init__(parent)
         self.setObjectName("farm")
@@ -99,7 +96,7 @@ class FarmDialog(QDialog):
     # ---- what it does ----------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Writes the job in a process, since reading a stage takes time, and then works on it."""
+        """Submits the job in a process, since reading a stage takes time, and then runs it."""
         try:
             wanted = self._describe(self.output.text())
         except WavecombError as error:
@@ -121,7 +118,7 @@ class FarmDialog(QDialog):
         self.stop.setEnabled(True)
 
     def _take(self, found: dict[str, Any]) -> None:
-        """Handles a JSON line: the job that was written, why it was not, or its progress."""
+        """Handles a JSON line: the job that was written, an error, or progress."""
         if "error" in found:
             self.say(found["error"])
         elif "job" in found and not self._is_resuming:
@@ -153,11 +150,11 @@ class FarmDialog(QDialog):
         self._command.stop()
 
     def say(self, line: str) -> None:
-        """Shows a line in place of the state."""
+        """Shows a line of text as the state."""
         self.state.setText(html.escape(line))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Stops a running job and hides until it has ended; finished tiles are kept."""
+        """Stops a running job, and hides until it has ended. Finished tiles are kept."""
         if not self._command.running:
             super().closeEvent(event)
             return

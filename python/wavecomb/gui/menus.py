@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the window's actions are and which menu they stand in."""
+"""Actions of the window and their places in the menus."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wavecomb.gui.actions import Entry, keypad, make_action
 from wavecomb.gui.recent_stages import RecentStages
 
 Window = Any
-"""A ``main_window.MainWindow``, which has its menus from here."""
+"""A ``main_window.MainWindow``, whose module imports this one."""
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
@@ -47,12 +47,12 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
-"""Title and names; "-": a line."""
+"""Titles of menus and names of their actions; "-" is a separator."""
 CHECKED = ("region",)
 
 
 def entries(window: Window) -> list[Entry]:
-    """All actions."""
+    """Returns all actions."""
     viewport, display, session = window.viewport, window.display, window.session
     scene = window.scene
 
@@ -171,8 +171,7 @@ def entries(window: Window) -> list[Entry]:
 def make_menus(window: Window) -> tuple[dict[str, QAction], RecentStages]:
     """Fills the menu bar of a window.
 
-    Returns:
-        The actions by name, and the menu of stages that were opened before.
+    Returns: The actions by name, and the menu of recently opened stages.
     """
     actions: dict[str, QAction] = {}
     by_name = {entry.name: entry for entry in entries(window)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bar at the bottom: how far the render is, and what else goes on."""
+"""Status bar with the progress of the render and of background work."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wavecomb.gui.widgets import named
 
 
 def frame_text(frame: Frame, state: str) -> str:
-    """How far a render is, in a line."""
+    """Describes the progress of a render in a line."""
     done = frame.status.get("samples_done", 0)
     if frame.scale > 1:
         return f"preview at 1/{frame.scale} of the size"
@@ -31,7 +31,7 @@ def frame_text(frame: Frame, state: str) -> str:
 
 
 class StatusLine(QStatusBar):
-    """Progress, state, what goes on beside it."""
+    """Status bar with progress, state and background work."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)

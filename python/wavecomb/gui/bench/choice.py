@@ -32,15 +32,12 @@ from wavecomb.run.progress import time_text
 class SuiteInfo:
     """Facts about a suite.
 
-    Attributes:
-        name: A name of `wavecomb bench list`, or the path of a TOML file.
-        title: One line.
-        stages: Names of its stages.
-        repetitions: Default number of repetitions.
-        configurations: Number of configurations on this machine.
-        seconds: Rough time of one repetition of all configurations, at 0.4 million samples per
-            second and thread; without making stages and golden pictures.
-        experiments: Name and number of configurations of each experiment.
+    Attributes: name: A name of `wavecomb bench list`, or the path of a TOML file. title: Title in
+    one line. stages: Names of its stages. repetitions: Default number of repetitions.
+    configurations: Number of configurations on this machine. seconds: Rough time of one repetition
+    of all configurations, at 0.4 million samples per second and thread, without the time for
+    preparing stages and golden images. experiments: Name and number of configurations of each
+    experiment.
     """
 
     name: str
@@ -68,8 +65,7 @@ def suite_infos() -> list[SuiteInfo]:
 def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
     """Reads a suite by name or TOML file, restricted to some stages.
 
-    Raises:
-        WavecombError: The suite is invalid; one line.
+    Raises: WavecombError: The suite is invalid. The message is one line.
     """
     from wavecomb.bench.machine import limits
     from wavecomb.bench.plan import Estimator, configurations
@@ -125,11 +121,9 @@ class Choice:
 
 
 class SuiteChoice(QWidget):
-    """The form.
+    """Form for the arguments of a benchmark.
 
-    Signals:
-        changed(): The choice changed.
-        failed(str): One line that says what to do.
+    Signals: changed(): The choice changed. failed(str): One line that says what to do.
     """
 
     changed = Signal()
@@ -191,20 +185,23 @@ class SuiteChoice(QWidget):
     # ---- the choice ----------------------------------------------------------------------------
 
     def info(self) -> SuiteInfo | None:
-        """The chosen suite."""
+        """Returns the chosen suite, or None."""
         return self._infos.get(str(self.suite.currentData()))
 
     def chosen_stages(self) -> list[str]:
-        """Names of the stages with a tick."""
+        """Returns the names of the checked stages."""
         items = [self.stages.item(k) for k in range(self.stages.count())]
         return [i.text() for i in items if i.checkState() == Qt.CheckState.Checked]
 
     def results_folder(self) -> Path:
-        """The results folder."""
+        """Returns the results folder."""
         return Path(self.folder.text().strip()).expanduser()
 
     def choice(self, *, quiet: bool = False) -> Choice | None:
-        """The choice; None, after ``failed`` unless ``quiet``, if it is incomplete."""
+        """Returns the choice.
+
+        Returns None if the choice is incomplete, and emits ``failed`` unless ``quiet``.
+        """
         info = self.info()
         stages = self.chosen_stages()
         problem = ""
@@ -232,7 +229,7 @@ class SuiteChoice(QWidget):
         self._choose_suite(suite)
 
     def shutdown(self) -> None:
-        """Stops reading."""
+        """Stops the thread that reads suites."""
         self._reader.close()
 
     # ---- inside --------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What there is to say of two pictures, in numbers and in a map. No Qt.
+"""Differences of two images, as numbers and as maps. Independent of Qt.
 
-The figures are those of `wavecomb compare`.
+The numbers equal those of `wavecomb compare`.
 """
 
 from __future__ import annotations
@@ -25,22 +25,18 @@ MAPS = {
     "flip-hdr": "FLIP, high range",
     "z": "z-test",
 }
-"""Kinds of maps and their names."""
+"""Names of the kinds of maps."""
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """How A differs from B, the reference, in one layer.
+    """Differences of A from B, the reference, in one layer.
 
-    Attributes:
-        layer: Its name.
-        comparison: Differences of linear values.
-        psnr: As shown, dB.
-        flip: Mean FLIP as shown; None: not known (yet).
-        flip_note: Why there is none.
-        test: None where no variance is known.
-        test_note: Why there is none.
-        others_differ: Layers that both have, with other bits; None where only one was looked at.
+    Attributes: layer: Name of the layer. comparison: Differences of linear values. psnr: PSNR of
+    the displayed values, in dB. flip: Mean FLIP of the displayed values; None if not known (yet).
+    flip_note: Reason for a missing FLIP value. test: Result of the z-test; None if no variance is
+    known. test_note: Reason for a missing z-test. others_differ: Layers of both images whose bits
+    differ; None if only one layer was compared.
     """
 
     layer: str
@@ -53,15 +49,15 @@ class Numbers:
     others_differ: tuple[str, ...] | None = None
 
     def with_flip(self, mean: float | None, note: str = "") -> Numbers:
-        """The same with what FLIP found."""
+        """Returns a copy with the result of FLIP."""
         return replace(self, flip=mean, flip_note=note)
 
 
 def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
-    """All but FLIP, which takes longer.
+    """Computes all numbers but FLIP, which takes longer.
 
-    Raises:
-        ValueError: The sizes or channels differ (``sides.problem`` says it better).
+    Raises: ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer
+    message).
     """
     one, two = pair(a, b, layer)
     others: tuple[str, ...] | None = None
@@ -76,7 +72,7 @@ def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
 
 
 def same(a: NDArray[Any], b: NDArray[Any]) -> bool:
-    """Bit for bit."""
+    """Returns whether two arrays are equal bit for bit."""
     if a.shape != b.shape or a.dtype != b.dtype:
         return False
     bits = f"u{a.dtype.itemsize}"
@@ -101,7 +97,7 @@ def _test(
 
 
 def rows(found: Numbers) -> list[tuple[str, str, str]]:
-    """Name, value and meaning of each figure, for a table."""
+    """Returns name, value and explanation of each number, for a table."""
     c = found.comparison
     pixels = c.width * c.height
     at = c.luminance_max_at
@@ -148,7 +144,7 @@ def rows(found: Numbers) -> list[tuple[str, str, str]]:
 
 
 def verdict(found: Numbers) -> str:
-    """One line."""
+    """Returns a summary in one line."""
     c = found.comparison
     if c.pixels_different == 0:
         return "bit for bit the same"
@@ -173,7 +169,7 @@ def _test_rows(found: Numbers) -> list[tuple[str, str, str]]:
 
 
 def decibels(value: float) -> str:
-    """For people."""
+    """Formats a value in dB."""
     return f"{value:.2f} dB" if math.isfinite(value) else "infinite: looks equal"
 
 
@@ -182,7 +178,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 
 def pixel_rows(a: Side | None, b: Side | None, layer: str, x: int, y: int) -> dict[str, str]:
-    """What A, B and A - B hold at a pixel, as text; empty where there is nothing."""
+    """Returns the values of A, B and A - B at a pixel as text; empty without an image."""
     found: dict[str, NDArray[Any]] = {}
     for name, side in (("A", a), ("B", b)):
         values = side.layer(layer) if side is not None else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bar of one side of a comparison: what it shows, and where else it may come from."""
+"""Bar of one side of a comparison, which shows and chooses the source of its image."""
 
 from __future__ import annotations
 
@@ -29,10 +29,9 @@ if TYPE_CHECKING:
 
 
 class SidePicker(TakesFiles, QWidget):
-    """Name and source of A or B.
+    """Bar with the name of side A or B and a menu of sources.
 
-    Signals:
-        dropped(list): Paths of files that were dropped here.
+    Signals: dropped(list): Files with these paths were dropped on the bar.
     """
 
     dropped = Signal(list)
@@ -101,7 +100,7 @@ class SidePicker(TakesFiles, QWidget):
         return menu
 
     def ask(self) -> None:
-        """A dialog for a file; it blocks nothing else."""
+        """Opens a file dialog that does not block the window."""
         patterns = " ".join(f"*{suffix}" for suffix in SUFFIXES)
         ask_file(
             self, f"Picture {self.source.name}", f"Pictures ({patterns})",
@@ -109,7 +108,7 @@ class SidePicker(TakesFiles, QWidget):
         )  # fmt: skip
 
     def render_other(self) -> None:
-        """A render of its own, at first with the viewport's settings."""
+        """Starts a separate render, initially with the viewport's settings."""
         self.source.render(self._session.setup)
 
     def _show(self) -> None:
@@ -126,5 +125,5 @@ class SidePicker(TakesFiles, QWidget):
         self._live.show_setup()
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Files were dropped on the bar."""
+        """Emits ``dropped`` for files that were dropped on the bar."""
         self.dropped.emit(paths)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What loading found: not supported, wrong in the stage, chosen by the loader."""
+"""Panel of the loader's findings: unsupported features, errors in the stage, choices it made."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class NotesPanel(QWidget):
-    """The list with a filter; double click chooses the prim, Ctrl+C copies lines."""
+    """List with a filter. Double click selects the prim, Ctrl+C copies lines."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -84,7 +84,7 @@ class NotesPanel(QWidget):
         copy.activated.connect(self.copy)
 
     def fill(self, stage: LoadedStage | None) -> None:
-        """Lists what was found in a stage."""
+        """Lists the findings of a stage."""
         self.model.fill(rows_of(stage) if stage is not None else [])
         self._refilter()
 
@@ -102,7 +102,7 @@ class NotesPanel(QWidget):
             self._session.select(place)
 
     def copy(self) -> None:
-        """Puts the selected lines on the clipboard, all where none is selected."""
+        """Copies the selected lines to the clipboard, or all lines if none is selected."""
         chosen = self.view.selectionModel().selectedRows()
         if not chosen:
             chosen = [self._filter.index(row, 0) for row in range(self._filter.rowCount())]

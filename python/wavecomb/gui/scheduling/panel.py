@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scheduling panel: every choice of order and amount of work, switched while it renders."""
+"""Scheduling panel: settings of order and amount of work, which can change during a render."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
 
 
 class SchedulingPanel(QScrollArea):
-    """Shows and changes the session's scheduling; keeps nothing but loaded policies."""
+    """Panel of the session's scheduling settings. Its only state are loaded policies."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -73,10 +73,11 @@ class SchedulingPanel(QScrollArea):
         self._show(session.setup)
 
     def shutdown(self) -> None:
-        """Ends the thread of the light."""
+        """Ends the thread of the picture light."""
         self.light.shutdown()
 
-    # ---- what it is made of ---------------------------------------------------------------------
+    # ---- construction
+    # --------------------------------------------------------------------------------
 
     def _presets_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
@@ -143,7 +144,8 @@ class SchedulingPanel(QScrollArea):
             add_row(form, one.label, control, field)
         return group
 
-    # ---- what it does ---------------------------------------------------------------------------
+    # ---- actions
+    # -------------------------------------------------------------------------------------
 
     def _choose(self, field: str, value: Any) -> None:
         if field == "policy":
@@ -198,7 +200,10 @@ class SchedulingPanel(QScrollArea):
         ask_file(self, "Load a policy", _POLICY_FILTER, self.load_policy, start=start)
 
     def load_policy(self, path: str) -> None:
-        """Offers the policies of a Python file and chooses the first; errors become messages."""
+        """Offers the policies of a Python file and selects the first.
+
+        Errors are shown as messages.
+        """
         try:
             policies = load_policies(path)
         except Exception as error:
@@ -208,7 +213,7 @@ class SchedulingPanel(QScrollArea):
         box = self._box("policy")
         for policy in policies:
             count = self._loads[policy.name] = self._loads.get(policy.name, 0) + 1
-            # An edited policy is another one: its runs make a series of their own.
+            # An edited policy counts as another one, so its runs form a separate series.
             name = policy.name if count == 1 else f"{policy.name} {count}"
             own = OwnPolicy(policy, path, name)
             box.add(own, name, f"{first_line(policy)} ({Path(path).name})")
@@ -223,7 +228,7 @@ class SchedulingPanel(QScrollArea):
         ask_file(self, "Load costs", _PROFILE_FILTER, self.load_profile)
 
     def load_profile(self, path: str) -> None:
-        """Starts renders from the costs in a file; errors become messages."""
+        """Starts renders with the costs in a file. Errors are shown as messages."""
         from wavecomb.run.costs import load_costs
 
         try:
@@ -234,7 +239,8 @@ class SchedulingPanel(QScrollArea):
         self._box("costs").add(profile, Path(path).name, f"From {path}, then measured.")
         self._choose("costs", profile)
 
-    # ---- every policy in turn -------------------------------------------------------------------
+    # ---- trying all policies
+    # -------------------------------------------------------------------------
 
     def _try_every_policy(self) -> None:
         if self.rounds.running:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of runs, as rows, text and CSV; no Qt."""
+"""Table of runs, as rows, text and CSV. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))
 
 @dataclass(frozen=True)
 class Row:
-    """One series."""
+    """A row of the table, for one series."""
 
     series: Series
     label: str
     texts: tuple[str, ...]
-    """One for each of ``COLUMNS``."""
+    """Texts for ``COLUMNS``."""
     ratio: Ratio | None
     is_base: bool
 
 
 def rows(log: RunLog, count: int = 20) -> list[Row]:
-    """The last series, oldest first, compared with the base."""
+    """Returns rows of the newest series, the oldest first, compared with the base."""
     base = log.base
     shown = [one for one in last_of(log.series, count, log.pinned) if one.runs]
     names = labels(shown)
@@ -104,7 +104,7 @@ def _ratio_texts(ratio: Ratio | None) -> tuple[str, str, str]:
 
 
 def as_text(table: Sequence[Row]) -> str:
-    """Columns in line, for a mail or a notebook."""
+    """Formats the table as aligned text, for a mail or a notebook."""
     cells = [COLUMNS, *(row.texts for row in table)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(COLUMNS))]
     return "\n".join(
@@ -117,7 +117,10 @@ def as_text(table: Sequence[Row]) -> str:
 
 
 def as_csv(table: Sequence[Row]) -> str:
-    """One line for each run, all settings, plain numbers; times in seconds."""
+    """Formats the table as CSV.
+
+    Each run has one line, with all settings as plain values and times in seconds.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     phases = list(table[0].series.best.last.phases) if table else []

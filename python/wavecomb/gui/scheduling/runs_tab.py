@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the last runs: pinned, compared, repeated, copied, saved."""
+"""Tab with the table of recent runs, which can be pinned, repeated, copied and saved."""
 
 from __future__ import annotations
 
@@ -36,10 +36,9 @@ NOTE = (
 
 
 class RunsTab(QWidget):
-    """Shows a log; asks for its redrawing where it changed it.
+    """Tab that shows a log of runs.
 
-    Signals:
-        changed(): Another run was pinned, or runs were forgotten.
+    Signals: changed(): Another run was pinned, or runs were removed, so plots must be redrawn.
     """
 
     changed = Signal()
@@ -90,10 +89,11 @@ class RunsTab(QWidget):
         row.addStretch(1)
         return row
 
-    # ---- what is shown --------------------------------------------------------------------------
+    # ---- display
+    # -------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Shows the log as it is."""
+        """Shows the current contents of the log."""
         self._rows = rows(self._log)
         colours: dict[tuple[int, int], QColor] = {}
         for i, row in enumerate(self._rows):
@@ -109,7 +109,7 @@ class RunsTab(QWidget):
         self._enable()
 
     def chosen(self) -> Series | None:
-        """The series of the selected row."""
+        """Returns the series of the selected row, or None."""
         lines = self.view.selectionModel().selectedRows()
         if not lines or lines[0].row() >= len(self._rows):
             return None
@@ -130,16 +130,17 @@ class RunsTab(QWidget):
             return None
         return (base, other) if base.picture == other.picture else None
 
-    # ---- what it does ---------------------------------------------------------------------------
+    # ---- actions
+    # -------------------------------------------------------------------------------------
 
     def pin(self) -> None:
-        """Pins the chosen row, or unpins it."""
+        """Pins the selected row, or unpins it."""
         chosen = self.chosen()
         self._log.pin(None if chosen is self._log.pinned else chosen)
         self.changed.emit()
 
     def repeat(self) -> None:
-        """Renders base and chosen in turn, or stops that."""
+        """Renders the base and the selected series in turn, or stops doing so."""
         if self.rounds.running:
             self.rounds.stop()
             return
@@ -155,14 +156,14 @@ class RunsTab(QWidget):
         self._enable()
 
     def copy(self) -> None:
-        """The table as text, on the clipboard."""
+        """Copies the table to the clipboard as text."""
         QGuiApplication.clipboard().setText(as_text(self._rows))
 
     def _ask_save(self) -> None:
         ask_file(self, "Save runs", "CSV (*.csv)", self.save, start="runs.csv", ending="csv")
 
     def save(self, path: str) -> None:
-        """Writes the runs as CSV, whole or not at all; errors become messages."""
+        """Writes the runs as CSV, never partially. Errors are shown as messages."""
         text = as_csv(self._rows)
 
         def work() -> None:
@@ -175,6 +176,6 @@ class RunsTab(QWidget):
         self._session.run("saving runs", work)
 
     def clear(self) -> None:
-        """Forgets all runs but the one that goes on."""
+        """Removes all runs but the current one."""
         self._log.clear()
         self.changed.emit()

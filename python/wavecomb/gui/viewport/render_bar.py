@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is rendered: camera, size, samples, depth, denoising, region; pause, stop, restart."""
+"""Tool bar of the render: camera, size, samples, depth, denoising, region; pause, stop, restart."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from wavecomb.run.settings import MAX_EDGE
 
 _MOST: dict[str, dict[str, Any]] = {"width": {"most": MAX_EDGE}, "height": {"most": MAX_EDGE}}
 _NAMES = {"max_depth": "depth"}
-"""Names of controls that are not those of their settings."""
+"""Names of controls that differ from those of their settings."""
 
 
 class RenderBar(QToolBar):
-    """The controls of a render that are used most."""
+    """Tool bar with the most used controls of a render."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__("Render", parent)
