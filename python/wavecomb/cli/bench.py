@@ -164,7 +164,7 @@ def _dry_run(sitting: object) -> None:
     click.echo(
         f"{len(left)} runs of {len(sitting.configs)} configurations, "
         f"about {time_text(estimator.total(left))} (from {basis}), "
-        "and what stages and golden pictures take to make"
+        "plus the time for making stages and golden images"
     )
 
 

@@ -178,9 +178,7 @@ def _refuse(options: dict[str, Any]) -> None:
 
     for name, value in options.items():
         if value:
-            raise WavecombError(
-                f"{name} is of two pictures; --page FILE.html shows those of folders"
-            )
+            raise WavecombError(f"{name} is only for two images; --page FILE.html compares folders")
 
 
 def _write_looks(
@@ -221,7 +219,7 @@ def _metric_lines(measured: dict[str, float], test: Any) -> list[str]:
             f"z-test: {verdict}, p = {test.p_value:.3g} over {test.tests} tests{where}; "
             f"{100.0 * test.pixels_accepted:.4g} % of pixel channels accepted"
         )
-        lines.append("        mean of the picture, z  " + _row(test.mean_z))
+        lines.append("        mean of the image, z    " + _row(test.mean_z))
     return lines
 
 

@@ -86,9 +86,9 @@ def resume_command(
     found = Job.of(ask_plan({"again": short.as_json()})["job"], job)
     changed = refresh(folder, replace(folder.job, files=found.files))
     if changed and not (quiet or as_json):
-        click.echo(f"{changed} files of the stage have changed: all images are rendered again")
+        click.echo(f"{changed} files of the stage have changed, so all images are rendered again")
     if where.kind == "none":
-        raise WavecombError("--on none: nobody would render; give local:N, dask:ADDRESS or slurm:N")
+        raise WavecombError("--on none: renders nothing; give local:N, dask:ADDRESS or slurm:N")
     run_job(folder, where, threads=threads, dashboard=dashboard, as_json=as_json, quiet=quiet)
 
 
@@ -163,7 +163,7 @@ def assemble_command(names: tuple[str, ...], maps: tuple[str, ...], as_json: boo
     elif written:
         click.echo(f"wrote {', '.join(written)}")
     elif not wrong:
-        click.echo("all images are there")
+        click.echo("all images are finished")
     if wrong:
         more = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
         raise WavecombError(f"{wrong[0]}{more}")

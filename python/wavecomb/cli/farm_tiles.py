@@ -56,8 +56,8 @@ def check_options(options: dict[str, Any], what: str = "a farm") -> None:
         ("--preview", options["preview"], "`wavecomb farm status` shows how far a job is"),
         ("--learn-from", learn_from, "frames are rendered in any order; give a file"),
         ("--learn-to", options["learn_to"],
-         "a render writes it, of one image, and --learn-from gives it to the job"),
-        ("--deep", options["deep"], "tiles of deep images are not joined; give it to render"),
+         "a render of one image writes it, and --learn-from gives it to the job"),
+        ("--deep", options["deep"], "tiles of deep images cannot be joined; use `wavecomb render`"),
         ("--film-memory", options["film_memory"], "tiles limit the memory of a worker"),
         ("--progress", "json" if options["progress"] == "json" else None, "give --json"),
     ):  # fmt: skip
@@ -74,7 +74,7 @@ def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
     found = parse_tile(text)
     check_options(options, "--tile")
     if options["output"] is None:
-        raise WavecombError("--tile: needs -o, beside which the tile is written")
+        raise WavecombError("--tile: needs -o, because the tile is written beside it")
     return found
 
 
@@ -164,7 +164,7 @@ def assemble_tiles(output: str) -> list[str]:
         same = [i for i in range(len(job.images))
                 if job.part_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
         if not same:
-            raise WavecombError(f"{names[0]}: is of another job than its header says")
+            raise WavecombError(f"{names[0]}: does not belong to the job in its header")
         image, count = same[0], job.tile_count(same[0])
         wanted = [tile_name(output, index, count) for index in range(count)]
         lacking = [name for name in wanted if name not in names]

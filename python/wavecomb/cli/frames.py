@@ -46,7 +46,7 @@ def check_frames(
         raise WavecombError("--frame is one frame and --frames are several; give one of them")
     if purpose.resume is not None:
         raise WavecombError(
-            "--resume goes on with one picture: give its --frame, and then the other --frames "
+            "--resume continues one image: give its --frame, and then all other --frames "
             "with --skip-existing"
         )
     frames = parse_frames(text)
@@ -86,7 +86,7 @@ def render_sequence(
     if skip:
         wanted = [f for f in frames if not all(map(os.path.exists, names.at(f).all()))]
         if len(wanted) < len(frames):
-            job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames are there")
+            job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames exist")
     done: Done | None = None
     opened: Frames | None = None
     files: list[str] = []
@@ -103,10 +103,10 @@ def render_sequence(
             )  # fmt: skip
             if done.stopped is not None:
                 so_far = f"{number - 1} of {len(wanted)} frames are written"
-                kept = f"; {here.checkpoint} goes on with it" if here.checkpoint else ""
+                kept = f"; {here.checkpoint} continues it" if here.checkpoint else ""
                 click.echo(
                     f"stopped in {place} {how_far(done)}, which is not written{kept}; {so_far}, "
-                    "and --skip-existing goes on after them",
+                    "and --skip-existing continues after them",
                     err=True,
                 )
                 raise click.exceptions.Exit(128 + done.stopped)

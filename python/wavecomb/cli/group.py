@@ -24,8 +24,8 @@ INTERRUPTED = 130
 
 _GREETING = """renders OpenUSD stages on the CPU.
 
-  wavecomb render shot.usd -o shot.exr --png shot.png   a stage of yours
-  wavecomb scene mixed -o mixed.usdc                    none at hand: a stage to try
+  wavecomb render shot.usd -o shot.exr --png shot.png   your stage
+  wavecomb scene mixed -o mixed.usdc                    an example stage
   wavecomb view shot.usd                                look at it in a window
   wavecomb doctor                                       what is installed, and what is missing
   wavecomb --help                                       all commands; COMMAND --help: its options
@@ -110,7 +110,7 @@ class Commands(click.Group):
         if lost is not None:
             line = f"standard output: {lost.strerror}"
             if _output_of(words) == "result":
-                _fail(f"{line}; what it was to get is incomplete")
+                _fail(f"{line}; the output is incomplete")
             click.echo(f"warning: {line}; messages were lost", err=True)
         sys.exit(code if isinstance(code, int) else 0)
 

@@ -62,7 +62,7 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
         write_png(png, to_rec709(merged.layers["beauty"], working))
     samples = merged.layers["samples"]
     click.echo(
-        f"{len(pictures)} pictures, seeds {', '.join(map(str, merged.seeds))}: "
+        f"{len(pictures)} images, seeds {', '.join(map(str, merged.seeds))}: "
         f"{samples.mean():.0f} samples per pixel; wrote "
         + ", ".join([*map(str, written), *([png] if png else [])])
     )

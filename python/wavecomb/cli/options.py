@@ -245,7 +245,7 @@ def _check_kept(row: Row, value: Any) -> None:
     if row.kind == "pair":
         good = good and len(value) == 2
     if not good:
-        raise WavecombError(f"the checkpoint's {row.key} is no good: it is damaged; start anew")
+        raise WavecombError(f"the checkpoint's {row.key} is invalid: the file is damaged")
 
 
 def warn(lines: list[str]) -> None:

@@ -127,7 +127,7 @@ class Asked:
     def check_deep(self) -> None:
         """Raises WavecombError if --aov requests deep samples, which are not a layer."""
         if aov_names.DEEP in self.layers.aovs:
-            raise WavecombError("--aov deep: is no layer; give --deep FILE.exr")
+            raise WavecombError("--aov deep: is not a layer; give --deep FILE.exr")
 
     def check_deep_resumed(self, kept: Iterable[str]) -> None:
         """Raises WavecombError unless --deep is used as in the render that is resumed.

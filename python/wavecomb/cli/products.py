@@ -44,7 +44,7 @@ class Plan:
             name = self.choice.output or names.output
             raise WavecombError(
                 f"{self.choice.product}: productName {name} leaves the folder {within}: give "
-                "-o FILE.exr, or --output-dir with the folder that pictures may go to"
+                "-o FILE.exr, or --output-dir with the folder for images"
             )
 
     def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
@@ -89,7 +89,7 @@ class Plan:
             if size != self.choice.resolution:
                 raise
             prim = self.choice.product or self.choice.settings
-            raise WavecombError(f"{prim}: {error}; --size goes before it") from None
+            raise WavecombError(f"{prim}: {error}; --size overrides it") from None
 
     def source(self, source: StageOptions) -> StageOptions:
         """Returns the options that load the stage for this product."""
@@ -153,7 +153,7 @@ def plan_products(
             target = os.path.realpath(plan.names.output)
             if target in seen:
                 raise WavecombError(
-                    f"productName {plan.choice.output} is that of several render products; "
+                    f"productName {plan.choice.output} is used by several render products; "
                     "choose one by --product"
                 )
             seen.add(target)

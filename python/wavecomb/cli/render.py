@@ -45,7 +45,7 @@ picture_options = add_options(
     ),
     option(
         "--region X0 Y0 X1 Y1", click.INT,
-        "Rectangle of pixels to render, without column X1 and row Y1.  "
+        "Rectangle of pixels to render; X1 and Y1 are exclusive.  "
         "[default: the render settings' data window, else all]", nargs=4,
     ),
     option(
@@ -69,7 +69,7 @@ picture_options = add_options(
     ),
     option(
         "--film-memory MB", "positive",
-        "Render and write an image that takes more memory in bands of rows.  "
+        "Memory for an image, in MB; a larger one is rendered in bands of rows.  "
         "[default: half of the machine's memory]",
     ),
     option("--exposure EV", "number", "Exposure of the PNG, in stops.  [default: 0]", default=0.0),
@@ -126,7 +126,7 @@ def render_command(part: str | None, **options: Any) -> None:
     if chosen_tile is not None:
         files = render_tile(prepared, asked, chosen_tile)
         if not asked.quiet:
-            click.echo(f"wrote {', '.join(files)}" if files else "all images are there")
+            click.echo(f"wrote {', '.join(files)}" if files else "all images exist")
         return
     jobs, source, resumed, reporter = (
         prepared.jobs, prepared.source, prepared.resumed, prepared.reporter,

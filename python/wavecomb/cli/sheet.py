@@ -69,7 +69,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     else:
         title = options["title"] or os.path.basename(os.path.normpath(pictures[0]))
         _write_page(found, output, look, title, options)
-    click.echo(f"{len(found)} pictures; wrote {output}")
+    click.echo(f"{len(found)} images; wrote {output}")
 
 
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
@@ -78,7 +78,7 @@ def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[st
     from wavecomb.picture.thumbnails import MOST, contact_sheet
 
     if len(found) > MOST:
-        raise WavecombError(f"{len(found)} pictures: a sheet has {MOST} at most")
+        raise WavecombError(f"{len(found)} images: a sheet holds at most {MOST}")
     columns, width = options["columns"] or 0, options["width"] or 240
     write_png_codes(output, contact_sheet(found, look, width=width, columns=columns))
 
@@ -91,7 +91,7 @@ def _write_page(
     from wavecomb.picture.pages import MOST_FRAMES, sequence_page
 
     if len(found) > MOST_FRAMES:
-        raise WavecombError(f"{len(found)} pictures: a page has {MOST_FRAMES} at most")
+        raise WavecombError(f"{len(found)} images: a page holds at most {MOST_FRAMES}")
     text = sequence_page(
         found, look, title=title, fps=options["fps"], width=options["width"] or 960,
         kind="png" if options["lossless"] else "jpeg",

@@ -45,7 +45,7 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
     _phases(console, stats)
     _programs_and_materials(console, stats)
     if report.unsupported:
-        console.print("not supported, and left out:")
+        console.print("not supported, left out:")
         for finding in report.unsupported:
             console.print(f"  {escape(finding.line())}")
     for finding in report.notes:
@@ -75,26 +75,26 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         )
     if allotted := stats.get("allotment"):
         line = (
-            f"samples by {settings['allocate']}: {allotted['least']} to {allotted['most']} a pixel "
-            f"after {allotted['pilot']} of each"
+            f"samples by {settings['allocate']}: {allotted['least']} to {allotted['most']} per "
+            f"pixel after {allotted['pilot']} in each"
         )
         if allotted["gain"] is not None:
-            line += f"; expected efficiency {allotted['gain']:.2f} of even"
+            line += f"; expected efficiency {allotted['gain']:.2f} times the even one"
         lines.append(line)
     if learned := stats.get("guiding"):
         took = "before" if learned["kept"] else f"in {time_text(learned['seconds'])}"
         line = f"learned from {count_text(learned['paths'])} paths {took}"
         if learned["gain"]:
-            line += f", expected efficiency {learned['gain']:.2f} of without"
+            line += f", expected efficiency {learned['gain']:.2f} times the unguided one"
         if not learned["used"]:
             line += "; not used"
         elif learned["guided_share"] > 0:
             line += f"; {_percent(learned['guided_share'])} of bounced light is guided"
         if learned["used"] and settings["roulette"] in ("auto", "efficient"):
-            line += f"; {_percent(learned['survival'])} of bounces go on"
+            line += f"; {_percent(learned['survival'])} of paths continue after a bounce"
         lines.append(line)
     elif settings.get("guiding") == "auto":
-        lines.append("not guided: too few samples to find out whether that pays")
+        lines.append("not guided: too few samples to predict the gain")
     if transport := stats.get("transport"):
         lines.append(_transport_line(transport))
     if aiming := stats.get("light_aiming"):
@@ -119,7 +119,7 @@ def _transport_line(chosen: Mapping[str, Any]) -> str:
         line += f", {chosen['light_paths']:g} light paths for each camera path"
     line += f": {chosen['why']}"
     if chosen["gain"] is not None:
-        line += f" in {chosen['seconds']:.2f} s, light paths promise "
+        line += f" in {chosen['seconds']:.2f} s, light paths are predicted to have "
         line += f"{chosen['gain']:.2f} times the efficiency"
     return line
 
@@ -128,7 +128,9 @@ def _aiming_line(aiming: Mapping[str, Any]) -> str:
     """Returns a line about the targets of light paths."""
     from wavecomb.run.progress import count_text, time_text
 
-    found = f"{aiming['targets']} places" if aiming["targets"] else "nothing, which brought light"
+    found = (
+        f"{aiming['targets']} places" if aiming["targets"] else "nothing, since none contributed"
+    )
     return (
         f"light paths aim at {found}: learned from {count_text(aiming['paths'])} paths "
         f"in {time_text(aiming['seconds'])}"
@@ -163,14 +165,14 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
             ways = counts["rays"] + counts["shadow_rays"]
             steps = counts["volume_steps"]
             lines.append(
-                f"volumes: {steps / ways:.3g} steps a ray, "
+                f"volumes: {steps / ways:.3g} steps per ray, "
                 f"{_percent(counts['volume_collisions'] / steps)} of them collisions, "
                 f"lanes {_percent(steps / counts['volume_lanes'])} full"
             )
         if counts.get("walks"):
             steps = counts["walk_steps"]
             lines.append(
-                f"below surfaces: {steps / counts['walks']:.3g} collisions a walk, "
+                f"subsurface: {steps / counts['walks']:.3g} collisions per random walk, "
                 f"lanes {_percent(steps / counts['walk_lanes'])} full"
             )
         lines.append(

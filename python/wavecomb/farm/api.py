@@ -66,7 +66,7 @@ def submit(
     loading, settings = split(options, without=("size", "threads"))
     frame = loading.pop("frame", None)
     if frame is not None and frames is not None:
-        raise WavecombError("frame is one frame and frames are several; give one of them")
+        raise WavecombError("frame and frames exclude each other; give one of them")
     size, aovs = _asked_for(stage, size, aovs, settings, loading)
     policy, costs = settings.pop("policy", None), settings.pop("costs", None)
     guides = aov_names.GUIDES if denoise else ()
@@ -75,7 +75,7 @@ def submit(
         aov_names.with_others(tuple(aovs or aov_names.DEFAULT), guides), settings,
     )  # fmt: skip
     if own is not None:
-        raise WavecombError("policy: a farm takes the name of one, not an object of this process")
+        raise WavecombError("policy: a farm needs a name, not an object of this process")
     LoadOptions.of(None, loading).check()
     kept = names if not denoise else aov_names.expand(tuple(aovs or aov_names.DEFAULT))
     done = Job(
@@ -182,12 +182,12 @@ def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
             lacking.append(
-                f"{job.title(image, missing[0])}{more}: not rendered, or damaged, or of another "
+                f"{job.title(image, missing[0])}{more}: not rendered, damaged, or of another "
                 "class of machines"
             )
             continue
         found = finish_image(folder, image, best)
         if found.get("again"):
-            lacking.append(f"{job.title(image)}: tiles must be rendered again: give it to resume")
+            lacking.append(f"{job.title(image)}: tiles must be rendered again: resume the job")
         written += found.get("files", [])
     return written, lacking

@@ -96,8 +96,8 @@ def parse_address(text: str) -> str:
         is_loopback = is_loopback or ipaddress.ip_address(host.strip("[]")).is_loopback
     if int(port) > 65535 or (kind == "tcp" and not is_loopback):
         raise WavecombError(
-            f"--on dask:{text}: is neither an address of this machine nor tls://: whoever reaches "
-            "a Dask scheduler runs code, so set up Dask's TLS (docs/farm.md)"
+            f"--on dask:{text}: is neither an address of this machine nor tls://: anyone who "
+            "reaches a Dask scheduler can run code, so set up Dask's TLS (docs/farm.md)"
         )
     return f"{kind}://{rest}"
 

@@ -29,7 +29,7 @@ def template(folder: Folder) -> dict[str, Any]:
     job = folder.job
     counts = {job.tile_count(image) for image in range(len(job.images))}
     if len(counts) > 1:
-        raise WavecombError(f"{folder.path}: images of several sizes have other tiles each")
+        raise WavecombError(f"{folder.path}: images of different sizes have different tiles")
     count = counts.pop()
     cancel = {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": _NOTICE_S}
 

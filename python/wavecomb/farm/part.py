@@ -158,7 +158,7 @@ def _as_floats(array: NDArray[Any]) -> NDArray[np.float32]:
     if array.dtype == np.float32:
         return np.ascontiguousarray(array)
     if array.dtype != np.uint32 or (array.size and int(array.max()) > _EXACT):
-        raise WavecombError(f"a layer of {array.dtype.name} has no exact place in a part")
+        raise WavecombError(f"a layer of {array.dtype.name} cannot be stored exactly in a tile")
     return array.astype(np.float32)
 
 
@@ -226,7 +226,7 @@ def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None)
             number=facts["number"],
         )  # fmt: skip
     except FileNotFoundError:
-        raise DamagedPart(f"{name}: is not there; the tile must be rendered again") from None
+        raise DamagedPart(f"{name}: is missing; the tile must be rendered again") from None
     except (OSError, KeyError, TypeError, ValueError) as error:
         why = error.args[0] if error.args else type(error).__name__
         raise DamagedPart(f"{name}: is damaged: {why}; the tile must be rendered again") from None

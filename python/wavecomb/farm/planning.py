@@ -50,7 +50,7 @@ def complete(
     Raises: WavecombError: A farm cannot render the job, or files are missing.
     """
     if not job.images:
-        raise WavecombError("all images are there; nothing is left to render")
+        raise WavecombError("all images exist; nothing is left to render")
     for shot in job.shots:
         check_reproducible(shot.settings)
         if tiles is not None:

@@ -162,12 +162,12 @@ def check_reproducible(settings: Mapping[str, Any]) -> None:
     """Raises WavecombError for settings whose images differ from render to render."""
     if settings.get("time_limit"):
         raise WavecombError(
-            "--time-limit: how many samples fit depends on the machine, so a farm's pictures would "
-            "differ from one machine's: give --spp, --adaptive or --noise"
+            "--time-limit: the sample count would depend on the machine, so a farm's images would "
+            "differ from those of one machine: give --spp, --adaptive or --noise"
         )
     if settings.get("costs") == "measured" and _costs_matter(settings):
         raise WavecombError(
-            "--costs measured: times of one machine decide over the picture here, and a farm has "
+            "--costs measured: the image would depend on times of one machine, and a farm has "
             "several: give --costs model"
         )
 
@@ -183,7 +183,7 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
     if settings.get("allocate", "even") != "even":
         return f"--allocate {settings['allocate']}: shares samples out over the whole picture"
     if settings.get("firefly", "keep") != "keep":
-        return f"--firefly {settings['firefly']}: looks at the pixels around each"
+        return f"--firefly {settings['firefly']}: depends on neighbouring pixels"
     return ""
 
 
@@ -205,4 +205,4 @@ def check_tiles(settings: Mapping[str, Any], tiles: tuple[int, int]) -> None:
     """Raises WavecombError if images cannot be divided into these tiles."""
     why = needs_whole(settings)
     if why and tiles != (1, 1):
-        raise WavecombError(f"{why}, which tiles do not see: give --tiles 1x1")
+        raise WavecombError(f"{why}, which a tile lacks: give --tiles 1x1")

@@ -53,10 +53,10 @@ class FarmDialog(QDialog):
         self._command.finished.connect(self._end)
         self._is_resuming = False
         self.output = self._line(
-            "farm.output", "Picture", output, "A file; for frames a name with ####"
+            "farm.output", "Picture", output, "File name; with #### for several frames"
         )
         self.frames = self._line(
-            "farm.frames", "Frames", "", "Such as 1-48; empty: the one that is shown"
+            "farm.frames", "Frames", "", "Such as 1-48; empty means the current frame"
         )
         self.tiles = self._line(
             "farm.tiles", "Tiles", "auto", "auto, or columns and rows such as 4x3"
@@ -64,10 +64,10 @@ class FarmDialog(QDialog):
         self.engine = self._line(
             "farm.on", "On", "local:2", "local:N, dask:ADDRESS, slurm:N, or none"
         )
-        self.send = named(QPushButton("&Send"), "farm.send", "Send", "Write the job and work on it")
-        self.stop = named(QPushButton("S&top"), "farm.stop", "Stop", "Finished tiles are kept")
-        self.bar = named(QProgressBar(), "farm.bar", "Progress", "Tasks that are done")
-        self.state = named(QLabel(), "farm.state", "State", "Where the job stands")
+        self.send = named(QPushButton("&Send"), "farm.send", "Send", "Write the job and render it")
+        self.stop = named(QPushButton("S&top"), "farm.stop", "Stop", "Keeps finished tiles")
+        self.bar = named(QProgressBar(), "farm.bar", "Progress", "Finished tasks")
+        self.state = named(QLabel(), "farm.state", "State", "State of the job")
         self.state.setWordWrap(True)
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.stop.setEnabled(False)

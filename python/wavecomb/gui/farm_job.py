@@ -47,16 +47,14 @@ def describe(session: Session, edits: StageEdits | None, output: str) -> dict[st
     if Path(output).suffix.lower() != ".exr":
         raise WavecombError(f"{output or 'Picture'}: give a file that ends in .exr")
     if setup.own_policy is not None:
-        raise WavecombError("a policy in Python is of this window; choose another")
+        raise WavecombError("a Python policy exists only in this window; choose another")
     if session.pose is not None and session.pose.path is None:
-        raise WavecombError(
-            "the view is free, and a job renders through a camera: choose one of the stage's"
-        )
+        raise WavecombError("the view is free, and a job needs a camera: choose one of the stage")
     stage = str(source.path)
     if edits is not None and edits.lines():
         if edits.values:
             raise WavecombError(
-                f"{len(edits.values)} edit(s) have no place in a layer, so a job would lack them"
+                f"{len(edits.values)} edit(s) cannot be saved in a layer, so a job would lack them"
             )
         target = Path(output.replace("#", "") or "shot").with_suffix(".edits.usda")
         stage = str(save_edits(edits.stage, target))

@@ -274,7 +274,7 @@ class MainWindow(TakesFiles, QMainWindow):
 
     def _state_changed(self, state: str) -> None:
         pause = self.actions_by_name["pause"]
-        pause.setText({"paused": "&Go on", "stopped": "&Go on"}.get(state, "&Pause"))
+        pause.setText({"paused": "&Continue", "stopped": "&Continue"}.get(state, "&Pause"))
         pause.setEnabled(state in ("rendering", "paused", "stopped"))
         self.actions_by_name["stop"].setEnabled(state in ("rendering", "paused"))
         self.actions_by_name["restart"].setEnabled(self.session.stage is not None)

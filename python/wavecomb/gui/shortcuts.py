@@ -23,14 +23,14 @@ from wavecomb.gui.actions import TITLE
 from wavecomb.gui.widgets import named, search_field
 
 MOUSE = (
-    ("Orbit about what is under the cursor", "Middle drag, Alt+Left drag"),
+    ("Orbit about the point under the cursor", "Middle drag, Alt+Left drag"),
     ("Pan", "Shift+Middle drag"),
     ("Dolly", "Wheel, Ctrl+Middle drag, Alt+Right drag"),
-    ("Select what is there", "Left click"),
+    ("Select the prim under the cursor", "Left click"),
     ("Zoom the picture", "Ctrl+Wheel"),
-    ("Shift the picture", "Right drag"),
+    ("Pan the picture", "Right drag"),
     ("Orbit by 15 degrees", "Arrow keys, in the viewport"),
-    ("Pan by a tenth", "Shift+arrow keys, in the viewport"),
+    ("Pan by a tenth of the picture", "Shift+arrow keys, in the viewport"),
     ("Dolly in, out", "PgUp, PgDown, in the viewport"),
 )
 """Mouse and keyboard controls of the viewport that are not actions."""

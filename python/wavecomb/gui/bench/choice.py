@@ -162,7 +162,7 @@ class SuiteChoice(QWidget):
         self.folder.textChanged.connect(lambda text: self.changed.emit())
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
-        tip = "Choose a suite of your own, a TOML file"
+        tip = "Choose a TOML file with a custom suite"
         form.addRow("Suite", self._with_button(self.suite, "suiteFile", tip, self._ask_suite))
         form.addRow("", self.about)
         form.addRow("Stages", self.stages)
@@ -208,7 +208,7 @@ class SuiteChoice(QWidget):
         if info is None:
             problem = "no suite is chosen"
         elif not stages:
-            problem = "no stage is chosen: tick one at least"
+            problem = "no stage is chosen: check at least one"
         elif not self.folder.text().strip():
             problem = "choose a folder for the results"
         if problem or info is None:
@@ -272,7 +272,7 @@ class SuiteChoice(QWidget):
             self.about.setText(
                 f"{info.configurations} configurations ({parts}); with {self.repetitions.value()} "
                 f"repetitions {runs} runs on all stages. Roughly {time_text(seconds)} for the "
-                "chosen stages, and the time to make stages and converged pictures."
+                "chosen stages, plus the time to make stages and golden images."
             )
         self.changed.emit()
 

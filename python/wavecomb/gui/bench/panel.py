@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
 
 _PREPARES = {
-    "stage": "Making the stage",
-    "golden": "Rendering the converged picture",
+    "stage": "Generating the stage",
+    "golden": "Rendering the golden image",
     "trace": "Recording the oracle's trace",
     "warm-up": "Warming up",
 }

@@ -85,7 +85,7 @@ def _test(
     a: Side, b: Side, layer: str, one: NDArray[Any], two: NDArray[Any]
 ) -> tuple[ZTest | None, str]:
     if layer != "beauty":
-        return None, "of the beauty only"
+        return None, "available only for the beauty"
     variances = [side.variance for side in (a, b)]
     if all(variance is None for variance in variances):
         return None, "needs a variance: a layer of an adaptive render, or NAME_var.exr"
@@ -102,11 +102,11 @@ def rows(found: Numbers) -> list[tuple[str, str, str]]:
     pixels = c.width * c.height
     at = c.luminance_max_at
     out = [
-        ("Verdict", verdict(found), "Equal means every bit of this layer: -0 is not 0"),
+        ("Verdict", verdict(found), "Equal means bit-identical in this layer; -0 differs from 0"),
         (
             "Pixels that differ",
             f"{c.pixels_different} of {pixels} ({100 * c.pixels_different / pixels:.3g} %)",
-            "Pixels with other bits",
+            "Pixels whose bits differ",
         ),
         ("relMSE", f"{c.rel_mse:.4g}", "Mean of (A - B)² / (B² + 0.01)"),
         (
@@ -115,16 +115,16 @@ def rows(found: Numbers) -> list[tuple[str, str, str]]:
             "relMSE without the 0.1 % of pixels with the largest terms",
         ),
         ("RMSE", f"{c.rmse:.4g}", "Square root of the mean of (A - B)², linear"),
-        ("PSNR", decibels(found.psnr), "-10 log10 of the mean of (A - B)² of the values as shown"),
+        ("PSNR", decibels(found.psnr), "-10 log10 of the mean of (A - B)² as displayed"),
         (
             "FLIP, mean",
             f"{found.flip:.4g}" if found.flip is not None else found.flip_note,
-            "How different the two look as shown: 0 equal, 1 the most",
+            "Perceptual difference of the displayed images, from 0 (equal) to 1",
         ),
         (
             "Largest difference",
             f"{c.max_abs:.4g}" + (f" near {at[0]}, {at[1]}" if at else ""),
-            "Of any channel; the pixel is that with the largest difference of luminance",
+            "Of any channel; the pixel has the largest difference of luminance",
         ),
         ("Mean difference", _row(c.mean_signed), "Mean of A - B of each channel"),
     ]
@@ -164,7 +164,7 @@ def _test_rows(found: Numbers) -> list[tuple[str, str, str]]:
     accepted = f"{100 * test.pixels_accepted:.4g} % of pixel channels"
     return [
         ("z-test", f"{said}, p = {test.p_value:.3g}{where}", why),
-        ("z-test, pixels", accepted, "Share of pixel channels that pass on their own"),
+        ("z-test, pixels", accepted, "Fraction of pixel channels that pass the test individually"),
     ]
 
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from wavecomb.gui.compare.source import SideSource
 
 NOTE = (
-    "Both renders go on at once and share all threads evenly, so each is slower than alone. "
-    "Compare pictures here; compare times by the benchmark."
+    "Both renders run at once and share all threads evenly, so each is slower than alone. "
+    "Compare images here, and times with the benchmark."
 )
 
 
@@ -40,7 +40,7 @@ _SHOWN: dict[str, dict[str, Any]] = {
     "adaptive": {"least": 0.0, "most": 1.0},
     "clamp_indirect": {"most": 1000.0, "step": 1.0, "decimals": 2},
 }
-SAME = "Changes no bit of the picture."
+SAME = "Does not change the image."
 
 
 def _row(name: str) -> Choice | Number:

@@ -44,7 +44,7 @@ class SidePicker(TakesFiles, QWidget):
         self.setObjectName(f"side{name}")
         self.setAcceptDrops(True)
         self._button = tool(
-            f"choose{name}", f"{name}  ", f"Choose where picture {name} is from", self
+            f"choose{name}", f"{name}  ", f"Choose the source of picture {name}", self
         )
         self._button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self._button.setMenu(self._menu())
@@ -83,12 +83,12 @@ class SidePicker(TakesFiles, QWidget):
                 "EXR with any layers, PNG, .npy of a results folder",
                 self.ask,
             ),
-            ("keep", "&Keep the viewport's picture", "As it is now", self.source.keep),
-            ("follow", "Follow the &viewport", "The picture as it goes on", self.source.follow),
+            ("keep", "&Keep the viewport's picture", "Without later changes", self.source.keep),
+            ("follow", "Follow the &viewport", "With all later changes", self.source.follow),
             (
                 "render",
                 "&Render with other settings",
-                "A second live render of the same stage, beside the viewport's",
+                "Start a second live render of the same stage",
                 self.render_other,
             ),
         ):

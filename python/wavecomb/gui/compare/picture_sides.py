@@ -100,7 +100,7 @@ def side_of_frame(frame: Frame, name: str, *, live: bool) -> Side:
         note += f", {done / (frame.width * frame.height):.3g} samples a pixel"
     if frame.scale > 1:
         note += f", 1/{frame.scale} of the size"
-    note += ", done" if frame.final else ", going on" if live else ""
+    note += ", done" if frame.final else ", rendering" if live else ""
     return Side(name, layers, note, None, layers.get("variance"), live and not frame.final)
 
 
@@ -128,7 +128,7 @@ def problem(a: Side | None, b: Side | None, layer: str) -> str:
     if a.size != b.size:
         return (
             f"A is {a.size[0]} x {a.size[1]}, B is {b.size[0]} x {b.size[1]}: only pictures of one "
-            "size have differences. Render or choose one at the size of the other."
+            "size can be subtracted. Render or choose one at the size of the other."
         )
     one, two = a.layer(layer), b.layer(layer)
     if one is None or two is None:

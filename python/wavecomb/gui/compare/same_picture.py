@@ -83,7 +83,7 @@ class PictureBook:
         differences.
         """
         if key is None:
-            return Verdict("none", "Time decides over this picture: no two are alike")
+            return Verdict("none", "This picture depends on time, so no two are equal")
         place = (key, samples)
         if place not in self._pictures:
             self._pictures[place] = (mark, dict(settings))

@@ -118,7 +118,7 @@ class CompareWindow(QWidget):
         bar.addStretch(1)
         for name, text, tip, call in (
             ("fit", "Fit", "The whole picture (0)", self.view.fit),
-            ("one", "1:1", "Pixel by pixel (1)", self._one_to_one),
+            ("one", "1:1", "One image pixel per screen pixel (1)", self._one_to_one),
         ):
             button = tool(name, text, tip, self)
             button.clicked.connect(lambda checked=False, call=call: call())
@@ -137,10 +137,10 @@ class CompareWindow(QWidget):
 
     def _look_bar(self) -> QHBoxLayout:
         bar = QHBoxLayout()
-        self._map = self._combo("map", "Difference", "What the difference shows")
+        self._map = self._combo("map", "Difference", "Kind of difference to show")
         for kind, title in MAPS.items():
             self._map.addItem(title, kind)
-        self._layer = self._combo("layer", "Layer", "Layer that both have")
+        self._layer = self._combo("layer", "Layer", "Layer to compare")
         self._layer.addItem("beauty")
         self._exposure = real(
             "compareExposure", "Exposure of both",

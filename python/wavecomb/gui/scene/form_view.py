@@ -154,7 +154,7 @@ class Group(QWidget):
             QToolButton(),
             f"group-{title.lower().replace(' ', '-')}",
             f"{title}, inputs",
-            "Fold, or open",
+            "Collapse or expand",
         )
         self.head.setText(title)
         self.head.setAutoRaise(True)

@@ -68,11 +68,11 @@ class LightInput:
 
 BRIGHTNESS = (
     LightInput("intensity", "intensity", "intensity", NUMBER, 1.0,
-               Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True), "What the colour is multiplied by"),
+               Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True), "Factor on the colour"),
     LightInput("exposure", "exposure", "exposure", NUMBER, 0.0,
-               Range(-30.0, 30.0, -10.0, 10.0, 2), "Stops: one more is twice as bright"),
+               Range(-30.0, 30.0, -10.0, 10.0, 2), "Stops; each doubles the brightness"),
     LightInput("color", "color", "colour", COLOUR, (1.0, 1.0, 1.0), Range(0.0, 1e4, 0.0, 1.0),
-               "Linear Rec.709; the colour temperature of the stage comes on top"),
+               "Linear Rec.709, multiplied by the colour temperature of the stage"),
 )  # fmt: skip
 """Inputs that the core combines into one colour."""
 

@@ -76,10 +76,10 @@ class LightsModel(HeadedModel):
 
     def _tip(self, path: str, column: int) -> str:
         if not path:
-            return "Added because the stage has no light; it is not on the stage"
+            return "Added because the stage has no light; not part of the stage"
         if column == ON:
-            return "Switches the light: its visibility on the stage"
-        return "Shows this light alone, or all again" if column == SOLO else path
+            return "Switches the light on or off, by its visibility on the stage"
+        return "Shows only this light, or all lights again" if column == SOLO else path
 
     def setData(self, index: Any, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Switches a light by its check box."""
@@ -119,7 +119,7 @@ class LightForm(FormModel):
 
     def _row(self, path: str, one: LightInput) -> FieldRow:
         reason = self._edits.light_reason(path)
-        where = f"in the picture only, it cannot be saved: {reason}" if reason else "on the stage"
+        where = f"only in the picture, cannot be saved: {reason}" if reason else "on the stage"
         return FieldRow(
             one.name,
             one.label,

@@ -104,7 +104,7 @@ class LightsPanel(ListAndForm):
 
     def __init__(self, edits: SceneEdits) -> None:
         form = LightForm(edits)
-        tip = "Lights of the stage, with those that are off"
+        tip = "Lights of the stage, including those that are off"
         widths = {KIND: 5, ON: 3, SOLO: 3.4}
         super().__init__(LightsModel(edits), form, form.show_light, "light", "Light", tip, widths)
 
@@ -120,7 +120,7 @@ class MaterialsPanel(ListAndForm):
 
     def __init__(self, edits: SceneEdits) -> None:
         model, form = MaterialsModel(edits), MaterialForm(edits)
-        tip, widths = "Materials that are in use", {PROGRAM: 5.5, RECORDS: 6, COST: 3}
+        tip, widths = "Materials in use", {PROGRAM: 5.5, RECORDS: 6, COST: 3}
         super().__init__(model, form, form.show_material, "material", "Material", tip, widths)
 
     def choose(self, path: str) -> bool:

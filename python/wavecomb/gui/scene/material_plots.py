@@ -32,7 +32,7 @@ from wavecomb.run.progress import count_text
 
 ORDERS = {
     "time": "By shading time: records x nanoseconds.",
-    "ns per record": "By what a record costs.",
+    "ns per record": "By cost per record.",
     "records": "By number of records.",
 }
 
@@ -113,12 +113,12 @@ def short_names(paths: Sequence[str]) -> list[str]:
 
 _HEADER = {
     "material": "",
-    "program": "The code that lanes run together.",
-    "records": "Hits shaded.",
+    "program": "The shading program of the material.",
+    "records": "Number of shaded hits.",
     "time": "Share of the shading time of all materials.",
-    "measured": "Nanoseconds a record, over timed batches; empty where none was timed.",
-    "predicted": "Nanoseconds a record, as the next pass is scheduled by.",
-    "calibrated": "Nanoseconds a record, measured on synthetic hits before the first pass.",
+    "measured": "Nanoseconds per record over timed batches; empty if none was timed.",
+    "predicted": "Nanoseconds per record, used to schedule the next pass.",
+    "calibrated": "Nanoseconds per record, measured on synthetic hits before the first pass.",
 }
 
 
@@ -141,7 +141,7 @@ class MaterialsTab(QWidget):
             QComboBox(),
             "materials_of",
             "Series whose materials are shown",
-            "Of which series; of its longest run.",
+            "Series of which the longest run is shown.",
         )
         self.of.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -154,8 +154,8 @@ class MaterialsTab(QWidget):
         self.top = named(
             QSpinBox(),
             "materials_top",
-            "How many materials have bars",
-            "How many materials have bars; the table has all.",
+            "Number of materials with bars",
+            "Number of materials with bars; the table has all.",
         )
         self.top.setRange(1, 40)
         self.top.setValue(10)
@@ -250,7 +250,7 @@ class MaterialsTab(QWidget):
         text = f"{len(self._rows)} materials were shaded."
         if prediction.get("materials"):
             r2 = prediction["r2"]
-            worth = f"{r2:.2f}" if r2 >= 0.0 else "below 0, worse than one mean for all"
+            worth = f"{r2:.2f}" if r2 >= 0.0 else "below 0, worse than a common mean"
             text += (
                 f" Prediction of the last pass: r² {worth}, mean error "
                 f"{100 * prediction['mean_error']:.0f} %, over {prediction['materials']} materials."

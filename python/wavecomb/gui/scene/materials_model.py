@@ -31,9 +31,9 @@ NAME, PROGRAM, RECORDS, COST = range(4)
 HEADERS = ("Material", "Program", "Records", "ns")
 TIPS = (
     "Prim of the material",
-    "Shading code that it runs",
-    "Hits that were shaded with it (statistics: records)",
-    "Nanoseconds for each of them, measured (statistics: ns_per_record)",
+    "Shading program of the material",
+    "Number of shaded hits (statistics: records)",
+    "Measured nanoseconds per hit (statistics: ns_per_record)",
 )
 
 
@@ -130,8 +130,8 @@ class MaterialsModel(HeadedModel):
         if role == ColourRole and column == NAME:
             return self.colours[index.row()]
         if role == Qt.ItemDataRole.ToolTipRole:
-            more = f"\n{len(row.ids)} of them: meshes bring values" if len(row.ids) > 1 else ""
-            return (row.path or "made by the loader: of a display colour") + more
+            more = f"\n{len(row.ids)} versions: meshes override values" if len(row.ids) > 1 else ""
+            return (row.path or "made by the loader from a display colour") + more
         if role == Qt.ItemDataRole.TextAlignmentRole and column in (RECORDS, COST):
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None
@@ -234,7 +234,7 @@ def row_of(parameter: Parameter) -> FieldRow:
         tip = f"{name}: edits {parameter.attribute}"
     else:
         why = parameter.reason
-        tip = f"{name}: in the picture only, edits of it cannot be saved: {why}"
+        tip = f"{name}: only in the picture, edits cannot be saved: {why}"
     return FieldRow(
         name,
         one.label if one is not None else LABELS.get(name, title),

@@ -68,8 +68,8 @@ class NotesPanel(QWidget):
         view = self.view
         view.setModel(self._filter)
         view.setItemDelegate(RowDelegate(view))
-        tip = "Double click chooses the prim; Ctrl+C copies"
-        show_rows(view, "notes", "What loading found", tip)
+        tip = "Double click selects the prim; Ctrl+C copies"
+        show_rows(view, "notes", "Findings of the loader", tip)
         view.setSortingEnabled(True)
         view.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
         view.setWordWrap(False)
@@ -91,7 +91,7 @@ class NotesPanel(QWidget):
     def _refilter(self) -> None:
         self._filter.set(self.kinds.currentData(), self.field.text().strip())
         shown, there = self._filter.rowCount(), len(self.model.rows)
-        self.count.setText(f"{shown} of {there}" if there else "nothing to say about this stage")
+        self.count.setText(f"{shown} of {there}" if there else "no findings for this stage")
 
     def _row(self, index: QModelIndex) -> Row:
         return self.model.rows[self._filter.mapToSource(index).row()]

@@ -199,7 +199,7 @@ class SceneEdits(QObject, RenderSync):
         if self.edits.values:
             count = len(self.edits.values)
             self.session.warned.emit(
-                f"{path}: {count} edit(s) are not in it: the stage has no place for them"
+                f"{path}: {count} edit(s) are not in it: no attribute can hold them"
             )
         self.history.stack.setClean()
         self.session.saved.emit(path)

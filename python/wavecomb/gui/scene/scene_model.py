@@ -227,13 +227,13 @@ class SceneModel(QAbstractItemModel):
             count = len(prim.GetPrototype().GetInstances())
             lines.append(f"one of {count} instances that share their contents")
         if prim.IsInstanceProxy():
-            lines.append("inside an instance: shown, and not to be edited here")
+            lines.append("inside an instance: cannot be edited here")
         if column == VISIBILITY:
             seen, by = state(prim, self._edits.time)
             if reason := uneditable(prim):
                 lines.append(reason)
             elif seen == HIDDEN_ABOVE:
-                lines.append(f"hidden by {by}; a click shows this prim alone of what is in it")
+                lines.append(f"hidden by {by}; click to show only this prim in it")
             else:
                 lines.append("click to hide" if seen == VISIBLE else "click to show")
         if column == VARIANTS and self._text(prim, VARIANTS):

@@ -185,8 +185,8 @@ class SceneTree(QWidget):
         self.view = _View(edits, self.model)
         self.field = search_field(
             "scene-search", "Search prims",
-            "Shows the prims whose name or type contains this text; text with a / in it is looked "
-            "for in paths", "Search names, types or paths",
+            "Shows the prims whose name or type contains this text; a text with / is "
+            "searched in paths", "Search names, types or paths",
         )  # fmt: skip
         self.found = QLabel()
         self._search: Iterator[list[Sdf.Path]] | None = None
@@ -210,7 +210,7 @@ class SceneTree(QWidget):
         self.found.setObjectName("scene-found")
         self.found.hide()
         view = self.view
-        tip = "Space or a click on the eye shows and hides; F frames what is selected"
+        tip = "Space or a click on the eye shows and hides; F frames the selected prims"
         named(view, "scene-tree", "Prims of the stage", tip)
         view.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         view.setUniformRowHeights(True)

@@ -158,9 +158,7 @@ class StageEdits:
             known = self.opinion(key)
             value = _text(known.value) if known is not None else ""
             if what.startswith("!"):
-                out.append(
-                    f"{path} {what[1:]} = {value} (not saved: the stage has no place for it)"
-                )
+                out.append(f"{path} {what[1:]} = {value} (not saved: no attribute can hold it)")
             else:
                 out.append(f"{path}{what} = {value}")
         return out

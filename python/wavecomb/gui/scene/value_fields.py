@@ -120,7 +120,7 @@ class Field(QWidget):
         self.lines.setSpacing(theme.em(0.1))
         self.row = QHBoxLayout()
         self.lines.addLayout(self.row)
-        self.back = named(QToolButton(), "reset", f"Reset {name}", "Back to the value of the stage")
+        self.back = named(QToolButton(), "reset", f"Reset {name}", "Reset to the stage's value")
         self.back.setText("\N{ANTICLOCKWISE OPEN CIRCLE ARROW}")
         self.back.setAutoRaise(True)
         self.back.clicked.connect(self.reset)
@@ -317,6 +317,6 @@ class DrivenField(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(PlainText(driver), 1)
         self.setToolTip(
-            f"{name} comes from {driver}, so there is no number to change; "
-            "edit that, or the network of the material"
+            f"{name} comes from {driver}, so it has no number; "
+            "edit that source or the material network"
         )

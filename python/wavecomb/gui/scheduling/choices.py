@@ -53,8 +53,8 @@ def lane_choices() -> dict[Any, str]:
 
 
 WAVE_SIZES: dict[Any, str] = {
-    0: "As wide as the caches of this machine ask for.",
-    **{1 << n: f"{1 << n} paths a wave." for n in range(8, 21)},
+    0: "Chosen by the caches of this machine.",
+    **{1 << n: f"{1 << n} paths per wave." for n in range(8, 21)},
 }
 
 
@@ -102,10 +102,10 @@ def fields_of(group: str, without: tuple[str, ...] = ()) -> tuple[Choice | Numbe
 
 
 ADAPTIVE_MODES = {
-    "off": "Every pixel gets as many samples.",
-    "pixel": "Pixels stop when their own error is small enough.",
-    "noise": "The render ends when the picture's mean error is small enough; samples go where "
-    "the noise is.",
+    "off": "Every pixel gets the same number of samples.",
+    "pixel": "A pixel stops when its error is small enough.",
+    "noise": "The render ends when the image's mean error is small enough; noisy pixels get more "
+    "samples.",
 }
 ORDER_FIELDS = names("order", without=("progressive",))
 WORK_FIELDS = names("work")
@@ -136,7 +136,7 @@ def promise(setup: Setup) -> str:
             "Nothing in this group but Costs changes a bit of the picture: cost-aware roulette "
             "goes by them."
         )
-    return "Nothing in this group changes a bit of the picture."
+    return "These settings do not change the picture."
 
 
 def recipe_of(setup: Setup) -> dict[str, Any]:
@@ -154,23 +154,21 @@ def presets() -> dict[str, tuple[str, dict[str, Any]]]:
     """Returns presets as (description, settings) by name. All but the first set only the order."""
     order = defaults((*ORDER_FIELDS, "own_policy", "profile"))
     return {
-        "Default": ("What a render does unless told otherwise.", order),
+        "Default": ("Default settings.", order),
         "Reference: none, 1 lane": (
-            "Arrival order, one lane, rays as generated: what orders and lanes are measured "
-            "against.",
+            "Arrival order, one lane, rays as generated: the baseline for orders and lanes.",
             order | {"policy": "none", "lanes": 1, "ray_order": "slot", "shadow_order": "slot"},
         ),
         "Lanes only: none, widest": (
-            "Arrival order in full lanes: what lanes give without an order.",
+            "Arrival order in full lanes: the gain of lanes without an order.",
             order | {"policy": "none", "ray_order": "slot", "shadow_order": "slot"},
         ),
         "Placebo: random-runs": (
-            "Runs of one material in an order that means nothing: what the order of runs has to "
-            "beat.",
+            "Runs of one material in random order: the baseline for the order of runs.",
             order | {"policy": "random-runs"},
         ),
         "Oracle: reference integrator": (
-            "One path at a time, depth first: what every picture must equal.",
+            "One path at a time, depth first: the reference for every picture.",
             order | {"integrator": "reference", "traversal": "single"},
         ),
     }

@@ -81,7 +81,7 @@ class SchedulingPanel(QScrollArea):
 
     def _presets_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
-        self._preset = named(QComboBox(), "preset", "Preset", "Sets the whole group below.")
+        self._preset = named(QComboBox(), "preset", "Preset", "Sets the group below.")
         self._preset.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
@@ -94,7 +94,7 @@ class SchedulingPanel(QScrollArea):
         self._preset.activated.connect(
             lambda index: self._session.change(**self._preset.itemData(index))
         )
-        tip = "Sets all of this panel back to what a render does by default."
+        tip = "Resets this panel to the default settings."
         reset = named(QPushButton("Reset"), "reset", "Reset", tip)
         reset.clicked.connect(self._reset)
         row.addWidget(self._preset, 1)
@@ -112,21 +112,21 @@ class SchedulingPanel(QScrollArea):
         form.addRow(self.light)
         self._try = named(
             QPushButton("Try every policy"), "try_every_policy", "Try every policy",
-            "Renders the picture with each policy in turn and compares the bits; then sets the "
-            "policy back. Press the button again to stop.",
+            "Renders the picture with each policy in turn and compares the bits; then restores "
+            "the policy. Press again to stop.",
         )  # fmt: skip
         self._try.clicked.connect(self._try_every_policy)
         form.addRow(self._try)
         buttons: dict[str, tuple[tuple[str, str, str, Any], ...]] = {
             "policy": (
-                ("load_policy", "Load…", "Load a policy of your own: a Python file that "
+                ("load_policy", "Load…", "Load a custom policy: a Python file that "
                  "defines a subclass of wavecomb.SchedulingPolicy.", self._ask_policy),
-                ("reload_policy", "↻", "Load the file again, after an edit.",
+                ("reload_policy", "↻", "Reload the file after an edit.",
                  self._reload_policy),
             ),
             "costs": (
-                ("load_profile", "File…", "Start from the costs of an earlier render: the "
-                 "file that its --costs FILE.json wrote.", self._ask_profile),
+                ("load_profile", "File…", "Start with the costs of an earlier render: "
+                 "the file written by --costs FILE.json.", self._ask_profile),
             ),
         }  # fmt: skip
         for one in choices.fields_of("order", without=("progressive",)):

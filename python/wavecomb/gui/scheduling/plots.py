@@ -226,10 +226,9 @@ def _points() -> str:
 
 SHARE, EACH, TIME = "share of time", "ns per sample", "over time"
 MODES = {
-    SHARE: "What part of the threads' time each phase took, for each series.",
-    EACH: "Thread nanoseconds that a camera path takes in each phase: shorter is faster, where "
-    "the work is the same.",
-    TIME: "The share of each phase in the run that goes on, from its start at the top to now.",
+    SHARE: "Fraction of thread time in each phase, for each series.",
+    EACH: "Thread nanoseconds per camera path in each phase. At equal work, shorter is faster.",
+    TIME: "Fraction of each phase in the current run, from its start (top) to now.",
 }
 _TITLES = {
     SHARE: "Phases: % of thread time",
@@ -292,7 +291,7 @@ class PhasePlot(QWidget):
         super().__init__()
         self.mode = QComboBox()
         self.mode.setObjectName("phase_mode")
-        self.mode.setAccessibleName("What the bars of phases show")
+        self.mode.setAccessibleName("Unit of the bars of phases")
         for i, (name, tip) in enumerate(MODES.items()):
             self.mode.addItem(name)
             self.mode.setItemData(i, tip, Qt.ItemDataRole.ToolTipRole)

@@ -46,10 +46,10 @@ class PlotsPanel(QWidget):
         self.tabs.addTab(self.runs, "Runs")
         for i, tip in enumerate(
             (
-                "Phases of the threads, and samples and rays a second.",
+                "Phases of the threads, and samples and rays per second.",
                 "Lane utilisation, run length and homogeneity of queues.",
-                "What a record of each material costs, and how many there are.",
-                "The last runs and how they compare.",
+                "Cost per record and number of records of each material.",
+                "Comparison of recent runs.",
             )
         ):
             self.tabs.setTabToolTip(i, tip)
@@ -75,8 +75,8 @@ class PlotsPanel(QWidget):
     # --------------------------------------------------------------------------------
 
     def _time_tab(self) -> QWidget:
-        samples = self._add_curves("samples_rate", "Samples a second", _rates("samples"))
-        rays = self._add_curves("rays_rate", "Rays a second", _rates("rays"))
+        samples = self._add_curves("samples_rate", "Samples per second", _rates("samples"))
+        rays = self._add_curves("rays_rate", "Rays per second", _rates("rays"))
         return self._grid(
             (self.phases, 0, 0, 2), (samples, 1, 0, 1), (rays, 1, 1, 1), stretch=(3, 2)
         )
@@ -102,9 +102,9 @@ class PlotsPanel(QWidget):
             (self._add_curves("lane_utilisation", "Lane utilisation, %", lanes), 0, 0, 1),
             (self._add_curves("run_length", "Run length, records",
                               coherence("run_length")), 0, 1, 1),
-            (self._add_curves("material_homogeneity", "Neighbours: one material, %",
+            (self._add_curves("material_homogeneity", "Neighbours: same material, %",
                               coherence("material_homogeneity", 100.0)), 1, 0, 1),
-            (self._add_curves("texture_homogeneity", "Neighbours: one texture place, %",
+            (self._add_curves("texture_homogeneity", "Neighbours: same texture position, %",
                               coherence("texture_homogeneity", 100.0)), 1, 1, 1),
             stretch=(1, 1),
         )  # fmt: skip
@@ -205,6 +205,6 @@ def summary(series: Series | None) -> str:
     samples = rate(run, "samples")
     text = f"{count_text(samples.value)} samples/s and {count_text(rate(run, 'rays').value)} rays/s"
     if samples.is_short:
-        return f"{text} over {samples.seconds:.1f} s: too few looks to mean anything."
-    spread = f"± {100 * samples.spread:.0f} % from stretch to stretch"
+        return f"{text} over {samples.seconds:.1f} s: too short to have meaning."
+    spread = f"± {100 * samples.spread:.0f} % between intervals"
     return f"{text} over {samples.seconds:.1f} s ({spread})."

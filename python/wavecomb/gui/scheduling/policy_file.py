@@ -59,7 +59,7 @@ class OwnPolicy(SchedulingPolicy):
             return self.policy.order(queue, costs, keys)
         except Exception as error:
             message = describe_failure(error, self.path)
-            raise WavecombError(f"{message}; mend it and load it again") from error
+            raise WavecombError(f"{message}; fix it and load it again") from error
 
 
 def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
@@ -92,7 +92,7 @@ def _run(path: Path) -> types.ModuleType:
         why = str(error) if error.strerror is None else f"{path}: {error.strerror}"
         raise WavecombError(why) from None
     except UnicodeDecodeError:
-        raise WavecombError(f"{path}: is no text in UTF-8; choose a Python file") from None
+        raise WavecombError(f"{path}: is not UTF-8 text; choose a Python file") from None
     module = types.ModuleType(f"wavecomb_policy_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickle look there

@@ -29,19 +29,19 @@ COLUMNS = (
     "changed",
 )
 _TIPS = {
-    "settings": "Those that are not the same in all rows.",
-    "changed": "What is different from the series before.",
-    "runs": "Renders with these settings. What is no rate is of the longest.",
-    "samples/s": "Over all time in which the settings held. In brackets where that was too short "
-    "to mean anything.",
-    "spread": "Standard deviation of samples/s: over runs, or over the stretches of a single one.",
+    "settings": "Settings that differ between rows.",
+    "changed": "Differences from the previous series.",
+    "runs": "Renders with these settings. Columns without rates show the longest one.",
+    "samples/s": "Over the whole time with these settings. In brackets if that was too short "
+    "to have meaning.",
+    "spread": "Standard deviation of samples/s: over runs, or over intervals of a single run.",
     "rays/s": "Camera, bounce and shadow rays.",
-    "ns/record": "Thread time of keys, sort, materialize and shade, for each record.",
+    "ns/record": "Thread time of keys, sort, materialize and shade, per record.",
     "lanes used": "Records / (packets x lanes).",
     "run length": "Records in an unbroken run of one material.",
-    "speed": "As a multiple of the pinned row, or of the first of this picture, at equal samples.",
-    "95 %": "Interval of the speed: over repeats, or over stretches where there is one pair only.",
-    "verdict": "A difference holds where three repeats agree that there is one.",
+    "speed": "Relative to the pinned row, or to the first of this picture, at equal samples.",
+    "95 %": "Interval of the speed: over repeats, or over intervals of a single pair.",
+    "verdict": "A difference holds if three repeats confirm it.",
 }
 TIPS = {name: _TIPS[name] for name in COLUMNS}
 LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))

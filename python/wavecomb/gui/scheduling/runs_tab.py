@@ -28,10 +28,10 @@ from wavecomb.gui.widgets import ask_file, named
 from wavecomb.picture.files import reason, replacing
 
 NOTE = (
-    f"Rates are over the whole time in which the settings held; in brackets: less than "
-    f"{MIN_SECONDS:g} s or too few looks, so that they mean nothing. Speeds are at equal samples "
-    f"of the same picture. A difference counts only when {MIN_REPEATS} repeats agree: machines "
-    "drift. For figures to publish, use wavecomb bench."
+    f"Rates are over the whole time with these settings; those in brackets are over less than "
+    f"{MIN_SECONDS:g} s and have no meaning. Speeds are at equal samples of the same picture. A "
+    f"difference holds only if {MIN_REPEATS} repeats agree, because the speed of machines "
+    "drifts. For results to publish, use wavecomb bench."
 )
 
 
@@ -72,15 +72,15 @@ class RunsTab(QWidget):
         row = QHBoxLayout()
         self._made: dict[str, QPushButton] = {}
         for name, text, tip, call in (
-            ("pin", "Pin", "Compares the others with the chosen row; again: with the first.",
+            ("pin", "Pin", "Compares all rows with the chosen one; press again for the first.",
              self.pin),
             ("repeat", "Repeat both", "Renders the settings of the base and of the chosen row (or "
-             f"the current ones) {MIN_REPEATS} times in turn, then goes back. Press again to "
+             f"the current ones) {MIN_REPEATS} times, then the old settings. Press again to "
              "stop.", self.repeat),
             ("copy", "Copy", "Copies the table as text.", self.copy),
             ("save", "Save CSV…", "Writes all runs shown, with all settings and phases, one line "
              "each.", self._ask_save),
-            ("clear", "Clear", "Forgets all runs but the one that goes on.", self.clear),
+            ("clear", "Clear", "Removes all runs but the current one.", self.clear),
         ):  # fmt: skip
             button = named(QPushButton(text), f"runs_{name}", text, tip)
             button.clicked.connect(call)

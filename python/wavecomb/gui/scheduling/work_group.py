@@ -23,7 +23,7 @@ from wavecomb.gui.scheduling.setting_controls import (
 )
 from wavecomb.gui.viewport.session import Session, Setup
 
-_MODE = Choice("adaptive_mode", "Adaptive", "How samples are spread.", choices.ADAPTIVE_MODES)
+_MODE = Choice("adaptive_mode", "Adaptive", "Distribution of samples.", choices.ADAPTIVE_MODES)
 _FIRST = {"adaptive": 0.02, "noise": 0.02}
 """Initial targets when adaptive sampling is switched on."""
 
@@ -37,7 +37,7 @@ class WorkGroup(QGroupBox):
         self._targets = dict(_FIRST)
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        note = QLabel("These change the noise, and not what the picture converges to.")
+        note = QLabel("These change the noise, but not the expectation of the picture.")
         note.setWordWrap(True)
         form.addRow(note)
         self._mode = ChoiceBox(_MODE, self._choose_mode)

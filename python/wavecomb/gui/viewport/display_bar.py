@@ -70,7 +70,7 @@ class DisplayBar(QToolBar):
         self.layer = choice(
             "display.layer",
             "Layer",
-            "Which layer is shown; one that is not kept yet starts the render again",
+            "Displayed layer; a layer that is not rendered yet restarts the render",
             [],
             lambda text: self.choose_layer(self.layer.currentData()),
         )
@@ -93,7 +93,7 @@ class DisplayBar(QToolBar):
         self.view = choice(
             "display.view",
             "View",
-            "How light becomes colour: Linear (as `wavecomb render --png`), Neutral (highlights "
+            "Tone mapping: Linear (as `wavecomb render --png`), Neutral (highlights "
             "rolled off), or a view of OpenColorIO; $OCIO chooses the configuration",
             display.views(),
             self.set_view,
@@ -106,16 +106,16 @@ class DisplayBar(QToolBar):
             box.view().setTextElideMode(Qt.TextElideMode.ElideNone)
         self.automatic = named(
             QCheckBox("Auto range"), "display.auto", "Automatic range",
-            "False colours from the picture's least to its greatest value",
+            "False colours from the smallest to the largest value of the picture",
         )  # fmt: skip
         self.automatic.setChecked(True)
         self.automatic.toggled.connect(self._range_changed)
-        self.low = self._bound("display.low", "Least value of the false colours")
-        self.high = self._bound("display.high", "Greatest value of the false colours")
+        self.low = self._bound("display.low", "Smallest value of the false colours")
+        self.high = self._bound("display.high", "Largest value of the false colours")
         self.zoom = choice(
             "display.zoom",
             "Zoom",
-            "Device pixels a pixel; Ctrl+wheel zooms, right drag shifts the picture",
+            "Screen pixels per image pixel; Ctrl+wheel zooms, right drag pans",
             _ZOOMS,
             self._zoom_chosen,
         )

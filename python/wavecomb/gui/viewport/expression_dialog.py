@@ -24,7 +24,7 @@ from wavecomb.gui.widgets import choice, named, set_text_colour
 from wavecomb.run import expressions
 from wavecomb.run.faults import describe
 
-OWN = "of your own"
+OWN = "custom"
 """Entry that stands for an unnamed expression."""
 
 
@@ -42,7 +42,7 @@ def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str
     expression. groups: Light groups of the stage.
     """
     if not text.strip():
-        return "Write an expression, such as C<RD>L, or choose one that has a name."
+        return "Write an expression, such as C<RD>L, or choose a named one."
     try:
         setup.changed(aovs=aovs_with(setup, name, text))
     except Exception as error:
@@ -76,25 +76,25 @@ class ExpressionDialog(QDialog):
         self._session, self._shown = session, shown
         self.known = choice(
             "expression.known", "Known",
-            "Expressions that have names in Arnold and Karma; choosing one fills in the others",
+            "Expressions with names in Arnold and Karma; choosing one fills in the fields below",
             [OWN, *expressions.NAMED], self.take,
         )  # fmt: skip
         self.name = named(
             QLineEdit("lpe"), "expression.name", "Name",
-            "Of the layer, which is lpe_NAME: letters, digits and underscores",
+            "NAME of the layer lpe_NAME: letters, digits and underscores",
         )  # fmt: skip
         self.text = named(
             QLineEdit(), "expression.text", "Expression",
-            "From the camera to the light: C, then what scatters, then what shines. "
-            "C<RD>L is direct diffuse light, C<T.>.* what is seen through glass",
+            "From the camera to the light: C, then scattering events, then the emitter. "
+            "C<RD>L is direct diffuse light, C<T.>.* is everything behind glass",
         )  # fmt: skip
         self.text.setPlaceholderText("C<RD>L")
         self.text.setMinimumWidth(theme.em(24))
-        self.note = named(QLabel(), "expression.note", "Note", "What is wrong with the expression")
+        self.note = named(QLabel(), "expression.note", "Note", "Problem of the expression")
         self.note.setWordWrap(True)
         self.show_layer = named(
             QPushButton("&Show"), "expression.show", "Show",
-            "Keeps the layer from now on, which starts the render again, and shows it",
+            "Adds the layer, which restarts the render, and shows it",
         )  # fmt: skip
         self.show_layer.setDefault(True)
         self.show_layer.clicked.connect(self.accept)

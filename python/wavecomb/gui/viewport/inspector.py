@@ -95,13 +95,13 @@ class Inspector(CursorPanel):
         self.tree.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        self.follow.setToolTip("Off: values stay those of the pixel that was clicked last")
+        self.follow.setToolTip("Off: keep the values of the last clicked pixel")
         self.follow.setAccessibleName("Follow the cursor")
         self.copy = named(
             QPushButton("Copy"),
             "inspector.copy",
             "Copy the values",
-            "Put these values on the clipboard as text",
+            "Copy these values to the clipboard as text",
         )
         self.copy.clicked.connect(self._copy)
         layout = QVBoxLayout(self)

@@ -29,7 +29,7 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
     Args: setup: Setup of the render. learned: Result of ``Renderer.learned``.
     """
     if learned is None:
-        return "Point at a surface of a render that goes on or has ended."
+        return "Point at a surface in the viewport."
     if learned["density"] is not None:
         density = learned["density"]
         text = (
@@ -42,7 +42,7 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
         return text
     if setup.guiding == "off" and setup.roulette != "efficient":
         return "Bounces are not guided: choose Guiding in the Scheduling panel."
-    return "No field here: too few samples to learn from, or it does not pay."
+    return "No guiding field here: too few samples to learn from, or no predicted gain."
 
 
 def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list[tuple[str, float]]:
@@ -70,16 +70,16 @@ class LearnedPanel(CursorPanel):
         self.note.setObjectName("learned.note")
         self.note.setWordWrap(True)
         self.map = DirectionsView("learned.map")
-        self.map.setAccessibleName("Directions that guided bounces take")
+        self.map.setAccessibleName("Directions of guided bounces")
         self.map.setToolTip(
-            "All directions: up is up, the middle is where the camera looks, right is right. "
+            "All directions; the view direction of the camera is in the middle. "
             "The ring is the surface's normal."
         )
-        self.lights = Bars("learned_lights", "Lights chosen here, %")
-        self.lights.setAccessibleName("Lights chosen here")
+        self.lights = Bars("learned_lights", "Lights sampled here, %")
+        self.lights.setAccessibleName("Lights sampled here")
         self.lights.setMinimumHeight(theme.em(7))
-        self.follow.setToolTip("Off: what is shown stays that of the pixel that was clicked last")
-        self.follow.setAccessibleName("Follow the cursor with what was learned")
+        self.follow.setToolTip("Off: keep the data of the last clicked pixel")
+        self.follow.setAccessibleName("Follow the cursor with the learned data")
         layout = QVBoxLayout(self)
         margin = theme.em(0.3)
         layout.setContentsMargins(margin, margin, margin, margin)

@@ -25,7 +25,7 @@ from wavecomb.gui.viewport.session import Frame, Session
 from wavecomb.gui.widgets import set_text_colour
 from wavecomb.gui.worker import Errands
 
-WAITING = "Waits until each pixel has the samples asked for"
+WAITING = "Waits until each pixel has all samples"
 
 
 class PictureLight(QWidget):
@@ -55,8 +55,8 @@ class PictureLight(QWidget):
         self.setObjectName("same_picture")
         self.setAccessibleName("Same picture")
         self.setToolTip(
-            "Compares the bits of each finished picture with those of the one before it that had "
-            "the same scene, camera and samples, but another scheduling."
+            "Compares the bits of each finished picture with an earlier one of "
+            "the same scene, camera and samples, but other scheduling settings."
         )
         session.frame.connect(self._take)
         session.edited.connect(self._wait)

@@ -40,7 +40,7 @@ class RenderBar(QToolBar):
         setup = session.setup
         self.camera = named(
             QComboBox(), "render.camera", "Camera",
-            "Look through a camera of the stage; moving the view leaves it",
+            "Camera of the view; moving the view changes to a free camera",
         )  # fmt: skip
         self.camera.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self.camera.setMinimumContentsLength(14)
@@ -53,7 +53,7 @@ class RenderBar(QToolBar):
         )
         self.denoise = named(
             QCheckBox("Denoise"), "render.denoise", "Denoise",
-            "Show the picture without its noise, by Open Image Denoise (Shift+D)",
+            "Denoise the picture with Open Image Denoise (Shift+D)",
         )  # fmt: skip
         self.denoise.toggled.connect(self._denoise_toggled)
         self._fill()

@@ -64,7 +64,7 @@ def save_frame(
     one line. WavecombError: There is only a preview so far.
     """
     if frame.scale != 1:
-        raise WavecombError("there is only a preview yet: save again when the picture is there")
+        raise WavecombError("there is only a preview so far: save again a little later")
     if frame.setup.denoise:
         # The shown denoised image may be of an earlier pass.
         frame = replace(frame, denoised=denoised_frame(frame)[1])

@@ -129,7 +129,7 @@ class Session(Live):
     def reload(self) -> None:
         """Reloads the stage from disk, dropping edits but keeping the camera."""
         if self._request is None or self.stage is None:
-            self.failed.emit("there is no stage to read again: open one first")
+            self.failed.emit("there is no stage to reload: open one first")
             return
         usd = self.usd
         if usd is None:
@@ -247,7 +247,7 @@ class Session(Live):
             return
         pose = self._pose_of(path)
         if pose is None:
-            self.failed.emit(f"camera {path}: cannot be looked through; choose another")
+            self.failed.emit(f"camera {path}: is not a supported camera; choose another")
             return
         self.set_camera(pose)
 

@@ -39,7 +39,7 @@ CLICK_PIXELS = 4
 
 EMPTY = (
     "Open a stage: Ctrl+O, or drop a USD file here\n\n"
-    "wavecomb scene cornell -o cornell.usda   writes one to begin with"
+    "wavecomb scene cornell -o cornell.usda   writes an example"
 )
 
 
