@@ -61,8 +61,9 @@ def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
     predicted better. Intervals resample materials, each with all its runs, since a new scene would
     have other materials.
 
-    Returns: ``r2``, ``slope``, ``intercept`` (ns), ``mean_error`` (relative, weighted), each with
-    ``_low`` and ``_high``; ``materials``, ``runs``. Empty with fewer than three materials.
+    Returns:
+        ``r2``, ``slope``, ``intercept`` (ns), ``mean_error`` (relative, weighted), each with
+        ``_low`` and ``_high``; ``materials``, ``runs``. Empty with fewer than three materials.
     """
     kept = costs.dropna(subset=[prediction])
     if kept.empty:

@@ -57,9 +57,12 @@ use."""
 class Results:
     """Contents of a result folder.
 
-    Attributes: folder: Path of the folder. runs: Successful runs, one row each, with the columns of
-    ``columns``. failed: Failed runs, with the same columns. machine: Contents of machine.json, or
-    {} without that file. suite_text: Contents of suite.toml, or "" without that file.
+    Attributes:
+        folder: Path of the folder.
+        runs: Successful runs, one row each, with the columns of ``columns``.
+        failed: Failed runs, with the same columns.
+        machine: Contents of machine.json, or {} without that file.
+        suite_text: Contents of suite.toml, or "" without that file.
     """
 
     folder: Path
@@ -96,8 +99,9 @@ class Results:
 def load(folder: Path) -> Results:
     """Reads a result folder.
 
-    Raises: WavecombError: It is not a result folder, or holds no successful run. The message names
-    the file.
+    Raises:
+        WavecombError: It is not a result folder, or holds no successful run. The message names the
+            file.
     """
     pandas = needed("pandas", "the analysis")
     path = folder / "runs.csv"
@@ -220,9 +224,12 @@ def labelled(
 ) -> pd.DataFrame:
     """Returns a table of rows with the short names of their cells.
 
-    Args: rows: Rows with the settings of their cells. only: Settings to use; empty means all.
-    column: Column for the names. default: Name if no setting varies. leave_out: Settings that are
-    not part of a cell.
+    Args:
+        rows: Rows with the settings of their cells.
+        only: Settings to use; empty means all.
+        column: Column for the names.
+        default: Name if no setting varies.
+        leave_out: Settings that are not part of a cell.
     """
     names = varying(rows) if rows else []
     names = [n for n in names if n not in leave_out and (not only or n in only)]

@@ -43,9 +43,10 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
     T is the mean over rounds. Intervals resample rounds; p-values test the effects of single
     rounds, with Holm's correction over all effects of the table.
 
-    Returns: One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``,
-    ``baseline``, ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of pairs),
-    ``n``, ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
+    Returns:
+        One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``, ``baseline``,
+        ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of pairs), ``n``,
+        ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
     """
     pandas = needed("pandas", "the analysis")
     runs = runs.dropna(subset=[metric])

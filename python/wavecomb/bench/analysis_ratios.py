@@ -110,9 +110,10 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
     The share is 0 for the placebo and 1 for the oracle. It is given only if the interval of the gap
     T_placebo / T_oracle excludes 1, because otherwise there is no gain to share.
 
-    Returns: One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
-    ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and ``share``
-    with ``_low`` and ``_high``; ``gap_shown``. The bounds come last.
+    Returns:
+        One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
+        ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and
+        ``share`` with ``_low`` and ``_high``; ``gap_shown``. The bounds come last.
     """
     strata: dict[tuple[Any, ...], list[pd.DataFrame]] = {}
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):
@@ -197,8 +198,9 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
     resample finds it again, so the interval accounts for the uncertainty about the best policy. The
     smallest of noisy means is biased low, so regret is overstated rather than understated.
 
-    Returns: One row per cell and policy: ``cell``, ``policy``, ``n``, ``regret``, ``low``,
-    ``high``, ``best`` (name of the best fixed policy).
+    Returns:
+        One row per cell and policy: ``cell``, ``policy``, ``n``, ``regret``, ``low``, ``high``,
+        ``best`` (name of the best fixed policy).
     """
     rows: list[dict[str, Any]] = []
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):

@@ -30,8 +30,11 @@ Kind = Literal["text", "integer", "number", "flag", "json"]
 class Column:
     """A column of ``runs.csv``.
 
-    Attributes: name: Name in the header. kind: "text", "integer", "number", "flag" (0 or 1) or
-    "json" (an object in one cell). unit: Unit, or "". meaning: Description in one sentence.
+    Attributes:
+        name: Name in the header.
+        kind: "text", "integer", "number", "flag" (0 or 1) or "json" (an object in one cell).
+        unit: Unit, or "".
+        meaning: Description in one sentence.
     """
 
     name: str
@@ -68,7 +71,8 @@ def header_line() -> str:
 def row_line(row: Mapping[str, Any]) -> str:
     """Formats a row as one line, with its line end.
 
-    Raises: KeyError: A name is not a column.
+    Raises:
+        KeyError: A name is not a column.
     """
     unknown = set(row) - set(NAMES)
     if unknown:

@@ -24,8 +24,9 @@ EVENTS = {
 class Counters:
     """Hardware counters of this machine.
 
-    Attributes: events: Name of the perf event for each available column. missing: Reason for each
-    column that cannot be counted.
+    Attributes:
+        events: Name of the perf event for each available column.
+        missing: Reason for each column that cannot be counted.
     """
 
     events: dict[str, str] = field(default_factory=dict)

@@ -44,10 +44,13 @@ LONGEST = 56
 class Row:
     """A row of a forest plot.
 
-    Attributes: name: Label at the left. value: Position of the point. low: Lower end of the
-    interval; NaN if there is none. high: Upper end of the interval; NaN if there is none. colour:
-    Colour of the point and its whiskers. hollow: Whether the row is a bound or a baseline, drawn
-    with a hollow point.
+    Attributes:
+        name: Label at the left.
+        value: Position of the point.
+        low: Lower end of the interval; NaN if there is none.
+        high: Upper end of the interval; NaN if there is none.
+        colour: Colour of the point and its whiskers.
+        hollow: Whether the row is a bound or a baseline, drawn with a hollow point.
     """
 
     name: str
@@ -78,10 +81,14 @@ def panels_of(
 ) -> list[Panel]:
     """Makes a panel for each value of the column ``by``, with a row for each row of the table.
 
-    Args: table: Table with the columns ``name``, ``value``, ``low`` and ``high``. by: Column with
-    the titles of panels. name: Column with the names of rows. value: Column with the positions of
-    points. prefix: Prefix of the columns ``low`` and ``high``. colour: Returns the colour of a row.
-    hollow: Returns whether a row is a bound or a baseline.
+    Args:
+        table: Table with the columns ``name``, ``value``, ``low`` and ``high``.
+        by: Column with the titles of panels.
+        name: Column with the names of rows.
+        value: Column with the positions of points.
+        prefix: Prefix of the columns ``low`` and ``high``.
+        colour: Returns the colour of a row.
+        hollow: Returns whether a row is a bound or a baseline.
     """
 
     def row_of(row: Any) -> Row:

@@ -168,9 +168,14 @@ def curve(
 ) -> Drawn | None:
     """Draws metrics over a numeric column, with a line for each series and logarithmic axes.
 
-    Args: runs: Runs that differ only in x and the series. x: Column with numbers. metrics: Column
-    and axis label, one panel each. name: Name of the figure. title: Title of the figure. x_label:
-    Label of the x axis, with its unit. series: Column that distinguishes the lines.
+    Args:
+        runs: Runs that differ only in x and the series.
+        x: Column with numbers.
+        metrics: Column and axis label, one panel each.
+        name: Name of the figure.
+        title: Title of the figure.
+        x_label: Label of the x axis, with its unit.
+        series: Column that distinguishes the lines.
     """
     kept = [(metric, text) for metric, text in metrics if runs[metric].notna().any()]
     if runs[x].nunique() < 2 or not kept:

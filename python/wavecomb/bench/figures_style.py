@@ -52,8 +52,11 @@ _STYLE = Path(__file__).parent / "report.mplstyle"
 class Drawn:
     """A figure with its title and caption.
 
-    Attributes: name: Name of the files; unique in a report. title: Short title. caption: Content
-    and unit of the figure, kind of whiskers, number of runs. figure: Matplotlib figure.
+    Attributes:
+        name: Name of the files; unique in a report.
+        title: Short title.
+        caption: Content and unit of the figure, kind of whiskers, number of runs.
+        figure: Matplotlib figure.
     """
 
     name: str

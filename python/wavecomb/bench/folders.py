@@ -35,11 +35,16 @@ _MACHINE = {"cpu": "CPU", "isa": "instruction set", "cores": "number of cores", 
 class Change:
     """Change of one configuration that is in both folders.
 
-    Attributes: config: Name of the configuration. before: Mean of the metric in BEFORE. after: Mean
-    of the metric in AFTER. ratio: Ratio of geometric means, AFTER / BEFORE. low: Lower end of the
-    95 % interval of the ratio; None with too few runs. high: Upper end of the 95 % interval of the
-    ratio; None with too few runs. runs: Number of runs in BEFORE and AFTER. p: p-value of no
-    change, corrected for all configurations. verdict: Verdict in a word.
+    Attributes:
+        config: Name of the configuration.
+        before: Mean of the metric in BEFORE.
+        after: Mean of the metric in AFTER.
+        ratio: Ratio of geometric means, AFTER / BEFORE.
+        low: Lower end of the 95 % interval of the ratio; None with too few runs.
+        high: Upper end of the 95 % interval of the ratio; None with too few runs.
+        runs: Number of runs in BEFORE and AFTER.
+        p: p-value of no change, corrected for all configurations.
+        verdict: Verdict in a word.
     """
 
     config: str
@@ -57,12 +62,16 @@ class Change:
 class FolderComparison:
     """Comparison of two folders.
 
-    Attributes: metric: Column of runs.csv. changes: Change of each configuration, in the order of
-    BEFORE. mean_ratio: Geometric mean of all ratios. only_before: Configurations that are missing
-    in AFTER. only_after: Configurations that are missing in BEFORE. pictures: Number of pairs of
-    runs with equal configuration, seed and size that have an image in both folders.
-    pictures_different: Number of these whose images are not bit-identical. warnings: Reasons to
-    read the ratios with care.
+    Attributes:
+        metric: Column of runs.csv.
+        changes: Change of each configuration, in the order of BEFORE.
+        mean_ratio: Geometric mean of all ratios.
+        only_before: Configurations that are missing in AFTER.
+        only_after: Configurations that are missing in BEFORE.
+        pictures: Number of pairs of runs with equal configuration, seed and size that have an image
+            in both folders.
+        pictures_different: Number of these whose images are not bit-identical.
+        warnings: Reasons to read the ratios with care.
     """
 
     metric: str
@@ -86,7 +95,8 @@ def compare_folders(before: Path, after: Path, metric: str = "render_s") -> Fold
     variances) of the logarithms. Runs are not paired, because equal repetitions of two folders
     share nothing.
 
-    Raises: WavecombError: A folder holds no results, or no configuration has this metric in both.
+    Raises:
+        WavecombError: A folder holds no results, or no configuration has this metric in both.
     """
     a, b = load(before), load(after)
     groups_a, groups_b = (_values(results, metric) for results in (a, b))

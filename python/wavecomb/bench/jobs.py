@@ -160,7 +160,8 @@ TRACE_SCHEMA = "wavecomb-trace/1"
 def make_profile(jobs: Jobs, config: Config, scratch: Path) -> None:
     """Writes the file of costs or ranks that the configuration's oracle uses.
 
-    Raises: WavecombError: A recording failed.
+    Raises:
+        WavecombError: A recording failed.
     """
     if config.settings["policy"] == COSTS:
         answers = [_run(jobs.recording(config, k), config, scratch) for k in range(RECORDINGS)]

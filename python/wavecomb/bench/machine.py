@@ -29,8 +29,10 @@ _SYS_CPU = Path("/sys/devices/system/cpu")
 class Limits:
     """Limits of a machine, for values of a suite that depend on them.
 
-    Attributes: threads: Number of usable cores. lanes: Largest SIMD width of this build.
-    cache_bytes: Cache sizes {"L2": ..., "L3": ...} in bytes; L3 is the sum over all cores.
+    Attributes:
+        threads: Number of usable cores.
+        lanes: Largest SIMD width of this build.
+        cache_bytes: Cache sizes {"L2": ..., "L3": ...} in bytes; L3 is the sum over all cores.
     """
 
     threads: int
@@ -227,10 +229,13 @@ def is_noisy(others_share: float | None, spin_s: float, reference_s: float) -> b
 class Noise:
     """Noise of the machine during a sitting.
 
-    Attributes: runs: Number of runs. noisy_runs: Number of disturbed runs. variation: Median over
-    configurations of the coefficient of variation of render_s, over those with at least three runs;
-    None if there are none. noisy: Whether the timings need a warning. lines: Reasons for the
-    warning.
+    Attributes:
+        runs: Number of runs.
+        noisy_runs: Number of disturbed runs.
+        variation: Median over configurations of the coefficient of variation of render_s, over
+            those with at least three runs; None if there are none.
+        noisy: Whether the timings need a warning.
+        lines: Reasons for the warning.
     """
 
     runs: int

@@ -119,8 +119,9 @@ def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
 
         sum over b of records(b) * cost(b after its predecessor)
 
-    Returns: ``best``, ``worst``: all names in order; ``best_ns``, ``worst_ns``, ``mean_ns``:
-    expected ns of all records, where ``mean_ns`` is the mean over the orders of the trace.
+    Returns:
+        ``best``, ``worst``: all names in order; ``best_ns``, ``worst_ns``, ``mean_ns``: expected ns
+        of all records, where ``mean_ns`` is the mean over the orders of the trace.
     """
     scale = _scales(trace)
     names = sorted({name for recording in trace for name in recording["materials"]})

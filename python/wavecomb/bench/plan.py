@@ -31,12 +31,18 @@ FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
 class Config:
     """One configuration: all inputs of a run except repetition and seed.
 
-    Attributes: name: Short name, unique in the suite and usable in file names. experiment: Name of
-    the experiment. renderer: "wavecomb" or a peer. stage: Name of the stage, with its varied
-    options. source: Source of the stage. settings: Settings of the render; the policy may be an
-    oracle. case: Name of the case, or "". factor: Name of the factor of a scaling curve, or "".
-    factor_value: Value of the factor, or None. images: As in ``Experiment``. golden: Whether the
-    image is compared with a converged one.
+    Attributes:
+        name: Short name, unique in the suite and usable in file names.
+        experiment: Name of the experiment.
+        renderer: "wavecomb" or a peer.
+        stage: Name of the stage, with its varied options.
+        source: Source of the stage.
+        settings: Settings of the render; the policy may be an oracle.
+        case: Name of the case, or "".
+        factor: Name of the factor of a scaling curve, or "".
+        factor_value: Value of the factor, or None.
+        images: As in ``Experiment``.
+        golden: Whether the image is compared with a converged one.
     """
 
     name: str
@@ -95,8 +101,10 @@ def digest(value: Any) -> str:
 def configurations(suite: Suite, limits: Limits, threads: int | None = None) -> list[Config]:
     """Lists all configurations, in the order of the file, without values that this machine lacks.
 
-    Args: suite: The suite. limits: Limits of the machine. threads: Number of threads of all runs
-    that do not vary it; None uses the suite's.
+    Args:
+        suite: The suite.
+        limits: Limits of the machine.
+        threads: Number of threads of all runs that do not vary it; None uses the suite's.
     """
     found: list[Config] = []
     for experiment in suite.experiments:
@@ -256,9 +264,11 @@ _TRIANGLES_PER_SECOND = 1.5e6
 class Estimator:
     """Estimator of the duration of runs.
 
-    Attributes: start_s: Time in seconds of a process that renders almost nothing of a small stage.
-    rate: Samples per second and thread, by number of lanes. Other renderers are assumed to be
-    equally fast. measured: Wall times in seconds of finished runs, by configuration.
+    Attributes:
+        start_s: Time in seconds of a process that renders almost nothing of a small stage.
+        rate: Samples per second and thread, by number of lanes. Other renderers are assumed to be
+            equally fast.
+        measured: Wall times in seconds of finished runs, by configuration.
     """
 
     start_s: float = 1.0

@@ -24,10 +24,13 @@ from wavecomb.bench.counters import Session
 class Outcome:
     """Answer and measurements of a process.
 
-    Attributes: answer: Its JSON object, or {"status": "failed", "error": line} if there is none.
-    wall_s: Wall time in seconds. others_share: Fraction of all cores' time that other processes
-    took; None if unknown. load_average: Load average of one minute, at the start. started: UTC time
-    of the start. code: Exit code.
+    Attributes:
+        answer: Its JSON object, or {"status": "failed", "error": line} if there is none.
+        wall_s: Wall time in seconds.
+        others_share: Fraction of all cores' time that other processes took; None if unknown.
+        load_average: Load average of one minute, at the start.
+        started: UTC time of the start.
+        code: Exit code.
     """
 
     answer: dict[str, Any]

@@ -47,11 +47,15 @@ _HERE = Path(__file__).parent
 def build(folder: Path, markdown: Path | None = None) -> Path:
     """Writes DIR/report.html and DIR/figures, each figure as SVG and PNG.
 
-    Args: folder: DIR. markdown: Also write this .md file, with a folder of figures beside it. It
-    has the same text, tables and figures, without viewers and folded parts.
+    Args:
+        folder: DIR.
+        markdown: Also write this .md file, with a folder of figures beside it. It has the same
+            text, tables and figures, without viewers and folded parts.
 
-    Raises: WavecombError: The folder holds no results, a file in it is damaged, or a library of the
-    extra "bench" is missing. OSError: The report cannot be written.
+    Raises:
+        WavecombError: The folder holds no results, a file in it is damaged, or a library of the
+            extra "bench" is missing.
+        OSError: The report cannot be written.
     """
     environment = _environment()
     results = load(folder)

@@ -21,8 +21,9 @@ MOST_ROWS = 60
 class Part:
     """Base class of everything below a heading.
 
-    Attributes: kind: Name of the macro of the templates that renders it. summary: If not empty, the
-    part is folded behind this line; Markdown leaves it out.
+    Attributes:
+        kind: Name of the macro of the templates that renders it.
+        summary: If not empty, the part is folded behind this line; Markdown leaves it out.
     """
 
     kind: ClassVar[str]
@@ -66,8 +67,10 @@ class Facts(Part):
 class Cell:
     """A cell of a table.
 
-    Attributes: text: The value. note: Smaller text after the value, such as an interval. mark: CSS
-    classes: "word" for text, "better", "worse".
+    Attributes:
+        text: The value.
+        note: Smaller text after the value, such as an interval.
+        mark: CSS classes: "word" for text, "better", "worse".
     """
 
     text: str
@@ -79,7 +82,11 @@ class Cell:
 class Table(Part):
     """A table whose first column holds the row headings; equal neighbours in it are merged.
 
-    Attributes: caption: Title. head: Titles of the columns. rows: Cells. note: Small text below.
+    Attributes:
+        caption: Title.
+        head: Titles of the columns.
+        rows: Cells.
+        note: Small text below.
     """
 
     kind = "table"

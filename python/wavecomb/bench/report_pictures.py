@@ -32,8 +32,9 @@ LARGEST = 720
 class Kept:
     """An image that one or more runs rendered.
 
-    Attributes: name: Policies that rendered it, and the settings that distinguish it from other
-    images. pixels: Linear colours, (height, width, 3).
+    Attributes:
+        name: Policies that rendered it, and the settings that distinguish it from other images.
+        pixels: Linear colours, (height, width, 3).
     """
 
     name: str
@@ -52,7 +53,8 @@ class Shot:
 def shots(results: Results) -> list[Shot]:
     """Returns the kept images by stage and golden image, with equal images merged.
 
-    Raises: WavecombError: An image file is damaged.
+    Raises:
+        WavecombError: An image file is damaged.
     """
     found: dict[str, list[tuple[dict[str, Any], Path]]] = {}
     for record in results.records():

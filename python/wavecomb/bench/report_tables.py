@@ -25,8 +25,11 @@ def ratio_table(
 ) -> Table | None:
     """Shows ratios of several metrics side by side.
 
-    Args: caption: Title of the table. metrics: Titles and tables of ``ratios``; the last one
-    provides the verdict. level_words: Heading of the level column. note: Text below.
+    Args:
+        caption: Title of the table.
+        metrics: Titles and tables of ``ratios``; the last one provides the verdict.
+        level_words: Heading of the level column.
+        note: Text below.
     """
     found = {words: entry for words, entry in metrics.items() if not entry.empty}
     if not found:

@@ -94,7 +94,8 @@ class ResultFolder:
 def read_objects(path: Path) -> list[dict[str, Any]]:
     """Reads the objects of runs.jsonl, skipping an incomplete last line.
 
-    Raises: WavecombError: Another line is not a JSON object.
+    Raises:
+        WavecombError: Another line is not a JSON object.
     """
     if not path.is_file():
         return []

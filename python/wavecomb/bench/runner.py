@@ -46,11 +46,14 @@ def _no_event(name: str, /, **values: Any) -> None:
 class Options:
     """Options of ``wavecomb bench run``.
 
-    Attributes: repetitions: Overrides the suite's repetitions. only: Pattern for names of
-    configurations. threads: Overrides the suite's threads in runs that do not vary them. seed:
-    Overrides the suite's seed of the order of runs. time_limit_s: Starts no run that would end
-    after this time, in seconds. resume: Whether to continue with the results in the folder. stages:
-    Names of stages to run; empty means all.
+    Attributes:
+        repetitions: Overrides the suite's repetitions.
+        only: Pattern for names of configurations.
+        threads: Overrides the suite's threads in runs that do not vary them.
+        seed: Overrides the suite's seed of the order of runs.
+        time_limit_s: Starts no run that would end after this time, in seconds.
+        resume: Whether to continue with the results in the folder.
+        stages: Names of stages to run; empty means all.
     """
 
     repetitions: int | None = None

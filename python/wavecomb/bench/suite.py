@@ -139,7 +139,8 @@ def find_suite(name: str) -> Path:
 def load_suite(path: Path) -> Suite:
     """Reads a suite.
 
-    Raises: WavecombError: The suite is invalid. The message names the file and the key.
+    Raises:
+        WavecombError: The suite is invalid. The message names the file and the key.
     """
     try:
         check_regular(path)

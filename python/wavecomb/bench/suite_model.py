@@ -20,8 +20,11 @@ RENDERERS = (WAVECOMB, *PEERS)
 class StageSource:
     """Source of a stage: a generated scene with options, or a file.
 
-    Attributes: scene: Name of a generated scene, or "". options: Fields of ``SceneOptions`` for the
-    scene. file: Path of a stage, or None. camera: Camera prim of a file, or None.
+    Attributes:
+        scene: Name of a generated scene, or "".
+        options: Fields of ``SceneOptions`` for the scene.
+        file: Path of a stage, or None.
+        camera: Camera prim of a file, or None.
     """
 
     scene: str = ""
@@ -34,14 +37,20 @@ class StageSource:
 class Experiment:
     """Runs that are compared with one another.
 
-    Attributes: name: Name, unique in the suite. stages: Names of stages. renderers: Names from
-    ``RENDERERS``. settings: Settings that all runs share. vary: Values by setting; all combinations
-    are run. stage_vary: Values by option of the stage; all combinations are run. cases: Settings
-    that change together; each is combined with all of ``vary``. case_names: Names of the cases, in
-    their order, or "". Named cases are compared with the case named "off". skip: Combinations to
-    leave out: those that agree with all keys of one entry. factor: Key of ``vary`` or
-    ``stage_vary`` over which a scaling curve is drawn, or "". images: Repetitions that keep their
-    image: "none", "first" or "all". golden: Whether images are compared with a converged one.
+    Attributes:
+        name: Name, unique in the suite.
+        stages: Names of stages.
+        renderers: Names from ``RENDERERS``.
+        settings: Settings that all runs share.
+        vary: Values by setting; all combinations are run.
+        stage_vary: Values by option of the stage; all combinations are run.
+        cases: Settings that change together; each is combined with all of ``vary``.
+        case_names: Names of the cases, in their order, or "". Named cases are compared with the
+            case named "off".
+        skip: Combinations to leave out: those that agree with all keys of one entry.
+        factor: Key of ``vary`` or ``stage_vary`` over which a scaling curve is drawn, or "".
+        images: Repetitions that keep their image: "none", "first" or "all".
+        golden: Whether images are compared with a converged one.
     """
 
     name: str
@@ -71,10 +80,17 @@ class Golden:
 class Suite:
     """A suite, as its file describes it.
 
-    Attributes: name: Short name. title: Title in one line. path: File of the suite. text: Contents
-    of the file. repetitions: Repetitions of each configuration. warm_up: Number of discarded runs
-    of each stage before the first round. seed: Seed of the order of runs. golden: See ``Golden``.
-    stages: Sources of stages by name. experiments: Experiments in the order of the file.
+    Attributes:
+        name: Short name.
+        title: Title in one line.
+        path: File of the suite.
+        text: Contents of the file.
+        repetitions: Repetitions of each configuration.
+        warm_up: Number of discarded runs of each stage before the first round.
+        seed: Seed of the order of runs.
+        golden: See ``Golden``.
+        stages: Sources of stages by name.
+        experiments: Experiments in the order of the file.
     """
 
     name: str
@@ -99,7 +115,8 @@ STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 def with_folder(suite: Suite, folder: Path) -> Suite:
     """Adds the stages of a folder to each experiment that does not vary options of stages.
 
-    Raises: WavecombError: The folder has no stages, or two stages have the same name.
+    Raises:
+        WavecombError: The folder has no stages, or two stages have the same name.
     """
     files = sorted(p for p in folder.glob("*") if p.suffix.lower() in STAGE_SUFFIXES)
     if not folder.is_dir() or not files:
@@ -129,7 +146,8 @@ def naming_folder(suite: Suite, folder: Path) -> Suite:
 def only_stages(suite: Suite, names: Sequence[str]) -> Suite:
     """Restricts the suite to the given stages; keeps all of them if no name is given.
 
-    Raises: WavecombError: The suite has no such stage.
+    Raises:
+        WavecombError: The suite has no such stage.
     """
     if not names:
         return suite

@@ -22,9 +22,11 @@ def compare_many(
 ) -> bool:  # fmt: skip
     """Compares all pairs of images and prints the results.
 
-    Returns: True if all pairs pass and no image lacks a counterpart.
+    Returns:
+        True if all pairs pass and no image lacks a counterpart.
 
-    Raises: WavecombError: There is nothing to compare.
+    Raises:
+        WavecombError: There is nothing to compare.
     """
     folders = pair_up(a, b)
     results: list[PairResult] = []
@@ -89,7 +91,8 @@ def write_pair_page(page: str, a: str, b: str, found: Comparison, kind: str, loo
 def write_wipe(file: str, a: str, b: str, at: float, look: Look) -> None:
     """Writes a PNG with A left and B right of a vertical line.
 
-    Raises: WavecombError: The images differ in size.
+    Raises:
+        WavecombError: The images differ in size.
     """
     from wavecomb.picture.image import write_png_codes
     from wavecomb.picture.thumbnails import wipe

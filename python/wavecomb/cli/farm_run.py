@@ -45,13 +45,17 @@ def run_job(
 ) -> None:
     """Runs a job on a cluster until all tasks are done, and reports the result.
 
-    Args: folder: Folder of the job. where: The cluster. threads: Threads of each local worker; 0
-    lets the job or the number of workers decide. dashboard: Port of Dask's dashboard; None starts
-    no dashboard. as_json: Print progress and result as lines of JSON. quiet: Print only warnings
-    and errors.
+    Args:
+        folder: Folder of the job.
+        where: The cluster.
+        threads: Threads of each local worker; 0 lets the job or the number of workers decide.
+        dashboard: Port of Dask's dashboard; None starts no dashboard.
+        as_json: Print progress and result as lines of JSON.
+        quiet: Print only warnings and errors.
 
-    Raises: WavecombError: Tasks failed, or there are no workers. click.exceptions.Exit: The user
-    stopped the job.
+    Raises:
+        WavecombError: Tasks failed, or there are no workers.
+        click.exceptions.Exit: The user stopped the job.
     """
     from wavecomb.farm.client import run
 

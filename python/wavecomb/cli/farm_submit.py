@@ -116,13 +116,15 @@ def submit_command(
 def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     """Reads the stage in a child process, so that a crash in a library becomes a one-line error.
 
-    Args: request: Options of ``farm submit``, or {"again": a job as JSON}. It is passed to the
-    child as a command-line argument, which a sandbox passes on once more, so it has to be short.
+    Args:
+        request: Options of ``farm submit``, or {"again": a job as JSON}. It is passed to the child
+            as a command-line argument, which a sandbox passes on once more, so it has to be short.
 
-    Returns: A dictionary with ``job``, as JSON, and ``learned``, the guiding data in base64 or
-    None.
+    Returns:
+        A dictionary with ``job``, as JSON, and ``learned``, the guiding data in base64 or None.
 
-    Raises: WavecombError: The child reported an error, or did not finish in time.
+    Raises:
+        WavecombError: The child reported an error, or did not finish in time.
     """
     words = processes.command("wavecomb", "farm", "plan", json.dumps(request), parent=0)
     process = processes.popen(

@@ -46,8 +46,9 @@ def tile_names(output: str) -> list[str]:
 def check_options(options: dict[str, Any], what: str = "a farm") -> None:
     """Raises WavecombError for options of ``render`` that do not apply to a farm.
 
-    Args: options: Arguments of the command. what: Name of the feature that lacks them, for the
-    message.
+    Args:
+        options: Arguments of the command.
+        what: Name of the feature that lacks them, for the message.
     """
     learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
     for option, given, instead in (
@@ -81,7 +82,8 @@ def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
 def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
     """Builds a farm job from a command's options, still without tiles and files.
 
-    Raises: WavecombError: --costs names a file.
+    Raises:
+        WavecombError: --costs names a file.
     """
     from wavecomb.farm.job import Job
     from wavecomb.farm.planning import shot_of
@@ -114,7 +116,8 @@ def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
 def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list[str]:
     """Renders tile I of N of each frame to a file beside the image, and returns the file names.
 
-    Raises: WavecombError: A farm cannot render this stage.
+    Raises:
+        WavecombError: A farm cannot render this stage.
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.machine_class import machine_class
@@ -145,9 +148,11 @@ def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list
 def assemble_tiles(output: str) -> list[str]:
     """Joins the tiles beside an image, writes the image's files and removes the tiles.
 
-    Returns: The files that were written.
+    Returns:
+        The files that were written.
 
-    Raises: WavecombError: Tiles are missing or damaged, or differ in settings, files or machines.
+    Raises:
+        WavecombError: Tiles are missing or damaged, or differ in settings, files or machines.
     """
     from wavecomb.farm.assemble import NarrowBorder, join, write_image
     from wavecomb.farm.job import Job, Task

@@ -77,10 +77,12 @@ def render_sequence(
 ) -> tuple[Done | None, list[str]]:
     """Renders frames one after another.
 
-    Returns: The result of the last frame, and all files that were written.
+    Returns:
+        The result of the last frame, and all files that were written.
 
-    Raises: WavecombError: A frame failed. The message names it; earlier frames are written.
-    click.exceptions.Exit: The user stopped the render; completed frames are written.
+    Raises:
+        WavecombError: A frame failed. The message names it; earlier frames are written.
+        click.exceptions.Exit: The user stopped the render; completed frames are written.
     """
     wanted = list(frames)
     if skip:

@@ -226,8 +226,8 @@ class Job:
     ) -> tuple[list[Any], dict[str, Any] | None, float]:
         """Prepares checkpoints and previews.
 
-        Returns: The sinks that save them, the state to resume or None, and its render time in
-        seconds.
+        Returns:
+            The sinks that save them, the state to resume or None, and its render time in seconds.
         """
         from wavecomb.run.watcher import CheckpointSink, PreviewSink, Sink
 

@@ -195,9 +195,12 @@ class StageOptions:
     ) -> LoadedStage:
         """Loads a stage for a render with these options.
 
-        Args: stage: File of the stage. threads: Number of threads; 0 uses all cores. size: Width
-        and height of the image in pixels; None takes them from the stage. progress: Called with the
-        amounts done and total. changes: Fields of ``LoadOptions`` that override the options.
+        Args:
+            stage: File of the stage.
+            threads: Number of threads; 0 uses all cores.
+            size: Width and height of the image in pixels; None takes them from the stage.
+            progress: Called with the amounts done and total.
+            changes: Fields of ``LoadOptions`` that override the options.
         """
         from wavecomb.api import load
 
@@ -214,8 +217,9 @@ class StageOptions:
     def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:
         """Reads the stage's render settings.
 
-        Returns: One choice for each render product, and an object to hold until the stage is
-        loaded, so that USD reads its layers only once.
+        Returns:
+            One choice for each render product, and an object to hold until the stage is loaded, so
+            that USD reads its layers only once.
         """
         from wavecomb.api import import_usd
 

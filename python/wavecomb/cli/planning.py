@@ -33,12 +33,28 @@ Peek = Callable[[StageOptions, str], "tuple[list[RenderChoice], Any]"]
 class Asked:
     """Arguments of a command that renders.
 
-    Attributes: stage: File of the stage. output: -o. output_dir: --output-dir. png: --png. deep:
-    --deep. stats_file: --stats. size: --size. spp: --spp. exposure: --exposure. tone_map:
-    --tone-map. quiet: --quiet. costs: --costs. learn_from: --learn-from. learn_to: --learn-to.
-    frames: --frames. skip_existing: --skip-existing. film_memory: --film-memory. source: Options
-    that load the stage. purpose: Options of ``purpose_options``. layers: Options of
-    ``aov_options``. chosen: Values of the render settings that were given.
+    Attributes:
+        stage: File of the stage.
+        output: -o.
+        output_dir: --output-dir.
+        png: --png.
+        deep: --deep.
+        stats_file: --stats.
+        size: --size.
+        spp: --spp.
+        exposure: --exposure.
+        tone_map: --tone-map.
+        quiet: --quiet.
+        costs: --costs.
+        learn_from: --learn-from.
+        learn_to: --learn-to.
+        frames: --frames.
+        skip_existing: --skip-existing.
+        film_memory: --film-memory.
+        source: Options that load the stage.
+        purpose: Options of ``purpose_options``.
+        layers: Options of ``aov_options``.
+        chosen: Values of the render settings that were given.
     """
 
     stage: str
@@ -132,7 +148,8 @@ class Asked:
     def check_deep_resumed(self, kept: Iterable[str]) -> None:
         """Raises WavecombError unless --deep is used as in the render that is resumed.
 
-        Args: kept: AOVs of the resumed render.
+        Args:
+            kept: AOVs of the resumed render.
         """
         had = aov_names.DEEP in kept
         if had and self.deep is None:
@@ -151,11 +168,14 @@ class Asked:
 class Prepared:
     """Render jobs that passed all checks.
 
-    Attributes: asked: Arguments, with the frame of a single image filled into the file names.
-    source: Options that load the stage, completed from the checkpoint. resumed: Checkpoint that the
-    render continues, or None. jobs: Plan, frames (None for a single image) and job of each render
-    product. learning: Initial guiding data of all jobs. opened: Held until the stage is loaded, so
-    that USD reads its layers only once. reporter: Progress display of all jobs.
+    Attributes:
+        asked: Arguments, with the frame of a single image filled into the file names.
+        source: Options that load the stage, completed from the checkpoint.
+        resumed: Checkpoint that the render continues, or None.
+        jobs: Plan, frames (None for a single image) and job of each render product.
+        learning: Initial guiding data of all jobs.
+        opened: Held until the stage is loaded, so that USD reads its layers only once.
+        reporter: Progress display of all jobs.
     """
 
     asked: Asked
@@ -170,7 +190,8 @@ class Prepared:
 def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     """Checks everything that can fail before rendering, and builds the jobs.
 
-    Raises: WavecombError: An option, a file or a setting is invalid.
+    Raises:
+        WavecombError: An option, a file or a setting is invalid.
     """
     from wavecomb.run.bands import band_rows
     from wavecomb.run.settings import keeps_error

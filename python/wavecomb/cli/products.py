@@ -34,7 +34,8 @@ class Plan:
     def check_place(self, names: Names) -> None:
         """Raises WavecombError if the image would leave ``folder``, also through symbolic links.
 
-        Args: names: File names of the plan, at a frame.
+        Args:
+            names: File names of the plan, at a frame.
         """
         if self.folder is None:
             return
@@ -71,9 +72,11 @@ class Plan:
     ) -> Any:
         """Builds checked render settings.
 
-        Args: chosen: Settings from the options and from the resumed render. aovs: AOVs to keep.
-        resumed: Whether a render is resumed, which fixes size and region. fits: As in
-        ``make_settings``.
+        Args:
+            chosen: Settings from the options and from the resumed render.
+            aovs: AOVs to keep.
+            resumed: Whether a render is resumed, which fixes size and region.
+            fits: As in ``make_settings``.
         """
         from wavecomb.run.settings import DEFAULT_SIZE, make_settings
 
@@ -111,12 +114,17 @@ def plan_products(
 ) -> list[Plan]:
     """Plans the images to render: the first render product with ``-o``, else all.
 
-    Args: choices: Choices of the stage, one for each render product. output: File of -o, or None.
-    beside: Other output files, from the options. purpose: Options of ``purpose_options``. frames:
-    --frames, or None. folder: Folder for images that the stage names, which they must not leave;
-    None means the working folder.
+    Args:
+        choices: Choices of the stage, one for each render product.
+        output: File of -o, or None.
+        beside: Other output files, from the options.
+        purpose: Options of ``purpose_options``.
+        frames: --frames, or None.
+        folder: Folder for images that the stage names, which they must not leave; None means the
+            working folder.
 
-    Raises: WavecombError: An image has no file name, or an option applies to one image only.
+    Raises:
+        WavecombError: An image has no file name, or an option applies to one image only.
     """
     if output is not None:
         if folder is not None:

@@ -147,10 +147,13 @@ def make_reporter(progress: str | None, quiet: bool) -> Reporter:
 class Done:
     """Result of a render.
 
-    Attributes: stats: Statistics from ``make_stats``. costs: Cost profile for later renders.
-    report: Loading report of the stage. stopped: Number of the signal that stopped the render; None
-    if it ran to its end. picture: Image to write; None if it was written band by band. files: Files
-    that were written band by band.
+    Attributes:
+        stats: Statistics from ``make_stats``.
+        costs: Cost profile for later renders.
+        report: Loading report of the stage.
+        stopped: Number of the signal that stopped the render; None if it ran to its end.
+        picture: Image to write; None if it was written band by band.
+        files: Files that were written band by band.
     """
 
     stats: dict[str, Any]

@@ -25,10 +25,14 @@ def enter_to_render(
 ) -> None:
     """Restarts ``wavecomb render`` in the sandbox.
 
-    Args: names: Files to write, with placeholders for the frame. output: The image among them; None
-    if the stage names it. folder: Folder of images that the stage names; None means the working
-    folder. frames: Text of ``--frames``. frame: Frame of a single image; None if the stage decides.
-    split: Whether each layer gets a separate file. gpu: Whether denoising may use GPU devices.
+    Args:
+        names: Files to write, with placeholders for the frame.
+        output: The image among them; None if the stage names it.
+        folder: Folder of images that the stage names; None means the working folder.
+        frames: Text of ``--frames``.
+        frame: Frame of a single image; None if the stage decides.
+        split: Whether each layer gets a separate file.
+        gpu: Whether denoising may use GPU devices.
     """
     from wavecomb.run.isolate.outputs import Outputs
     from wavecomb.run.isolate.supervisor import enter
@@ -60,7 +64,9 @@ def enter_to_render(
 def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:
     """Restarts a command in the sandbox whose output files are all known.
 
-    Args: outputs: Files to write. split: One of these that may become a file for each layer.
+    Args:
+        outputs: Files to write.
+        split: One of these that may become a file for each layer.
     """
     from wavecomb.run.isolate.outputs import Outputs
     from wavecomb.run.isolate.supervisor import enter

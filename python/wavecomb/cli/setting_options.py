@@ -154,11 +154,18 @@ def row_option(
 
     Its value is None, or () with ``many``, if it is not given.
 
-    Args: names: "--option", and the name of the argument. kind: "flag", "text", "file", "number",
-    "integer", "pair" (of numbers), "choice" or "switch" (on or off); or a type of click. text: Help
-    text. default: Description of the default, for help. choices: Values of a "choice". least:
-    Smallest number. most: Largest integer. above: Whether ``least`` itself is excluded. metavar:
-    Placeholder of the value in help. many: Whether the option may be repeated.
+    Args:
+        names: "--option", and the name of the argument.
+        kind: "flag", "text", "file", "number", "integer", "pair" (of numbers), "choice" or "switch"
+            (on or off); or a type of click.
+        text: Help text.
+        default: Description of the default, for help.
+        choices: Values of a "choice".
+        least: Smallest number.
+        most: Largest integer.
+        above: Whether ``least`` itself is excluded.
+        metavar: Placeholder of the value in help.
+        many: Whether the option may be repeated.
     """
     if default:
         text = f"{text}  [default: {default}]"
@@ -196,10 +203,12 @@ _TYPES: dict[str, Any] = {
 def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> Callable[[F], F]:
     """Returns a decorator that adds an option to a command.
 
-    Args: usage: Names and metavar as help shows them, such as "-o --output FILE.exr". kind: A type
-    of click, or one of "count" (a positive integer), "flag", "path", "positive" (a positive
-    number), "number", "text". text: Help text. more: Further arguments of ``click.option``;
-    ``name`` is the name of the argument.
+    Args:
+        usage: Names and metavar as help shows them, such as "-o --output FILE.exr".
+        kind: A type of click, or one of "count" (a positive integer), "flag", "path", "positive" (a
+            positive number), "number", "text".
+        text: Help text.
+        more: Further arguments of ``click.option``; ``name`` is the name of the argument.
     """
     words = usage.split()
     names = [word for word in words if word.startswith("-")]

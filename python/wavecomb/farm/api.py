@@ -40,18 +40,28 @@ def submit(
 ) -> Folder:
     """Creates the folder of a job, which ``run`` or `wavecomb farm resume` renders.
 
-    Args: stage: File of the stage. output: File of the image. For several frames, with a
-    placeholder such as shot.####.exr. frames: Frames, as in ``render_frames``; None renders a
-    single image. tiles: "auto", or columns and rows such as "4x3". job: Folder to create; None puts
-    it beside the output. workers: Expected number of workers; 0 means unknown. size: As in
-    ``render``. spp: As in ``render``. aovs: As in ``render``. png: File of a PNG for display.
-    stats: File of the statistics, as JSON. denoise: Whether images get the layer ``denoised``.
-    file: half, compression, tile and split of ``Picture.save``. strict: Whether a missing file is
-    an error. maps: "FROM=TO": workers without the folder FROM look for its files in TO. tries:
-    Number of attempts for each task. hang_s: Time in seconds without progress after which a worker
-    is restarted. **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
+    Args:
+        stage: File of the stage.
+        output: File of the image. For several frames, with a placeholder such as shot.####.exr.
+        frames: Frames, as in ``render_frames``; None renders a single image.
+        tiles: "auto", or columns and rows such as "4x3".
+        job: Folder to create; None puts it beside the output.
+        workers: Expected number of workers; 0 means unknown.
+        size: As in ``render``.
+        spp: As in ``render``.
+        aovs: As in ``render``.
+        png: File of a PNG for display.
+        stats: File of the statistics, as JSON.
+        denoise: Whether images get the layer ``denoised``.
+        file: half, compression, tile and split of ``Picture.save``.
+        strict: Whether a missing file is an error.
+        maps: "FROM=TO": workers without the folder FROM look for its files in TO.
+        tries: Number of attempts for each task.
+        hang_s: Time in seconds without progress after which a worker is restarted.
+        **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
 
-    Raises: WavecombError: An option is invalid, or a farm cannot render the stage with it.
+    Raises:
+        WavecombError: An option is invalid, or a farm cannot render the stage with it.
     """
     from wavecomb.api import _asked_for
     from wavecomb.run import aovs as aov_names
@@ -99,15 +109,19 @@ def run(
 ) -> list[Path]:
     """Renders the missing tiles and images of a job.
 
-    Args: job: Result of ``submit``, or the job's folder. workers: Number of worker processes on
-    this machine. on: Cluster to use instead of ``workers``, as for `--on`, such as
-    "dask:tls://HOST:8786". threads: Threads of each process; 0 uses the job's value, else an equal
-    share of the cores. progress: Called regularly; stops the run if it returns True.
+    Args:
+        job: Result of ``submit``, or the job's folder.
+        workers: Number of worker processes on this machine.
+        on: Cluster to use instead of ``workers``, as for `--on`, such as "dask:tls://HOST:8786".
+        threads: Threads of each process; 0 uses the job's value, else an equal share of the cores.
+        progress: Called regularly; stops the run if it returns True.
 
-    Returns: Files of the images.
+    Returns:
+        Files of the images.
 
-    Raises: WavecombError: Some tasks failed. All other tasks are done. KeyboardInterrupt:
-    ``progress`` stopped the run. Finished tiles are kept.
+    Raises:
+        WavecombError: Some tasks failed. All other tasks are done.
+        KeyboardInterrupt: ``progress`` stopped the run. Finished tiles are kept.
     """
     from wavecomb.farm.client import run as run_job
     from wavecomb.farm.clusters import parse_where
@@ -133,12 +147,16 @@ def run(
 def render_task(folder: Folder, image: int, tile: str) -> list[str]:
     """Renders one tile of a job in this process, unless it is finished.
 
-    Args: folder: Folder of the job. image: Number of the image, from 1. tile: Number and count,
-    such as "3/8" for the third of eight tiles.
+    Args:
+        folder: Folder of the job.
+        image: Number of the image, from 1.
+        tile: Number and count, such as "3/8" for the third of eight tiles.
 
-    Returns: Warnings about the stage.
+    Returns:
+        Warnings about the stage.
 
-    Raises: WavecombError: There is no such task, or it cannot be rendered.
+    Raises:
+        WavecombError: There is no such task, or it cannot be rendered.
     """
     from wavecomb.api import import_usd
     from wavecomb.farm.machine_class import machine_class
@@ -168,7 +186,8 @@ def render_task(folder: Folder, image: int, tile: str) -> list[str]:
 def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
     """Joins the tiles of all unfinished images in this process.
 
-    Returns: Files that were written, and a line for each image with missing tiles.
+    Returns:
+        Files that were written, and a line for each image with missing tiles.
     """
     from wavecomb.farm.assemble import finish_image, is_finished, machine_of
 

@@ -35,7 +35,8 @@ narrow."""
 class NarrowBorder(WavecombError):
     """Error that adaptive tiles had too narrow borders and must be rendered again.
 
-    Attributes: passes: Largest number of passes that a tile took.
+    Attributes:
+        passes: Largest number of passes that a tile took.
     """
 
     def __init__(self, message: str, passes: int) -> None:
@@ -46,9 +47,11 @@ class NarrowBorder(WavecombError):
 def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
     """Joins tiles, reading one at a time, into an image without denoising.
 
-    Raises: DamagedPart: A tile is missing or damaged. NarrowBorder: Borders of adaptive tiles were
-    too narrow. WavecombError: The tiles do not cover each pixel of the image exactly once, or
-    differ in their layers.
+    Raises:
+        DamagedPart: A tile is missing or damaged.
+        NarrowBorder: Borders of adaptive tiles were too narrow.
+        WavecombError: The tiles do not cover each pixel of the image exactly once, or differ in
+            their layers.
     """
     shot, rectangles = job.shot(image), job.rectangles(image)
     check_cover(shot.region, rectangles)
@@ -156,10 +159,14 @@ def _stats(job: Job, shot: Shot, parts: Sequence[Part]) -> dict[str, Any]:
 def write_image(job: Job, image: int, picture: Picture, threads: int) -> list[str]:
     """Writes the PNG, the statistics and finally the EXR. No file is ever partially written.
 
-    Args: job: The job. image: Index of the image. picture: Result of ``join``. threads: Number of
-    threads for denoising.
+    Args:
+        job: The job.
+        image: Index of the image.
+        picture: Result of ``join``.
+        threads: Number of threads for denoising.
 
-    Returns: Names of the files.
+    Returns:
+        Names of the files.
     """
     if job.denoise:
         picture = picture.with_denoised(threads=threads)
@@ -189,8 +196,10 @@ def write_record(folder: Folder, image: int, files: Sequence[str]) -> None:
 def is_finished(folder: Folder, image: int, *, quick: bool = False) -> bool:
     """Returns whether all files of an image exist, belong to this job and are unchanged.
 
-    Args: folder: Folder of the job. image: Index of the image. quick: Checks only that the files
-    exist, not their hashes.
+    Args:
+        folder: Folder of the job.
+        image: Index of the image.
+        quick: Checks only that the files exist, not their hashes.
     """
     job = folder.job
     try:
@@ -237,12 +246,16 @@ def machine_of(folder: Folder, task: Task) -> str:
 def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> dict[str, Any]:
     """Joins the tiles of an image, writes its files and removes the tiles.
 
-    Args: folder: Folder of the job. image: Index of the image. machine: Class of the machines that
-    rendered the tiles. threads: Number of threads for denoising.
+    Args:
+        folder: Folder of the job.
+        image: Index of the image.
+        machine: Class of the machines that rendered the tiles.
+        threads: Number of threads for denoising.
 
-    Returns: A dictionary with ``files``, the files written. If tiles must be rendered first, it has
-    ``again``, their indices, and ``looks``, the number of error checks that their borders must
-    allow for, or 0.
+    Returns:
+        A dictionary with ``files``, the files written. If tiles must be rendered first, it has
+        ``again``, their indices, and ``looks``, the number of error checks that their borders must
+        allow for, or 0.
     """
     job = folder.job
     tasks = list(zip(job.tasks_of(image), job.rectangles(image), strict=True))
@@ -271,10 +284,14 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
 class Outcome:
     """Progress of a job.
 
-    Attributes: tasks: Number of tiles. tasks_done: Number of rendered tiles. images: Number of
-    images. images_done: Number of written images. failed: Title and error line of each tile or
-    image that failed. stopped: Whether ``is_stopped`` ended the run. others: Number of workers that
-    were not used because their machine class differs.
+    Attributes:
+        tasks: Number of tiles.
+        tasks_done: Number of rendered tiles.
+        images: Number of images.
+        images_done: Number of written images.
+        failed: Title and error line of each tile or image that failed.
+        stopped: Whether ``is_stopped`` ended the run.
+        others: Number of workers that were not used because their machine class differs.
     """
 
     tasks: int

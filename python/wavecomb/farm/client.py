@@ -368,13 +368,19 @@ def run(
 
     Renders only tiles whose file is missing, damaged or made with other inputs.
 
-    Args: folder: Folder of the job. where: The cluster. threads: Threads of each local worker; 0
-    uses the job's value, else an equal share of the cores. dashboard: Port of Dask's dashboard;
-    None starts no dashboard. show: Called with the progress of the job. warn: Called once with each
-    distinct warning about the stage. say: Called with the address of the dashboard. is_stopped:
-    Returns whether to stop the run. Finished tiles are kept.
+    Args:
+        folder: Folder of the job.
+        where: The cluster.
+        threads: Threads of each local worker; 0 uses the job's value, else an equal share of the
+            cores.
+        dashboard: Port of Dask's dashboard; None starts no dashboard.
+        show: Called with the progress of the job.
+        warn: Called once with each distinct warning about the stage.
+        say: Called with the address of the dashboard.
+        is_stopped: Returns whether to stop the run. Finished tiles are kept.
 
-    Raises: WavecombError: The settings are invalid, or no workers came, or all are gone.
+    Raises:
+        WavecombError: The settings are invalid, or no workers came, or all are gone.
     """
     from wavecomb import _core
 

@@ -47,8 +47,10 @@ _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 class Where:
     """Cluster that ``--on`` names.
 
-    Attributes: kind: "local", "dask", "slurm", or "none", which only writes the job. workers:
-    Number of workers for "local" and "slurm". address: Address of the scheduler for "dask".
+    Attributes:
+        kind: "local", "dask", "slurm", or "none", which only writes the job.
+        workers: Number of workers for "local" and "slurm".
+        address: Address of the scheduler for "dask".
     """
 
     kind: str
@@ -83,7 +85,8 @@ def parse_address(text: str) -> str:
     >>> parse_address("127.0.0.1:8786"), parse_address("tls://farm:8786")
     ('tcp://127.0.0.1:8786', 'tls://farm:8786')
 
-    Raises: WavecombError: The address is invalid, or is on another machine without TLS.
+    Raises:
+        WavecombError: The address is invalid, or is on another machine without TLS.
     """
     kind, found, rest = text.partition("://")
     kind, rest = (kind, rest) if found else ("tcp", text)
@@ -105,7 +108,8 @@ def parse_address(text: str) -> str:
 class Cluster:
     """Connection to a scheduler, with the workers that this process started.
 
-    Attributes: client: Dask client.
+    Attributes:
+        client: Dask client.
     """
 
     wait_s: float | None = 120.0
@@ -119,9 +123,11 @@ class Cluster:
     def check(self, progressed: bool) -> None:
         """Replaces workers that have ended. Called regularly.
 
-        Args: progressed: Whether any task finished since the last call.
+        Args:
+            progressed: Whether any task finished since the last call.
 
-        Raises: WavecombError: Workers end repeatedly without progress, or the scheduler is gone.
+        Raises:
+            WavecombError: Workers end repeatedly without progress, or the scheduler is gone.
         """
         if self.client.status != "running":
             raise WavecombError(
@@ -228,14 +234,18 @@ def connected(
 ) -> Iterator[Cluster]:  # fmt: skip
     """Connects to a cluster, or starts one, for the duration of a ``with`` block.
 
-    Args: where: The cluster. folder: Folder of the job. Workers on other machines read certificates
-    from it. threads: Threads of each local worker; 0 means an equal share of the cores. tries:
-    Number of workers that may crash during a task before it fails. Does not apply to an existing
-    Dask cluster. hang_s: Time in seconds without a heartbeat after which a worker is replaced. Does
-    not apply to an existing Dask cluster. dashboard: Port of Dask's dashboard on this machine; None
-    starts no dashboard.
+    Args:
+        where: The cluster.
+        folder: Folder of the job. Workers on other machines read certificates from it.
+        threads: Threads of each local worker; 0 means an equal share of the cores.
+        tries: Number of workers that may crash during a task before it fails. Does not apply to an
+            existing Dask cluster.
+        hang_s: Time in seconds without a heartbeat after which a worker is replaced. Does not apply
+            to an existing Dask cluster.
+        dashboard: Port of Dask's dashboard on this machine; None starts no dashboard.
 
-    Raises: WavecombError: The cluster cannot be reached or started.
+    Raises:
+        WavecombError: The cluster cannot be reached or started.
     """
     distributed = needed("distributed", "wavecomb farm", "farm")
     needed("cryptography", "wavecomb farm", "farm")

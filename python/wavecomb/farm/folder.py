@@ -23,7 +23,9 @@ LEARNED_FILE = "guide.learned"
 class Folder:
     """Folder of a farm job.
 
-    Attributes: path: Absolute path. job: Job described by the folder.
+    Attributes:
+        path: Absolute path.
+        job: Job described by the folder.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

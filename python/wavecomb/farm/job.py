@@ -27,10 +27,13 @@ _MAX_EDGE = 65536
 class Shot:
     """Images of one camera or render product.
 
-    Attributes: settings: Settings of the whole image, from ``Settings.to_dict``. aovs: AOVs, from
-    ``aovs.expand``. loading: Fields of ``LoadOptions`` except the frame. output: File of the image,
-    with a placeholder for the frame. png: File of the PNG, or None. stats: File of the statistics,
-    or None.
+    Attributes:
+        settings: Settings of the whole image, from ``Settings.to_dict``.
+        aovs: AOVs, from ``aovs.expand``.
+        loading: Fields of ``LoadOptions`` except the frame.
+        output: File of the image, with a placeholder for the frame.
+        png: File of the PNG, or None.
+        stats: File of the statistics, or None.
     """
 
     settings: dict[str, Any]
@@ -80,17 +83,25 @@ class Task:
 class Job:
     """A farm job. Every field can be stored as JSON.
 
-    Attributes: stage: Name as given; a relative name is relative to ``folder``. folder: Working
-    folder of ``farm submit``. shots: See ``Shot``. images: For each image, the index of its shot,
-    and its frame or None. files: Files of the stage with their hashes. tiles: Columns and rows of
-    each image. file: half, compression, tile and split of ``Picture.save``. exposure: Exposure of
-    PNGs, in stops. tone_map: Tone mapping of PNGs. denoise: Whether images get the layer
-    ``denoised``. costs: Initial profile of scheduling costs. learned: SHA-256 of the guiding field
-    for all images, or None. tries: Number of attempts for each task. hang_s: Time in seconds
-    without progress after which a worker is restarted. strict: Whether a missing file is an error.
-    maps: Pairs of folders. Machines without the first look for its files in the second. isa:
-    Instruction set that all workers must use; None allows any, but the same for all. version:
-    Version of Wavecomb.
+    Attributes:
+        stage: Name as given; a relative name is relative to ``folder``.
+        folder: Working folder of ``farm submit``.
+        shots: See ``Shot``.
+        images: For each image, the index of its shot, and its frame or None.
+        files: Files of the stage with their hashes.
+        tiles: Columns and rows of each image.
+        file: half, compression, tile and split of ``Picture.save``.
+        exposure: Exposure of PNGs, in stops.
+        tone_map: Tone mapping of PNGs.
+        denoise: Whether images get the layer ``denoised``.
+        costs: Initial profile of scheduling costs.
+        learned: SHA-256 of the guiding field for all images, or None.
+        tries: Number of attempts for each task.
+        hang_s: Time in seconds without progress after which a worker is restarted.
+        strict: Whether a missing file is an error.
+        maps: Pairs of folders. Machines without the first look for its files in the second.
+        isa: Instruction set that all workers must use; None allows any, but the same for all.
+        version: Version of Wavecomb.
     """
 
     stage: str
@@ -188,7 +199,9 @@ class Job:
     def image_key(self, image: int, machine: str) -> str:
         """Returns a hash of all inputs that determine the pixels of an image.
 
-        Args: image: Index of the image. machine: Machine class, from ``machine_class``.
+        Args:
+            image: Index of the image.
+            machine: Machine class, from ``machine_class``.
         """
         known: dict[tuple[int, str], str] = self._image_keys  # type: ignore[attr-defined]
         if (image, machine) in known:
@@ -228,8 +241,9 @@ class Job:
     def of(cls, value: Any, name: str) -> Job:
         """Reads a job from parsed JSON.
 
-        Raises: WavecombError: It is not a job, has another format, or is damaged. The message
-        begins with ``name``.
+        Raises:
+            WavecombError: It is not a job, has another format, or is damaged. The message begins
+                with ``name``.
         """
         if not isinstance(value, Mapping) or value.get("kind") != KIND:
             raise WavecombError(f"{name}: is no job of `wavecomb farm submit`")

@@ -23,7 +23,8 @@ _NOTICE_S = 30
 def template(folder: Folder) -> dict[str, Any]:
     """Returns a template with two steps: a task for each tile, then the assembly of all images.
 
-    Raises: WavecombError: The data model rejects a name of the job, or images differ in tile count.
+    Raises:
+        WavecombError: The data model rejects a name of the job, or images differ in tile count.
     """
     model = needed("openjd.model", "farm export", "farm")
     job = folder.job

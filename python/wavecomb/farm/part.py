@@ -50,15 +50,22 @@ class DamagedPart(WavecombError):
 class Part:
     """A rendered tile.
 
-    Attributes: name: File of the tile. key: Key from the header. tile: Rectangle of the tile in the
-    image, in pixels. layers: Arrays of the image by name, of shape (height, width) or (height,
-    width, channels); names of AOVs begin with "aov.". empty: For each layer, the value of a pixel
-    without samples, if the image has such pixels. stats: Statistics from ``make_stats``. metadata:
-    As in ``Picture.metadata``. manifests: As in ``Picture.manifests``. costs: As in
-    ``Picture.costs``. passes: Number of passes over the pixels; an adaptive render checks errors
-    after each. looks: Number of error checks that the border around the tile allows for. machine:
-    Class of the machine that rendered the tile. job: The job as JSON, for tiles outside of a job's
-    folder. number: Index of the tile.
+    Attributes:
+        name: File of the tile.
+        key: Key from the header.
+        tile: Rectangle of the tile in the image, in pixels.
+        layers: Arrays of the image by name, of shape (height, width) or (height, width, channels);
+            names of AOVs begin with "aov.".
+        empty: For each layer, the value of a pixel without samples, if the image has such pixels.
+        stats: Statistics from ``make_stats``.
+        metadata: As in ``Picture.metadata``.
+        manifests: As in ``Picture.manifests``.
+        costs: As in ``Picture.costs``.
+        passes: Number of passes over the pixels; an adaptive render checks errors after each.
+        looks: Number of error checks that the border around the tile allows for.
+        machine: Class of the machine that rendered the tile.
+        job: The job as JSON, for tiles outside of a job's folder.
+        number: Index of the tile.
     """
 
     name: str
@@ -123,12 +130,18 @@ def save_part(
 ) -> None:
     """Writes a tile, never partially.
 
-    Args: path: File to write. picture: Rendered pixels. key: Key from ``Job.part_key``. number:
-    Index of the tile. tile: Rectangle of the tile in the image, in pixels. rendered: Rectangle of
-    ``picture`` in the image: the tile, perhaps with a border. machine: Class of this machine.
-    looks: Number of error checks that the border allows for. empty: An image whose last pixel has
-    no samples. job: The job as JSON, for a tile outside of a job's folder. replacing: Context
-    manager that yields the temporary name.
+    Args:
+        path: File to write.
+        picture: Rendered pixels.
+        key: Key from ``Job.part_key``.
+        number: Index of the tile.
+        tile: Rectangle of the tile in the image, in pixels.
+        rendered: Rectangle of ``picture`` in the image: the tile, perhaps with a border.
+        machine: Class of this machine.
+        looks: Number of error checks that the border allows for.
+        empty: An image whose last pixel has no samples.
+        job: The job as JSON, for a tile outside of a job's folder.
+        replacing: Context manager that yields the temporary name.
     """
     x, y = tile[0] - rendered[0], tile[1] - rendered[1]
     width, height = tile[2] - tile[0], tile[3] - tile[1]
@@ -195,9 +208,12 @@ def _write(
 def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None) -> Part:
     """Reads a tile and verifies its checksum.
 
-    Args: path: File to read. size: Required width and height in pixels; None allows any.
+    Args:
+        path: File to read.
+        size: Required width and height in pixels; None allows any.
 
-    Raises: DamagedPart: The file is missing or damaged.
+    Raises:
+        DamagedPart: The file is missing or damaged.
     """
     name = os.fspath(path)
     try:
@@ -235,11 +251,14 @@ def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None)
 def load_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> Part:
     """Reads a tile that must have a given key.
 
-    Args: path: File to read. key: Key from ``Job.part_key``. tile: Rectangle of the tile in the
-    image, in pixels. looks: Number of error checks that its border must allow for.
+    Args:
+        path: File to read.
+        key: Key from ``Job.part_key``.
+        tile: Rectangle of the tile in the image, in pixels.
+        looks: Number of error checks that its border must allow for.
 
-    Raises: DamagedPart: The tile is missing or damaged, has another key, or its border is too
-    narrow.
+    Raises:
+        DamagedPart: The tile is missing or damaged, has another key, or its border is too narrow.
     """
     part = read_part(path, (tile[2] - tile[0], tile[3] - tile[1]))
     if part.key != key or part.tile != tile:

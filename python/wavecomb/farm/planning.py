@@ -44,10 +44,14 @@ def complete(
 ) -> Job:
     """Returns a job with its tiles and files filled in.
 
-    Args: job: The job. tiles: Columns and rows; None chooses them here. workers: Expected number of
-    workers; 0 means unknown. learned: Guiding field for all images, or None.
+    Args:
+        job: The job.
+        tiles: Columns and rows; None chooses them here.
+        workers: Expected number of workers; 0 means unknown.
+        learned: Guiding field for all images, or None.
 
-    Raises: WavecombError: A farm cannot render the job, or files are missing.
+    Raises:
+        WavecombError: A farm cannot render the job, or files are missing.
     """
     if not job.images:
         raise WavecombError("all images exist; nothing is left to render")
@@ -75,7 +79,8 @@ def complete(
 def with_files(job: Job) -> Job:
     """Returns a job with the files that its stage needs now, and their hashes.
 
-    Raises: WavecombError: The stage cannot be opened, or a file is missing.
+    Raises:
+        WavecombError: The stage cannot be opened, or a file is missing.
     """
     from wavecomb.farm.rendering import list_files, use_job_maps
 

@@ -49,9 +49,13 @@ class Renderer:
     ) -> None:
         """Creates a renderer without opening the stage yet.
 
-        Args: job: The job. threads: Number of threads; 0 uses the job's value. learned: Guiding
-        field for all images, or None. reporter: Progress display of the render. loading: Called
-        while a stage is loading. is_stopped: Returns whether to cancel the render.
+        Args:
+            job: The job.
+            threads: Number of threads; 0 uses the job's value.
+            learned: Guiding field for all images, or None.
+            reporter: Progress display of the render.
+            loading: Called while a stage is loading.
+            is_stopped: Returns whether to cancel the render.
         """
         self.job = job
         self.warnings: dict[str, None] = {}
@@ -79,14 +83,20 @@ class Renderer:
     ) -> dict[str, Any]:
         """Renders a tile to a file.
 
-        Args: task: The tile. path: File of the tile. machine: Class of this machine. looks: Number
-        of error checks that a border must allow for; 0 chooses a likely number. with_job: Whether
-        the file also stores the job. replacing: As in ``save_part``.
+        Args:
+            task: The tile.
+            path: File of the tile.
+            machine: Class of this machine.
+            looks: Number of error checks that a border must allow for; 0 chooses a likely number.
+            with_job: Whether the file also stores the job.
+            replacing: As in ``save_part``.
 
-        Returns: Counts for the progress display.
+        Returns:
+            Counts for the progress display.
 
-        Raises: Stopped: ``is_stopped`` cancelled the render. WavecombError: The stage or the
-        settings cannot be rendered.
+        Raises:
+            Stopped: ``is_stopped`` cancelled the render.
+            WavecombError: The stage or the settings cannot be rendered.
         """
         from wavecomb.farm.part import replacing_quickly, save_part
 
@@ -207,9 +217,11 @@ def list_files(
 ) -> tuple[tuple[StageFile, ...], tuple[str, ...]]:
     """Lists all files that a stage needs, with hashes.
 
-    Returns: The files, and a line for each missing one.
+    Returns:
+        The files, and a line for each missing one.
 
-    Raises: WavecombError: The stage cannot be opened.
+    Raises:
+        WavecombError: The stage cannot be opened.
     """
     from pathlib import Path
 

@@ -111,7 +111,8 @@ class FarmPlugin(WorkerPlugin):
 def retry_unrunnable(dask_scheduler: Any) -> None:
     """Makes a scheduler look again for workers for tasks that had none.
 
-    Args: dask_scheduler: The scheduler. This function runs in its process.
+    Args:
+        dask_scheduler: The scheduler. This function runs in its process.
     """
     waiting = {task.key: "waiting" for task in dask_scheduler.unrunnable}
     if waiting:
@@ -123,13 +124,17 @@ def render_tiles(
 ) -> dict[str, Any]:
     """Renders the unfinished tiles among those of a job.
 
-    Args: folder: Folder of the job, on the client's machine. maps: Path maps of the job. job:
-    Expected ``Job.id``; a changed job in the folder is an error. machine: Machine class of this
-    worker. tiles: For each tile, the index of its image, its index and the number of error checks.
+    Args:
+        folder: Folder of the job, on the client's machine.
+        maps: Path maps of the job.
+        job: Expected ``Job.id``; a changed job in the folder is an error.
+        machine: Machine class of this worker.
+        tiles: For each tile, the index of its image, its index and the number of error checks.
 
-    Returns: A dictionary: ``done``, image and tile of each finished tile; ``failed``, image, tile
-    and an error line of each tile that cannot be rendered; ``full``, why nothing can be written
-    here, or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, its address.
+    Returns:
+        A dictionary: ``done``, image and tile of each finished tile; ``failed``, image, tile and an
+        error line of each tile that cannot be rendered; ``full``, why nothing can be written here,
+        or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, its address.
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.part import has_part
@@ -171,9 +176,10 @@ def assemble_image(
 ) -> dict[str, Any]:
     """Joins the tiles of an image and writes its files; takes the arguments of ``render_tiles``.
 
-    Returns: A dictionary: ``again``, tiles that must be rendered first; ``looks``, the number of
-    error checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
-    or ""; ``worker``, its address.
+    Returns:
+        A dictionary: ``again``, tiles that must be rendered first; ``looks``, the number of error
+        checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
+        or ""; ``worker``, its address.
     """
     from wavecomb.farm.assemble import finish_image
 
@@ -199,9 +205,13 @@ def has_stale_files(files: Iterable[tuple[str, str]], maps: list[Pair]) -> bool:
 def restart_stale(client: Any, cluster: str, job: Any) -> None:
     """Restarts workers that have read other versions of a job's files.
 
-    Args: client: Dask client. cluster: Name of the cluster, for messages. job: The job.
+    Args:
+        client: Dask client.
+        cluster: Name of the cluster, for messages.
+        job: The job.
 
-    Raises: WavecombError: Such a worker cannot be restarted.
+    Raises:
+        WavecombError: Such a worker cannot be restarted.
     """
     files = [(one.path, one.sha256) for one in job.files]
     maps = [list(pair) for pair in job.maps]
@@ -221,7 +231,9 @@ def restart_stale(client: Any, cluster: str, job: Any) -> None:
 def is_full(error: OSError, path: Path) -> bool:
     """Returns whether a full disk or an exceeded quota caused an error.
 
-    Args: error: The error, with its chain of causes. path: File that could not be written.
+    Args:
+        error: The error, with its chain of causes.
+        path: File that could not be written.
     """
     cause: BaseException | None = error
     while cause is not None:

@@ -47,7 +47,8 @@ def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
 def parse_tiles(text: str) -> tuple[int, int] | None:
     """Parses columns and rows such as "4x3"; returns None for "auto".
 
-    Raises: WavecombError: The text is neither.
+    Raises:
+        WavecombError: The text is neither.
     """
     if text == "auto":
         return None
@@ -63,7 +64,8 @@ def parse_tile(text: str) -> tuple[int, int]:
     >>> parse_tile("3/8")
     (2, 8)
 
-    Raises: WavecombError: The text is not a tile and a count.
+    Raises:
+        WavecombError: The text is not a tile and a count.
     """
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
@@ -77,7 +79,8 @@ def layout(count: int, region: Rectangle) -> tuple[int, int]:
     >>> layout(8, (0, 0, 1920, 1080))
     (4, 2)
 
-    Raises: WavecombError: The region has too few pixels for that many tiles.
+    Raises:
+        WavecombError: The region has too few pixels for that many tiles.
     """
     width, height = region[2] - region[0], region[3] - region[1]
     fits = [
@@ -99,9 +102,12 @@ def choose_tiles(
 
     Images stay whole if there are at least two for each worker.
 
-    Args: regions: Regions of the images, each size once. pictures: Number of images. workers:
-    Expected number of workers. whole: Whether tiles cost more than they gain, because each would
-    need a wide border or would train a guiding field.
+    Args:
+        regions: Regions of the images, each size once.
+        pictures: Number of images.
+        workers: Expected number of workers.
+        whole: Whether tiles cost more than they gain, because each would need a wide border or
+            would train a guiding field.
     """
     if workers < 2 or whole or pictures >= 2 * workers:
         return 1, 1

@@ -32,7 +32,8 @@ def write_certificates(place: Path, security: Any) -> None:
 def main(words: Sequence[str]) -> None:
     """Hosts workers until the scheduler ends.
 
-    Args: words: The private folder, the scheduler's address, and options of ``dask worker``.
+    Args:
+        words: The private folder, the scheduler's address, and options of ``dask worker``.
     """
     import dask
 

@@ -19,11 +19,15 @@ TITLE = "title"
 class Entry:
     """An action of the window.
 
-    Attributes: name: Object name without the prefix "action.". text: Text in the menu, with a
-    mnemonic. call: Callback. A checkable action passes its new state. keys: Shortcuts; the menu
-    shows the first. tip: Description in a sentence. checkable: Whether the action can be on or off.
-    local: Whether the shortcut works only while the viewport has the focus. Single keys need this,
-    because they would otherwise interfere with typing.
+    Attributes:
+        name: Object name without the prefix "action.".
+        text: Text in the menu, with a mnemonic.
+        call: Callback. A checkable action passes its new state.
+        keys: Shortcuts; the menu shows the first.
+        tip: Description in a sentence.
+        checkable: Whether the action can be on or off.
+        local: Whether the shortcut works only while the viewport has the focus. Single keys need
+            this, because they would otherwise interfere with typing.
     """
 
     name: str
@@ -68,8 +72,11 @@ def keypad(digit: int) -> tuple[str, str]:
 class HistoryActions(QObject):
     """Updater of the texts of undo and redo, such as "Undo intensity of /Key".
 
-    Args: stack: Undo stack, whose texts are appended to the actions' texts. undo: The undo action.
-    redo: The redo action. parent: Qt parent.
+    Args:
+        stack: Undo stack, whose texts are appended to the actions' texts.
+        undo: The undo action.
+        redo: The redo action.
+        parent: Qt parent.
     """
 
     def __init__(self, stack: QUndoStack, undo: QAction, redo: QAction, parent: QObject) -> None:

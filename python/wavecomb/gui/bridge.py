@@ -120,7 +120,8 @@ def port(receive: Receive) -> Port:
 
     Must be called on the window's thread.
 
-    Args: receive: A bound method. Messages are dropped once its object is gone.
+    Args:
+        receive: A bound method. Messages are dropped once its object is gone.
     """
     global _bridge
     application = QCoreApplication.instance()

@@ -19,10 +19,11 @@ KILL_MS = 8000
 class Command(QObject):
     """A process that runs a command, one at a time.
 
-    Signals: event(dict): The process printed a line with a JSON object on stdout. said(str): The
-    process printed another line, on stdout or stderr. finished(code, text, error): The process
-    ended: exit code, all of stdout, and the last line of stderr if it failed, else "". A stopped
-    process has the code 130.
+    Signals:
+        event(dict): The process printed a line with a JSON object on stdout.
+        said(str): The process printed another line, on stdout or stderr.
+        finished(code, text, error): The process ended: exit code, all of stdout, and the last line
+            of stderr if it failed, else "". A stopped process has the code 130.
     """
 
     event = Signal(dict)
@@ -45,8 +46,10 @@ class Command(QObject):
     def start(self, arguments: Sequence[str], *, module: str = "wavecomb", text: str = "") -> None:
         """Runs a module of Wavecomb as a program.
 
-        Args: arguments: Command-line arguments. module: The module; the default is the command-line
-        program. text: Standard input.
+        Args:
+            arguments: Command-line arguments.
+            module: The module; the default is the command-line program.
+            text: Standard input.
         """
         assert self._process is None, "one at a time"
         process = QProcess(self)

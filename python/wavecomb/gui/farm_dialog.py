@@ -35,13 +35,17 @@ WavecombError."""
 class FarmDialog(QDialog):
     """Dialog that asks for output and workers, submits the job and shows its progress.
 
-    Attributes: folder: Folder of the job; None before it is submitted.
+    Attributes:
+        folder: Folder of the job; None before it is submitted.
     """
 
     def __init__(self, describe: Describe, output: str, parent: QWidget | None = None) -> None:
         """Creates the dialog without submitting anything.
 
-        Args: describe: Describes the job. output: Initial output file. parent: The window.
+        Args:
+            describe: Describes the job.
+            output: Initial output file.
+            parent: The window.
         """
         super().__init__(parent)
         self.setObjectName("farm")

@@ -36,10 +36,14 @@ def describe(session: Session, edits: StageEdits | None, output: str) -> dict[st
 
     Edits are saved as a layer over the stage, beside the image.
 
-    Args: session: Session of the window. edits: Edits of its stage. output: File of the image.
+    Args:
+        session: Session of the window.
+        edits: Edits of its stage.
+        output: File of the image.
 
-    Raises: WavecombError: There is no stage, the view is not through a camera, or edits cannot be
-    saved.
+    Raises:
+        WavecombError: There is no stage, the view is not through a camera, or edits cannot be
+            saved.
     """
     source, setup = session.source, session.setup
     if source is None:

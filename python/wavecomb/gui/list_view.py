@@ -68,9 +68,13 @@ def lay_out_rows(
 ) -> None:
     """Sets up a list that selects whole rows, one at a time.
 
-    Args: view: View that already has its model. name: Object name. title: Accessible name. tip:
-    Tooltip. stretch: Column that takes the remaining width. widths: Widths of the fixed columns, in
-    font heights.
+    Args:
+        view: View that already has its model.
+        name: Object name.
+        title: Accessible name.
+        tip: Tooltip.
+        stretch: Column that takes the remaining width.
+        widths: Widths of the fixed columns, in font heights.
     """
     show_rows(view, name, title, tip)
     view.setItemDelegate(RowDelegate(view))

@@ -18,9 +18,12 @@ from wavecomb.usd.looks.texture import TextureCache
 class Source:
     """A stage to read, with its loading options.
 
-    Attributes: path: File of the stage. camera: Prim path or unique name, or None. time: Time code;
-    None means the start of the stage. variants: Selections as for ``wavecomb.load``, authored in
-    the session layer. purposes: Purposes of the geometry; None means default and render.
+    Attributes:
+        path: File of the stage.
+        camera: Prim path or unique name, or None.
+        time: Time code; None means the start of the stage.
+        variants: Selections as for ``wavecomb.load``, authored in the session layer.
+        purposes: Purposes of the geometry; None means default and render.
     """
 
     path: Path
@@ -34,10 +37,14 @@ class Source:
 class Request:
     """Request of a session to read a stage.
 
-    Attributes: source: Stage and loading options. usd: A stage that is already open, or None.
-    overrides: Private copy of its session layer, or None. fresh: Whether to reload the layers of
-    ``usd`` from disk first. threads: Number of threads for textures; 0 uses all cores. textures:
-    Textures of the previous scene, to share. size: Width and height of the image, in pixels.
+    Attributes:
+        source: Stage and loading options.
+        usd: A stage that is already open, or None.
+        overrides: Private copy of its session layer, or None.
+        fresh: Whether to reload the layers of ``usd`` from disk first.
+        threads: Number of threads for textures; 0 uses all cores.
+        textures: Textures of the previous scene, to share.
+        size: Width and height of the image, in pixels.
     """
 
     source: Source
@@ -60,8 +67,9 @@ def copied(layer: Sdf.Layer) -> Sdf.Layer:
 class Read:
     """A stage that was read for the window.
 
-    Attributes: stage: The loaded stage with its scene. usd: The USD stage that the window shows and
-    edits.
+    Attributes:
+        stage: The loaded stage with its scene.
+        usd: The USD stage that the window shows and edits.
     """
 
     stage: LoadedStage
@@ -71,7 +79,8 @@ class Read:
 def read(request: Request) -> Read:
     """Opens a stage for the window's editors, and loads a scene from a second stage of its files.
 
-    Raises: WavecombError: The stage cannot be rendered.
+    Raises:
+        WavecombError: The stage cannot be rendered.
     """
     from wavecomb.usd import LoadReport, mtlx, open_editable
     from wavecomb.usd.stage.diagnostics import captured

@@ -43,8 +43,9 @@ _STATE_VERSION = 1
 class MainWindow(TakesFiles, QMainWindow):
     """The window of `wavecomb view`.
 
-    Args: setup: Initial render settings. settings: Storage of the window's state; None uses the
-    user's settings.
+    Args:
+        setup: Initial render settings.
+        settings: Storage of the window's state; None uses the user's settings.
     """
 
     def __init__(self, setup: Setup | None = None, settings: QSettings | None = None) -> None:
@@ -310,7 +311,8 @@ class MainWindow(TakesFiles, QMainWindow):
     def _farm_job(self, output: str) -> dict[str, Any]:
         """Describes a farm job for the displayed stage, saving edits beside the image.
 
-        Raises: WavecombError: There is no stage, or its edits cannot be saved.
+        Raises:
+            WavecombError: There is no stage, or its edits cannot be saved.
         """
         from wavecomb.gui.farm_job import describe
 

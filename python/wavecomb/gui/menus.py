@@ -171,7 +171,8 @@ def entries(window: Window) -> list[Entry]:
 def make_menus(window: Window) -> tuple[dict[str, QAction], RecentStages]:
     """Fills the menu bar of a window.
 
-    Returns: The actions by name, and the menu of recently opened stages.
+    Returns:
+        The actions by name, and the menu of recently opened stages.
     """
     actions: dict[str, QAction] = {}
     by_name = {entry.name: entry for entry in entries(window)}

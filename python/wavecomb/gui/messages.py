@@ -106,9 +106,11 @@ def log_folder() -> Path:
 def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
     """Installs hooks that turn internal errors on any thread into one line and a report file.
 
-    Args: tell: Called with the line, on the window's thread.
+    Args:
+        tell: Called with the line, on the window's thread.
 
-    Returns: A function that removes the hooks.
+    Returns:
+        A function that removes the hooks.
     """
     reporter = _Reporter(tell)
     caught = reporter.caught  # the hooks must not hold a Qt object

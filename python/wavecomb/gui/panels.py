@@ -25,8 +25,12 @@ _BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 class Panel:
     """A panel of the window.
 
-    Attributes: name: Name in the saved state. title: Title for people. widget: The widget. area:
-    Initial area of its dock. hidden: Whether the panel is hidden initially.
+    Attributes:
+        name: Name in the saved state.
+        title: Title for people.
+        widget: The widget.
+        area: Initial area of its dock.
+        hidden: Whether the panel is hidden initially.
     """
 
     name: str

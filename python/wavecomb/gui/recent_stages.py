@@ -16,9 +16,12 @@ MOST = 10
 class RecentStages(QMenu):
     """Menu of the recently opened files, the last one first.
 
-    Args: settings: Storage of the files. parent: The window.
+    Args:
+        settings: Storage of the files.
+        parent: The window.
 
-    Signals: chosen(str): The user chose a file.
+    Signals:
+        chosen(str): The user chose a file.
     """
 
     chosen = Signal(str)

@@ -41,10 +41,12 @@ else:
 class Setup(_Rows):
     """Settings of a live render: those of the core's table, and those that only a window has.
 
-    Attributes: aovs: Layers to keep beside the beauty, by the names of docs/aovs.md. denoise:
-    Whether frames are also denoised. region: Rectangle x0, y0, x1, y1 of pixels to render, without
-    x1 and y1; None renders all. own_policy: A policy object that replaces ``policy``, or None.
-    profile: Initial costs from ``wavecomb.run.costs.load_costs``, or None.
+    Attributes:
+        aovs: Layers to keep beside the beauty, by the names of docs/aovs.md.
+        denoise: Whether frames are also denoised.
+        region: Rectangle x0, y0, x1, y1 of pixels to render, without x1 and y1; None renders all.
+        own_policy: A policy object that replaces ``policy``, or None.
+        profile: Initial costs from ``wavecomb.run.costs.load_costs``, or None.
     """
 
     aovs: tuple[str, ...] = aov_names.DEFAULT
@@ -56,7 +58,9 @@ class Setup(_Rows):
     def changed(self, **values: Any) -> Setup:
         """Returns a checked copy with some values replaced.
 
-        Raises: WavecombError: A field does not exist. wavecomb._core.Error: A value is invalid.
+        Raises:
+            WavecombError: A field does not exist.
+            wavecomb._core.Error: A value is invalid.
         """
         known = {field.name for field in fields(self)}
         unknown = sorted(set(values) - known)
@@ -81,10 +85,12 @@ class Setup(_Rows):
     def settings(self, scale: int = 1, *, preview: bool = False) -> Settings:
         """Returns the checked settings of the core.
 
-        Args: scale: Divisor of width and height. preview: Whether to render only one sample per
-        pixel.
+        Args:
+            scale: Divisor of width and height.
+            preview: Whether to render only one sample per pixel.
 
-        Raises: WavecombError, wavecomb._core.Error: A value is invalid. The message is one line.
+        Raises:
+            WavecombError, wavecomb._core.Error: A value is invalid. The message is one line.
         """
         from wavecomb.run.settings import make_settings
 

@@ -18,7 +18,9 @@ ToneRole = Qt.ItemDataRole.UserRole + 11
 class HeadedModel(QAbstractTableModel):
     """Table with fixed column titles. Subclasses implement ``data``.
 
-    Args: headers: Titles of the columns. tips: Tooltips of the titles; empty means none.
+    Args:
+        headers: Titles of the columns.
+        tips: Tooltips of the titles; empty means none.
     """
 
     def __init__(

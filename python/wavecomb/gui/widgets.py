@@ -99,10 +99,14 @@ def ask_file(
 ) -> None:
     """Opens a file dialog without blocking.
 
-    Args: parent: Parent of the dialog. title: Title of the dialog. kinds: Filter, such as "USD
-    (*.usda *.usdc)". take: Called with the chosen name. start: Initial folder or file. mode: An
-    existing file, or a folder. ending: Ending of a file to write, without the dot; "" means that
-    the file is read.
+    Args:
+        parent: Parent of the dialog.
+        title: Title of the dialog.
+        kinds: Filter, such as "USD (*.usda *.usdc)".
+        take: Called with the chosen name.
+        start: Initial folder or file.
+        mode: An existing file, or a folder.
+        ending: Ending of a file to write, without the dot; "" means that the file is read.
     """
     dialog = QFileDialog(parent, title, start, kinds)
     if ending:

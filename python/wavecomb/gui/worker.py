@@ -109,7 +109,8 @@ class Worker(_OneThread):
     A running job is not stopped. Its result is reported even if a newer job waits, unless
     ``cancel`` was called.
 
-    Signals: done(key, result), failed(key, line): Results, emitted on the window's thread.
+    Signals:
+        done(key, result), failed(key, line): Results, emitted on the window's thread.
     """
 
     done = Signal(object, object)
@@ -124,10 +125,12 @@ class Worker(_OneThread):
     def submit(self, job: Job, key: object = None) -> None:
         """Submits the next job.
 
-        Args: job: The job, preferably a partial of a function. key: Returned with the result.
-        Nothing happens if a job with this key is running.
+        Args:
+            job: The job, preferably a partial of a function.
+            key: Returned with the result. Nothing happens if a job with this key is running.
 
-        Raises: TypeError: The job holds a Qt object.
+        Raises:
+            TypeError: The job holds a Qt object.
         """
         refuse_qt(job)
         if self._closed:
@@ -176,7 +179,8 @@ class Errands(_OneThread):
     def submit(self, job: Job, done: Callable[[Any], None], failed: Callable[[str], None]) -> None:
         """Queues a job; afterwards calls ``done(result)`` or ``failed(line)``.
 
-        Raises: TypeError: The job holds a Qt object.
+        Raises:
+            TypeError: The job holds a Qt object.
         """
         refuse_qt(job)
         if self._closed:
@@ -208,10 +212,12 @@ class Errands(_OneThread):
 class Tasks(QObject):
     """Background tasks, of which the newest is reported.
 
-    Signals: busy(str): Description such as "writing a.exr", or "" if there is no task. failed(str):
-    Error in one line.
+    Signals:
+        busy(str): Description such as "writing a.exr", or "" if there is no task.
+        failed(str): Error in one line.
 
-    Attributes: jobs: Key and description of each task.
+    Attributes:
+        jobs: Key and description of each task.
     """
 
     busy = Signal(str)

@@ -42,8 +42,10 @@ __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
 class SceneInfo:
     """A scene that ``write_scene`` can write.
 
-    Attributes: summary: Description in one line, for a list. metres_per_unit: Length of a scene
-    unit, in metres. build: Function that fills a stage.
+    Attributes:
+        summary: Description in one line, for a list.
+        metres_per_unit: Length of a scene unit, in metres.
+        build: Function that fills a stage.
     """
 
     summary: str
@@ -82,11 +84,14 @@ SCENES: dict[str, SceneInfo] = {
 def write_scene(name: str, path: Path, **options: Any) -> None:
     """Writes a procedural stage, with textures and volumes in folders ``<stem>_...`` beside it.
 
-    Args: name: A key of ``SCENES``. path: File to write: .usda (text), .usdc or .usd (binary).
-    **options: Fields of ``SceneOptions``.
+    Args:
+        name: A key of ``SCENES``.
+        path: File to write: .usda (text), .usdc or .usd (binary).
+        **options: Fields of ``SceneOptions``.
 
-    Raises: SceneError: The name, the file's ending, an option or an imported mesh is invalid, or a
-    file cannot be written. SceneError is also a ValueError.
+    Raises:
+        SceneError: The name, the file's ending, an option or an imported mesh is invalid, or a file
+            cannot be written. SceneError is also a ValueError.
     """
     if name not in SCENES:
         raise SceneError(f"no scene {name!r}; there are {', '.join(SCENES)}")

@@ -27,9 +27,12 @@ def below_surface(
 ) -> str:
     """Adds an OpenPBR material with subsurface scattering and returns its name.
 
-    Args: writer: Writer of the stage. name: Name of the material. colour: Diffuse reflectance of a
-    flat surface of the material. radius: Mean free path of each colour channel, in scene units.
-    **inputs: Further inputs of the OpenPBR surface.
+    Args:
+        writer: Writer of the stage.
+        name: Name of the material.
+        colour: Diffuse reflectance of a flat surface of the material.
+        radius: Mean free path of each colour channel, in scene units.
+        **inputs: Further inputs of the OpenPBR surface.
     """
     net = Network(writer.stage, f"/World/Looks/{name}")
     longest = max(radius)

@@ -80,9 +80,13 @@ def _leg(
 ) -> list[Tube]:
     """Makes a leg with foot, toes and claws.
 
-    Args: hip: Start, inside the body, (3,). knee: Knee or elbow, (3,). ankle: Ankle or wrist, (3,).
-    foot: Middle of the foot, about 0.05 above the ground, (3,). yaw: Direction of the toes about Y,
-    in radians from +x. thigh: Radius of the thigh.
+    Args:
+        hip: Start, inside the body, (3,).
+        knee: Knee or elbow, (3,).
+        ankle: Ankle or wrist, (3,).
+        foot: Middle of the foot, about 0.05 above the ground, (3,).
+        yaw: Direction of the toes about Y, in radians from +x.
+        thigh: Radius of the thigh.
     """
     path = np.array([hip, 0.6 * hip + 0.4 * knee, knee, 0.5 * (knee + ankle), ankle, foot])
     radius = thigh * np.array([0.9, 1.05, 0.66, 0.50, 0.40, 0.46])
@@ -195,12 +199,15 @@ def _grids(tubes: list[Tube], triangles: int) -> list[tuple[int, int]]:
 def dragon(triangles: int = 250_000) -> Mesh:
     """Makes the dragon.
 
-    Args: triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The result is
-    within one percent.
+    Args:
+        triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The result is
+            within one percent.
 
-    Returns: A mesh of closed, overlapping parts with outward faces, smooth normals and uv.
+    Returns:
+        A mesh of closed, overlapping parts with outward faces, smooth normals and uv.
 
-    Raises: SceneError: The number is out of range.
+    Raises:
+        SceneError: The number is out of range.
     """
     if not MIN_TRIANGLES <= triangles <= MAX_TRIANGLES:
         raise SceneError(

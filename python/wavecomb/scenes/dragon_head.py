@@ -23,10 +23,14 @@ def spike(
 ) -> Tube:
     """Makes a tapering horn, claw, tooth or blade from ``root`` through ``path``.
 
-    Args: root: Start point. *path: Further control points; the last one is the tip. radius: Half
-    width along ``up`` at the root. flat: Half width across as a fraction of ``radius``. up:
-    Direction of the broad side. relief: Displacement. bulge: Radius of the second control point
-    relative to a straight taper.
+    Args:
+        root: Start point.
+        *path: Further control points; the last one is the tip.
+        radius: Half width along ``up`` at the root.
+        flat: Half width across as a fraction of ``radius``.
+        up: Direction of the broad side.
+        relief: Displacement.
+        bulge: Radius of the second control point relative to a straight taper.
     """
     points = np.array([root, *path], np.float64)
     if len(points) == 2:
@@ -55,9 +59,13 @@ def tube(
 ) -> Tube:
     """Makes a tube from a table of control points.
 
-    Args: rows: Control points: x, y, z, half width, half height. Without the half height, the
-    section is round. relief: Displacement. belly: As in ``Tube``. detail: As in ``Tube``. side: -1
-    mirrors the tube in z = 0.
+    Args:
+        rows: Control points: x, y, z, half width, half height. Without the half height, the section
+            is round.
+        relief: Displacement.
+        belly: As in ``Tube``.
+        detail: As in ``Tube``.
+        side: -1 mirrors the tube in z = 0.
     """
     table = np.array(rows)
     points = table[:, :3] * np.array([1.0, 1.0, side])

@@ -101,10 +101,14 @@ def add_strands(
 ) -> None:
     """Adds strands that taper towards their tips.
 
-    Args: writer: Writer of the stage. path: Path of the prim. strands: Points of the strands, (n,
-    points, 3), root first. width: Width at the root, in scene units. material: Name of the bound
-    material. primvars: By name, interpolation (uniform or varying) and values, which are numbers or
-    colours.
+    Args:
+        writer: Writer of the stage.
+        path: Path of the prim.
+        strands: Points of the strands, (n, points, 3), root first.
+        width: Width at the root, in scene units.
+        material: Name of the bound material.
+        primvars: By name, interpolation (uniform or varying) and values, which are numbers or
+            colours.
     """
     count, points = strands.shape[:2]
     flat = strands.reshape(-1, 3).astype(np.float32)

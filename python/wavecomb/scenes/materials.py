@@ -32,9 +32,11 @@ PROGRAMS = ("diffuse", "metal", "dielectric", "plastic", "emissive", "principled
 class MaterialInfo:
     """A material.
 
-    Attributes: program: One of ``PROGRAMS``, or None for a UsdPreviewSurface without a program.
-    inputs: Values of UsdPreviewSurface inputs by name. textures: Names in ``textures.TEXTURES`` by
-    input. repeat: Texture repeats per unit of uv.
+    Attributes:
+        program: One of ``PROGRAMS``, or None for a UsdPreviewSurface without a program.
+        inputs: Values of UsdPreviewSurface inputs by name.
+        textures: Names in ``textures.TEXTURES`` by input.
+        repeat: Texture repeats per unit of uv.
     """
 
     program: str | None

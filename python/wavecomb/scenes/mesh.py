@@ -19,9 +19,11 @@ _CHUNK_FACES = 1 << 20
 class Mesh:
     """An indexed triangle mesh, Y up.
 
-    Attributes: points: Vertex positions, float32 (n, 3), in scene units. faces: Vertex indices,
-    int32 (m, 3), counter-clockwise seen from outside. normals: Unit vertex normals, float32 (n, 3).
-    uv: Texture coordinates, float32 (n, 2).
+    Attributes:
+        points: Vertex positions, float32 (n, 3), in scene units.
+        faces: Vertex indices, int32 (m, 3), counter-clockwise seen from outside.
+        normals: Unit vertex normals, float32 (n, 3).
+        uv: Texture coordinates, float32 (n, 2).
     """
 
     points: NDArray[np.float32]
@@ -124,9 +126,11 @@ def grid_mesh(
 ) -> Mesh:
     """Makes the mesh of a grid of vertices.
 
-    Args: points: Positions, (rows, columns, 3). uv: Texture coordinates, (rows, columns, 2).
-    normals: Normals, (rows, columns, 3); None computes smooth normals. reverse: Whether the face
-    normal points along (next column) x (next row).
+    Args:
+        points: Positions, (rows, columns, 3).
+        uv: Texture coordinates, (rows, columns, 2).
+        normals: Normals, (rows, columns, 3); None computes smooth normals.
+        reverse: Whether the face normal points along (next column) x (next row).
     """
     faces = grid_faces(*points.shape[:2])
     if reverse:

@@ -39,9 +39,11 @@ def load_dragon(path: Path) -> Mesh:
     The mesh is scaled to the dragon's size, centred over the origin, put on y = 0 and given smooth
     normals. A mesh without uv gets a cylindrical projection about Y.
 
-    Args: path: .obj, .ply, either also with .gz, or .usd, .usda, .usdc, .usdz.
+    Args:
+        path: .obj, .ply, either also with .gz, or .usd, .usda, .usdc, .usdz.
 
-    Raises: SceneError: The file is missing, broken, empty or of another kind.
+    Raises:
+        SceneError: The file is missing, broken, empty or of another kind.
     """
     if not path.is_file():
         raise SceneError(f"{path}: no such mesh file")

@@ -34,9 +34,10 @@ class Network:
     def node(self, kind: str, output: str, **inputs: Any) -> UsdShade.Output:
         """Adds node ``ND_<kind>_<output>`` and returns its output.
 
-        Args: kind: Category of the node, such as "mix". output: Type of its output, such as
-        "color3", or "color3FA" if one operand is a float. **inputs: Outputs to connect, or (type,
-        value) pairs; "in" is spelt ``in_``.
+        Args:
+            kind: Category of the node, such as "mix".
+            output: Type of its output, such as "color3", or "color3FA" if one operand is a float.
+            **inputs: Outputs to connect, or (type, value) pairs; "in" is spelt ``in_``.
         """
         self._count += 1
         shader = self._shader(f"{kind}_{self._count:02d}", f"ND_{kind}_{output}", inputs)
@@ -58,10 +59,11 @@ class Network:
     def hair(self, absorption: str, roughness: dict[str, Any], **inputs: Any) -> None:
         """Adds a hair BSDF as the final shader.
 
-        Args: absorption: Node that computes absorption, without types:
-        ``chiang_hair_absorption_from_color`` or ``deon_hair_absorption_from_melanin``. roughness:
-        Inputs of ``chiang_hair_roughness``, as ``node`` takes them. **inputs: Inputs of the
-        absorption node.
+        Args:
+            absorption: Node that computes absorption, without types:
+                ``chiang_hair_absorption_from_color`` or ``deon_hair_absorption_from_melanin``.
+            roughness: Inputs of ``chiang_hair_roughness``, as ``node`` takes them.
+            **inputs: Inputs of the absorption node.
         """
         colour = self._shader("Absorption", f"ND_{absorption}", inputs)
         rough = self._shader("Roughness", "ND_chiang_hair_roughness", roughness)

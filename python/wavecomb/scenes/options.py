@@ -15,25 +15,32 @@ from wavecomb.scenes.mesh import Mesh
 class SceneOptions:
     """Options of ``write_scene``. A scene ignores options that it has no use for.
 
-    Attributes: dragon: OBJ, PLY or USD file that replaces the built-in dragon, or None. triangles:
-    Triangles of the built-in dragon, or of all stones of ``spread`` or ``heavy``. teapot_level:
-    Cells along each edge of the teapot's 32 patches. Bodies of revolution in ``room`` have four
-    times as many cells around their axis. seed: Random seed of the layout and of texture patterns.
-    texture_size: Edge of the largest textures, in texels; all others shrink in proportion. aspect:
-    Width / height of the image that the camera frames; None uses the scene's value. material:
-    Material of the dragon in ``cornell-dragon``: gold, copper, glass or jade. materials: Number of
-    materials in ``spread`` and ``heavy``. programs: Number of kinds of material in ``spread``, 1 to
-    5. texture_mb: Memory of all textures of ``spread`` or ``heavy``, in 1e6 bytes; 0 means no
-    textures. shader_cost: Octaves of noise on the most expensive material of ``spread``. The
-    octaves of the materials grow geometrically from 1, which means no noise. lights: Number of
-    lights in ``lights``. lamps: Whether a key, a fill and a dim dome light ``mixed`` and
-    ``dragon``. strands: Number of strands in ``fur`` and ``head``. splats: Number of splats in
-    ``splats``. capture: PLY file of 3D Gaussian splats that replaces the contents of ``splats``, or
-    None. capture_linear: Whether the capture's colours are linear. By default they are sRGB, in
-    which most captures are trained. voxels: Voxels along the longest edge of the grids of ``smoke``
-    and ``clouds``, at least 16. plain: Whether materials are written as by third-party exporters:
-    UsdPreviewSurface in the metallic workflow, without a program. Not available for ``heavy``, for
-    hair, and for ``spread`` with a ``shader_cost`` above 1.
+    Attributes:
+        dragon: OBJ, PLY or USD file that replaces the built-in dragon, or None.
+        triangles: Triangles of the built-in dragon, or of all stones of ``spread`` or ``heavy``.
+        teapot_level: Cells along each edge of the teapot's 32 patches. Bodies of revolution in
+            ``room`` have four times as many cells around their axis.
+        seed: Random seed of the layout and of texture patterns.
+        texture_size: Edge of the largest textures, in texels; all others shrink in proportion.
+        aspect: Width / height of the image that the camera frames; None uses the scene's value.
+        material: Material of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
+        materials: Number of materials in ``spread`` and ``heavy``.
+        programs: Number of kinds of material in ``spread``, 1 to 5.
+        texture_mb: Memory of all textures of ``spread`` or ``heavy``, in 1e6 bytes; 0 means no
+            textures.
+        shader_cost: Octaves of noise on the most expensive material of ``spread``. The octaves of
+            the materials grow geometrically from 1, which means no noise.
+        lights: Number of lights in ``lights``.
+        lamps: Whether a key, a fill and a dim dome light ``mixed`` and ``dragon``.
+        strands: Number of strands in ``fur`` and ``head``.
+        splats: Number of splats in ``splats``.
+        capture: PLY file of 3D Gaussian splats that replaces the contents of ``splats``, or None.
+        capture_linear: Whether the capture's colours are linear. By default they are sRGB, in which
+            most captures are trained.
+        voxels: Voxels along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
+        plain: Whether materials are written as by third-party exporters: UsdPreviewSurface in the
+            metallic workflow, without a program. Not available for ``heavy``, for hair, and for
+            ``spread`` with a ``shader_cost`` above 1.
     """
 
     dragon: Path | str | None = None

@@ -33,9 +33,12 @@ def value_noise(
 ) -> Image:
     """Evaluates tileable value noise, 0 to 1, with ``cells`` lattice cells per unit.
 
-    Args: x: Horizontal positions, of any shape; (1, w) with y (h, 1) is a grid, which is much
-    faster. y: Vertical positions. cells: Lattice cells per unit. rng: Source of the lattice values.
-    rows: Vertical lattice cells, if different.
+    Args:
+        x: Horizontal positions, of any shape; (1, w) with y (h, 1) is a grid, which is much faster.
+        y: Vertical positions.
+        cells: Lattice cells per unit.
+        rng: Source of the lattice values.
+        rows: Vertical lattice cells, if different.
     """
     rows = rows or cells
     lattice = rng.random((rows, cells)).astype(np.float32)
@@ -110,8 +113,9 @@ def step(x: Image, low: float, high: float) -> Image:
 def normal_map(height: Image, metres: float) -> Image:
     """Converts tileable heights (size, size) to a normal map that stores n as 0.5 + 0.5 n.
 
-    Args: height: Height of the surface at each texel, in metres. metres: Edge of the image, in
-    metres.
+    Args:
+        height: Height of the surface at each texel, in metres.
+        metres: Edge of the image, in metres.
     """
     per_metre = 0.5 * height.shape[0] / metres
     slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * per_metre

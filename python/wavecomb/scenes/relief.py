@@ -29,8 +29,10 @@ def _visible(cells: FloatArray) -> FloatArray:
 def _scale_height(row: FloatArray, column: FloatArray, edge: FloatArray) -> FloatArray:
     """Returns the height, 0 to 1, of overlapping, staggered scales whose tips point to lower rows.
 
-    Args: row: Lattice coordinate along the tube, one row per unit. column: Lattice coordinate
-    around the tube, one scale per unit. edge: Width of the rim, in lattice units.
+    Args:
+        row: Lattice coordinate along the tube, one row per unit.
+        column: Lattice coordinate around the tube, one scale per unit.
+        edge: Width of the rim, in lattice units.
     """
     base = np.floor(-row)
     y = -row - base
@@ -72,9 +74,12 @@ def scaly(
 ) -> Relief:
     """Makes a relief of scales above, transverse plates below, and grain.
 
-    Args: around: Number of scales around the tube. depth: Height of a scale in local radii. belly:
-    Fraction of the circumference, on each side of the underside, that has plates; 0 for none. fade:
-    Factor on the whole relief as a function of ``along``.
+    Args:
+        around: Number of scales around the tube.
+        depth: Height of a scale in local radii.
+        belly: Fraction of the circumference, on each side of the underside, that has plates; 0 for
+            none.
+        fade: Factor on the whole relief as a function of ``along``.
     """
 
     def relief(surface: Surface) -> FloatArray:

@@ -84,10 +84,13 @@ def rounded_box(
 ) -> Mesh:
     """Makes a box with rounded edges.
 
-    Args: low: Lower corner (3,). high: Upper corner (3,). radius: Radius of the edges; at most half
-    of the thinnest side. arc: Cells on an eighth of a circle. bulge: Height of the bulge of the
-    faces across x, y and z, for upholstery. uv_offset: Added to texture coordinates (2,), so that
-    boards differ.
+    Args:
+        low: Lower corner (3,).
+        high: Upper corner (3,).
+        radius: Radius of the edges; at most half of the thinnest side.
+        arc: Cells on an eighth of a circle.
+        bulge: Height of the bulge of the faces across x, y and z, for upholstery.
+        uv_offset: Added to texture coordinates (2,), so that boards differ.
     """
     low, high, swell = (np.asarray(v, float) for v in (low, high, bulge))
     half = 0.5 * (high - low)
@@ -129,9 +132,11 @@ def _lengths(curve: FloatArray) -> FloatArray:
 def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4) -> Mesh:
     """Makes a body of revolution about y.
 
-    Args: profile: Control points (radius, height) of a spline from axis to axis, upwards on the
-    outside. A point given twice is nearly a corner. columns: Cells around. steps: Cells between two
-    control points.
+    Args:
+        profile: Control points (radius, height) of a spline from axis to axis, upwards on the
+            outside. A point given twice is nearly a corner.
+        columns: Cells around.
+        steps: Cells between two control points.
     """
     control = np.asarray(profile, float)
     curve = spline(control, np.linspace(0.0, 1.0, steps * (len(control) - 1) + 1))
@@ -164,9 +169,13 @@ def tube(
 ) -> Mesh:
     """Makes a closed tube with round ends along a spline.
 
-    Args: points: Control points of the centre line, (k, 3). width: Half width: one number, or one
-    for each point. columns: Cells around. rings: Cells along. height: Half height along ``up``;
-    None makes it equal to the half width. up: Direction that is not along the tube.
+    Args:
+        points: Control points of the centre line, (k, 3).
+        width: Half width: one number, or one for each point.
+        columns: Cells around.
+        rings: Cells along.
+        height: Half height along ``up``; None makes it equal to the half width.
+        up: Direction that is not along the tube.
     """
     control = np.asarray(points, float)
     wide = np.broadcast_to(np.asarray(width, float), len(control)).copy()

@@ -34,8 +34,12 @@ _CHUNK = 1 << 15
 class Splats:
     """Gaussian splats, with the attributes of UsdVol.
 
-    Attributes: positions: (n, 3). scales: (n, 3), lengths. orientations: (n, 4) quaternions w, x,
-    y, z. opacities: (n,) from 0 to 1. harmonics: (n, k, 3), coefficients of the colour minus 0.5.
+    Attributes:
+        positions: (n, 3).
+        scales: (n, 3), lengths.
+        orientations: (n, 4) quaternions w, x, y, z.
+        opacities: (n,) from 0 to 1.
+        harmonics: (n, k, 3), coefficients of the colour minus 0.5.
     """
 
     positions: FloatArray
@@ -51,7 +55,8 @@ def read_capture(path: Path) -> Splats:
     Columns are x, y, z, scale_* (logarithms), rot_*, opacity (a logit), f_dc_*, f_rest_* (by
     channel).
 
-    Raises: SceneError: The file is not such a capture.
+    Raises:
+        SceneError: The file is not such a capture.
     """
     try:
         columns = ply_vertices(path.read_bytes())

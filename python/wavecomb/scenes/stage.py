@@ -59,10 +59,12 @@ class StageWriter:
     ) -> None:
         """Starts an empty stage.
 
-        Args: path: File to write: .usda, .usdc or .usd (binary). metres_per_unit: Length of a scene
-        unit, in metres. texture_size: Edge of the largest textures in texels; all others shrink in
-        proportion. seed: Random seed of the patterns in textures. is_plain: Whether materials are
-        written in their plain form, see ``materials.plain``.
+        Args:
+            path: File to write: .usda, .usdc or .usd (binary).
+            metres_per_unit: Length of a scene unit, in metres.
+            texture_size: Edge of the largest textures in texels; all others shrink in proportion.
+            seed: Random seed of the patterns in textures.
+            is_plain: Whether materials are written in their plain form, see ``materials.plain``.
         """
         if path.suffix.lower() not in SUFFIXES:
             raise SceneError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
@@ -323,8 +325,11 @@ class StageWriter:
     def sun(self, name: str, way: Sequence[float], angle: float, radiant: Sequence[float]) -> None:
         """Adds a distant light.
 
-        Args: name: Name of the prim. way: Direction in which its light travels, (3,). angle:
-        Angular diameter, in degrees. radiant: Irradiance of a surface that faces the light, RGB.
+        Args:
+            name: Name of the prim.
+            way: Direction in which its light travels, (3,).
+            angle: Angular diameter, in degrees.
+            radiant: Irradiance of a surface that faces the light, RGB.
         """
         light = UsdLux.DistantLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateAngleAttr(angle)
@@ -359,10 +364,12 @@ class StageWriter:
     ) -> None:
         """Adds ``/World/Camera``, a pinhole camera that looks at a point, with +Y up.
 
-        Args: position: Position of the pinhole, (3,), in scene units. target: Point in the middle
-        of the image, (3,), in scene units. fov_degrees: Horizontal angle of view. aspect: Width /
-        height of the image. focal_mm: Focal length in mm; the aperture follows from it and the
-        angle of view.
+        Args:
+            position: Position of the pinhole, (3,), in scene units.
+            target: Point in the middle of the image, (3,), in scene units.
+            fov_degrees: Horizontal angle of view.
+            aspect: Width / height of the image.
+            focal_mm: Focal length in mm; the aperture follows from it and the angle of view.
         """
         camera = UsdGeom.Camera.Define(self.stage, "/World/Camera")
         # USD's camera units are tenths of a scene unit. Only the ratio to the aperture matters.

@@ -73,10 +73,14 @@ def build_field(
 ) -> None:
     """Adds stones with randomly assigned materials, ground, lights and camera.
 
-    Args: writer: Writer of the stage. names: Materials, which the stage already has. triangles:
-    Number of triangles of all stones together. edge: Edge of the textures in texels, over which a
-    stone's triangles are scattered like the charts of an atlas; 0 means no texture coordinates.
-    aspect: Width / height of the image. rng: Source of random shapes and positions.
+    Args:
+        writer: Writer of the stage.
+        names: Materials, which the stage already has.
+        triangles: Number of triangles of all stones together.
+        edge: Edge of the textures in texels, over which a stone's triangles are scattered like the
+            charts of an atlas; 0 means no texture coordinates.
+        aspect: Width / height of the image.
+        rng: Source of random shapes and positions.
     """
     count = stones_for(len(names))
     hands = [names[k] for _ in range(-(-count // len(names))) for k in rng.permutation(len(names))]

@@ -25,11 +25,12 @@ _TEXTURE_LENGTH = 0.5
 class Surface:
     """Grid positions where a relief is evaluated.
 
-    Attributes: along: Arc length divided by the tube's length, 0 to 1, (rings, 1). turns: Arc
-    length in units of local circumferences, (rings, 1). around: Angle / 2 pi from the underside, 0
-    to 1; 0.5 is the ridge, (1, columns). radius: Mean radius of the section, in scene units,
-    (rings, 1). cell: Grid spacing as a fraction of the local circumference. Finer relief would
-    alias.
+    Attributes:
+        along: Arc length divided by the tube's length, 0 to 1, (rings, 1).
+        turns: Arc length in units of local circumferences, (rings, 1).
+        around: Angle / 2 pi from the underside, 0 to 1; 0.5 is the ridge, (1, columns).
+        radius: Mean radius of the section, in scene units, (rings, 1).
+        cell: Grid spacing as a fraction of the local circumference. Finer relief would alias.
     """
 
     along: FloatArray
@@ -47,11 +48,14 @@ Relief = Callable[[Surface], FloatArray]
 class Tube:
     """A closed tube.
 
-    Attributes: points: Control points of the centre line, (k, 3). width: Half width across, at each
-    control point, (k,). Zero makes a tip. height: Half height along "up", at each control point,
-    (k,). up: Direction of the ridge, at each control point, (k, 3) or (3,). relief: Displacement,
-    or None for a smooth tube. belly: Factor on the height below the centre line; 1 is a full
-    ellipse. detail: Factor on the density of triangles.
+    Attributes:
+        points: Control points of the centre line, (k, 3).
+        width: Half width across, at each control point, (k,). Zero makes a tip.
+        height: Half height along "up", at each control point, (k,).
+        up: Direction of the ridge, at each control point, (k, 3) or (3,).
+        relief: Displacement, or None for a smooth tube.
+        belly: Factor on the height below the centre line; 1 is a full ellipse.
+        detail: Factor on the density of triangles.
     """
 
     points: FloatArray
@@ -66,9 +70,12 @@ class Tube:
 def spline(control: FloatArray, t: FloatArray) -> FloatArray:
     """Evaluates a uniform cubic B-spline through its first and last control point.
 
-    Args: control: Control values, (k,) or (k, n), k at least 2. t: Parameters from 0 to 1, (m,).
+    Args:
+        control: Control values, (k,) or (k, n), k at least 2.
+        t: Parameters from 0 to 1, (m,).
 
-    Returns: Values, (m,) or (m, n).
+    Returns:
+        Values, (m,) or (m, n).
     """
     padded = np.concatenate(
         [2 * control[:1] - control[1:2], control, 2 * control[-1:] - control[-2:-1]]
@@ -136,8 +143,10 @@ def _perimeter(profile: _Profile) -> FloatArray:
 class Extent:
     """Size of a tube, for distributing triangles among tubes.
 
-    Attributes: length: Length along its profile, in scene units. perimeter: Mean perimeter, in
-    scene units. detail: Factor on the density of triangles.
+    Attributes:
+        length: Length along its profile, in scene units.
+        perimeter: Mean perimeter, in scene units.
+        detail: Factor on the density of triangles.
     """
 
     length: float

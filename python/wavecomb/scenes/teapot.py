@@ -153,8 +153,11 @@ def _arc_lengths(rows: FloatArray) -> FloatArray:
 def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> Mesh:
     """Tessellates a part in Newell's coordinates.
 
-    Args: patches: (k, 4, 4, 3), ``turns`` patches around for each step along. turns: Number of
-    patches around. level: Cells along each patch edge. repeats: Texture repeats around the part.
+    Args:
+        patches: (k, 4, 4, 3), ``turns`` patches around for each step along.
+        turns: Number of patches around.
+        level: Cells along each patch edge.
+        repeats: Texture repeats around the part.
     """
     t = np.linspace(0.0, 1.0, level + 1)
     inner = np.clip(t, 1e-4, 1.0 - 1e-4)
@@ -179,9 +182,11 @@ def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> 
 def teapot(level: int = 16) -> Mesh:
     """Tessellates the teapot, Y up, standing on y = 0, spout along +x, 6.43 units wide.
 
-    Args: level: Cells along each patch edge, at least 1; yields about ``64 * level**2`` triangles.
+    Args:
+        level: Cells along each patch edge, at least 1; yields about ``64 * level**2`` triangles.
 
-    Returns: The mesh with analytic normals, and uv whose unit is a sixth of the height around.
+    Returns:
+        The mesh with analytic normals, and uv whose unit is a sixth of the height around.
     """
     if level < 1:
         raise SceneError(f"teapot level must be at least 1, not {level}")

@@ -35,10 +35,12 @@ from wavecomb.scenes.patterns import (
 class TextureInfo:
     """Description of a procedural texture.
 
-    Attributes: make: Function of the size in texels and a random generator that returns the image.
-    size: Edge in texels at full resolution. colour: True for sRGB colour, False for raw data.
-    channels: Output of UsdUVTexture to use, "rgb" or "r". normal: True for a tangent space normal
-    map (stored as 0.5 + 0.5 n).
+    Attributes:
+        make: Function of the size in texels and a random generator that returns the image.
+        size: Edge in texels at full resolution.
+        colour: True for sRGB colour, False for raw data.
+        channels: Output of UsdUVTexture to use, "rgb" or "r".
+        normal: True for a tangent space normal map (stored as 0.5 + 0.5 n).
     """
 
     make: Callable[[int, np.random.Generator], Image]
@@ -262,10 +264,13 @@ def sky(width: int, height: int, seed: int) -> Image:
 def write_image(path: Path, image: Image, data_format: str) -> None:
     """Writes an image, never partially.
 
-    Args: path: PNG or EXR file. image: (height, width, channels). data_format: OpenImageIO's name
-    of the stored type: "uint8" or "half".
+    Args:
+        path: PNG or EXR file.
+        image: (height, width, channels).
+        data_format: OpenImageIO's name of the stored type: "uint8" or "half".
 
-    Raises: OSError: The file cannot be written.
+    Raises:
+        OSError: The file cannot be written.
     """
     height, width, channels = image.shape
     part = path.with_name(f".{path.stem}.part{path.suffix}")

@@ -75,9 +75,12 @@ def sampled(
 ) -> dict[str, Any]:
     """Samples a function of space to bricks for ``vdb.write``, leaving out bricks of zeros.
 
-    Args: density: Returns values at points (n, 3), 0 in empty space. low: Lower corner of the
-    sampled box. high: Upper corner of the sampled box. voxels: Number of voxels along the longest
-    edge. half: Whether to store values with 16 bits.
+    Args:
+        density: Returns values at points (n, 3), 0 in empty space.
+        low: Lower corner of the sampled box.
+        high: Upper corner of the sampled box.
+        voxels: Number of voxels along the longest edge.
+        half: Whether to store values with 16 bits.
     """
     start, end = np.array(low), np.array(high)
     step = float((end - start).max()) / voxels

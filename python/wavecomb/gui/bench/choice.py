@@ -32,12 +32,15 @@ from wavecomb.run.progress import time_text
 class SuiteInfo:
     """Facts about a suite.
 
-    Attributes: name: A name of `wavecomb bench list`, or the path of a TOML file. title: Title in
-    one line. stages: Names of its stages. repetitions: Default number of repetitions.
-    configurations: Number of configurations on this machine. seconds: Rough time of one repetition
-    of all configurations, at 0.4 million samples per second and thread, without the time for
-    preparing stages and golden images. experiments: Name and number of configurations of each
-    experiment.
+    Attributes:
+        name: A name of `wavecomb bench list`, or the path of a TOML file.
+        title: Title in one line.
+        stages: Names of its stages.
+        repetitions: Default number of repetitions.
+        configurations: Number of configurations on this machine.
+        seconds: Rough time of one repetition of all configurations, at 0.4 million samples per
+            second and thread, without the time for preparing stages and golden images.
+        experiments: Name and number of configurations of each experiment.
     """
 
     name: str
@@ -65,7 +68,8 @@ def suite_infos() -> list[SuiteInfo]:
 def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
     """Reads a suite by name or TOML file, restricted to some stages.
 
-    Raises: WavecombError: The suite is invalid. The message is one line.
+    Raises:
+        WavecombError: The suite is invalid. The message is one line.
     """
     from wavecomb.bench.machine import limits
     from wavecomb.bench.plan import Estimator, configurations
@@ -123,7 +127,9 @@ class Choice:
 class SuiteChoice(QWidget):
     """Form for the arguments of a benchmark.
 
-    Signals: changed(): The choice changed. failed(str): One line that says what to do.
+    Signals:
+        changed(): The choice changed.
+        failed(str): One line that says what to do.
     """
 
     changed = Signal()

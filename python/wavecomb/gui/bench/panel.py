@@ -43,8 +43,9 @@ class BenchPanel(TakesFiles, QWidget):
 
     The viewport pauses while a suite runs, since its renders would disturb the measurement.
 
-    Signals: done(Path): The page of a report was opened. failed(str): One line that says what to
-    do; also shown in the panel.
+    Signals:
+        done(Path): The page of a report was opened.
+        failed(str): One line that says what to do; also shown in the panel.
     """
 
     done = Signal(object)

@@ -32,11 +32,15 @@ MAPS = {
 class Numbers:
     """Differences of A from B, the reference, in one layer.
 
-    Attributes: layer: Name of the layer. comparison: Differences of linear values. psnr: PSNR of
-    the displayed values, in dB. flip: Mean FLIP of the displayed values; None if not known (yet).
-    flip_note: Reason for a missing FLIP value. test: Result of the z-test; None if no variance is
-    known. test_note: Reason for a missing z-test. others_differ: Layers of both images whose bits
-    differ; None if only one layer was compared.
+    Attributes:
+        layer: Name of the layer.
+        comparison: Differences of linear values.
+        psnr: PSNR of the displayed values, in dB.
+        flip: Mean FLIP of the displayed values; None if not known (yet).
+        flip_note: Reason for a missing FLIP value.
+        test: Result of the z-test; None if no variance is known.
+        test_note: Reason for a missing z-test.
+        others_differ: Layers of both images whose bits differ; None if only one layer was compared.
     """
 
     layer: str
@@ -56,8 +60,8 @@ class Numbers:
 def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
     """Computes all numbers but FLIP, which takes longer.
 
-    Raises: ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer
-    message).
+    Raises:
+        ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer message).
     """
     one, two = pair(a, b, layer)
     others: tuple[str, ...] | None = None

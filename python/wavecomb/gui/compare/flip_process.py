@@ -32,8 +32,8 @@ class FlipProcess:
     ) -> NDArray[np.float32]:
         """Computes ``perceptual.flip`` of two images (height, width, channels).
 
-        Raises: WavecombError: The library is missing, or the process failed. The message is one
-        line.
+        Raises:
+            WavecombError: The library is missing, or the process failed. The message is one line.
         """
         job = io.BytesIO()
         np.savez(job, a=a, b=b, high_range=high_range, exposure=exposure)

@@ -26,8 +26,11 @@ from wavecomb.picture.layer_view import Legend, Shown
 class Ask:
     """Request to show a comparison.
 
-    Attributes: a: Image A, or None. b: Image B, the reference, or None. look: Layer, exposure and
-    tone mapping of both images. kind: Kind of the map, a key of ``differences.MAPS``.
+    Attributes:
+        a: Image A, or None.
+        b: Image B, the reference, or None.
+        look: Layer, exposure and tone mapping of both images.
+        kind: Kind of the map, a key of ``differences.MAPS``.
     """
 
     a: Side | None
@@ -55,9 +58,11 @@ class Ask:
 class Jobs(QObject):
     """Four workers for images, numbers, FLIP and the map. Each computes only the newest request.
 
-    Signals: images(A, B): Displayed images, QImage or None. numbers(Numbers): Numbers, first
-    without and then with FLIP; None if there is no comparison. map(QImage, Scale): Difference map;
-    None, None if there is no map. failed(str): Error in one line.
+    Signals:
+        images(A, B): Displayed images, QImage or None.
+        numbers(Numbers): Numbers, first without and then with FLIP; None if there is no comparison.
+        map(QImage, Scale): Difference map; None, None if there is no map.
+        failed(str): Error in one line.
     """
 
     images = Signal(object, object)

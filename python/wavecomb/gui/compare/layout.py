@@ -20,11 +20,15 @@ MOST_ZOOM = 64.0
 class Layout:
     """Geometry of the panes, in device-independent points of the widget.
 
-    Attributes: mode: One of ``MODES``. shown: The image that the flip view shows, A or B. area:
-    Area of the widget. size: Size of an image in pixels, that of A if they differ; None without
-    images. gap: Gap between panes. bar: Height of the free area below the difference. zoom: Points
-    per pixel; None fits the whole image. centre: Point of the image in the middle of a pane, as a
-    fraction of the image size.
+    Attributes:
+        mode: One of ``MODES``.
+        shown: The image that the flip view shows, A or B.
+        area: Area of the widget.
+        size: Size of an image in pixels, that of A if they differ; None without images.
+        gap: Gap between panes.
+        bar: Height of the free area below the difference.
+        zoom: Points per pixel; None fits the whole image.
+        centre: Point of the image in the middle of a pane, as a fraction of the image size.
     """
 
     def __init__(self) -> None:

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 class SidePicker(TakesFiles, QWidget):
     """Bar with the name of side A or B and a menu of sources.
 
-    Signals: dropped(list): Files with these paths were dropped on the bar.
+    Signals:
+        dropped(list): Files with these paths were dropped on the bar.
     """
 
     dropped = Signal(list)

@@ -30,11 +30,14 @@ _numbers = itertools.count(1)
 class Side:
     """An image to compare.
 
-    Attributes: name: Name for people, such as a file name or "viewport". layers: Layers by name,
-    float32 (height, width, channels), linear; at least one. note: Description of the origin or
-    progress. path: Path of the file, or None. variance: Variance of each pixel's mean, with the
-    shape of the beauty; None if unknown. live: Whether it is a frame of a render that continues.
-    number: Unique number of this image.
+    Attributes:
+        name: Name for people, such as a file name or "viewport".
+        layers: Layers by name, float32 (height, width, channels), linear; at least one.
+        note: Description of the origin or progress.
+        path: Path of the file, or None.
+        variance: Variance of each pixel's mean, with the shape of the beauty; None if unknown.
+        live: Whether it is a frame of a render that continues.
+        number: Unique number of this image.
     """
 
     name: str
@@ -66,7 +69,8 @@ def read_side(path: Path) -> Side:
 
     A file NAME_var.exr beside NAME.exr, as golden images have it, is read as its variance.
 
-    Raises: WavecombError: The file cannot be read. The message is one line that names the file.
+    Raises:
+        WavecombError: The file cannot be read. The message is one line that names the file.
     """
     try:
         layers = _read_npy(path) if path.suffix.lower() == ".npy" else layers_of(path)

@@ -78,9 +78,11 @@ class PictureBook:
     ) -> Verdict:
         """Compares an image with the first one of the same key.
 
-        Args: key: Key from ``picture_key``. samples: Samples of each pixel, or an identifier of
-        their map. mark: Hash from ``fingerprint``. settings: Scheduling settings, to report the
-        differences.
+        Args:
+            key: Key from ``picture_key``.
+            samples: Samples of each pixel, or an identifier of their map.
+            mark: Hash from ``fingerprint``.
+            settings: Scheduling settings, to report the differences.
         """
         if key is None:
             return Verdict("none", "This picture depends on time, so no two are equal")

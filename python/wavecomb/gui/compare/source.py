@@ -31,7 +31,9 @@ SHORT = {
 class SideSource(QObject):
     """One side of a comparison. All methods are for the UI thread; none blocks.
 
-    Signals: changed(): ``side`` or ``kind`` changed. failed(str): One line that says what to do.
+    Signals:
+        changed(): ``side`` or ``kind`` changed.
+        failed(str): One line that says what to do.
     """
 
     changed = Signal()

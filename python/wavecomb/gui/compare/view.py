@@ -85,9 +85,11 @@ _PAN_STEP = 0.1
 class CompareView(TakesFiles, QWidget):
     """Widget that draws the images, independent of their sources.
 
-    Signals: hovered(x, y): The pixel under the mouse, or -1, -1. flipped(which): The flip view now
-    shows "A" or "B". wiped(fraction): The wipe line moved to this fraction of the width, 0 at the
-    left. dropped(which, paths): Files were dropped on the half of A or of B.
+    Signals:
+        hovered(x, y): The pixel under the mouse, or -1, -1.
+        flipped(which): The flip view now shows "A" or "B".
+        wiped(fraction): The wipe line moved to this fraction of the width, 0 at the left.
+        dropped(which, paths): Files were dropped on the half of A or of B.
     """
 
     hovered = Signal(int, int)

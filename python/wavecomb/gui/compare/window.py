@@ -45,7 +45,8 @@ _KEYS = {"side": "1", "wipe": "2", "flip": "3", "difference": "4", "three": "5"}
 class CompareWindow(QWidget):
     """Window that compares A and B, in one view and with numbers.
 
-    Signals: failed(str): One line that says what to do; also shown in the window.
+    Signals:
+        failed(str): One line that says what to do; also shown in the window.
     """
 
     failed = Signal(str)

@@ -30,7 +30,8 @@ class Autosave(QObject):
     Each stage has one file. The window with the stage holds a lock beside the file. A second window
     with the same stage writes no copy.
 
-    Signals: found(): There are edits of an earlier window that ended without saving them.
+    Signals:
+        found(): There are edits of an earlier window that ended without saving them.
     """
 
     found = Signal()
@@ -38,7 +39,10 @@ class Autosave(QObject):
     def __init__(self, edits: SceneEdits, folder: Path, parent: QObject | None = None) -> None:
         """Follows the edits of a window.
 
-        Args: edits: The edits. folder: Folder of the files, created when needed. parent: Qt parent.
+        Args:
+            edits: The edits.
+            folder: Folder of the files, created when needed.
+            parent: Qt parent.
         """
         super().__init__(parent)
         self._edits, self._folder = edits, folder

@@ -20,8 +20,9 @@ _NOT_REPEATED = frozenset(
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     """Returns a layer with the content of the session layer, and the stage as its sublayer.
 
-    Args: stage: Stage with edits in its session layer. folder: Folder of the layer, from which the
-    path of the stage is relative.
+    Args:
+        stage: Stage with edits in its session layer.
+        folder: Folder of the layer, from which the path of the stage is relative.
     """
     root = stage.GetRootLayer()
     layer = Sdf.Layer.CreateAnonymous("edits.usda")
@@ -43,7 +44,8 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
 def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
     """Writes the edits as a .usda file, never partially, and returns its path.
 
-    Raises: WavecombError: The file cannot be written, or would replace a file of the stage.
+    Raises:
+        WavecombError: The file cannot be written, or would replace a file of the stage.
     """
     target = Path(path)
     if target.suffix.lower() not in (".usda", ".usd"):

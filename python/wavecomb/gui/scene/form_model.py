@@ -17,9 +17,13 @@ Colour = tuple[float, float, float]
 class Range:
     """Range of a parameter.
 
-    Attributes: low: Smallest value. high: Largest value. soft_low: Left end of the slider.
-    soft_high: Right end of the slider. decimals: Number of decimals. logarithmic: Whether the
-    slider is logarithmic. If ``low`` is 0, its left end means 0.
+    Attributes:
+        low: Smallest value.
+        high: Largest value.
+        soft_low: Left end of the slider.
+        soft_high: Right end of the slider.
+        decimals: Number of decimals.
+        logarithmic: Whether the slider is logarithmic. If ``low`` is 0, its left end means 0.
     """
 
     low: float
@@ -72,13 +76,18 @@ NUMBER, COLOUR, SWITCH, DRIVEN = "number", "colour", "switch", "driven"
 class FieldRow:
     """A field of a form.
 
-    Attributes: name: Name of the parameter. label: Label before the field. kind: "number",
-    "colour", "switch", or "driven" for a value from a texture or primvar. value: Value when the
-    form was made: a number, a colour of three numbers, or a bool; None for a driven field. title:
-    Full name for people, such as "coat weight". bounds: Range of a number, or of each component of
-    a colour. default: Value if nothing is authored; None if unknown. driver: Source of the value of
-    a driven field, such as "texture wood.png". group: Heading above the field, or "". tip: Tooltip
-    with the effect and the edited attribute.
+    Attributes:
+        name: Name of the parameter.
+        label: Label before the field.
+        kind: "number", "colour", "switch", or "driven" for a value from a texture or primvar.
+        value: Value when the form was made: a number, a colour of three numbers, or a bool; None
+            for a driven field.
+        title: Full name for people, such as "coat weight".
+        bounds: Range of a number, or of each component of a colour.
+        default: Value if nothing is authored; None if unknown.
+        driver: Source of the value of a driven field, such as "texture wood.png".
+        group: Heading above the field, or "".
+        tip: Tooltip with the effect and the edited attribute.
     """
 
     name: str
@@ -96,12 +105,15 @@ class FieldRow:
 class FormModel(QObject):
     """Form of one object at a time. Subclasses provide the values and receive the edits.
 
-    Signals: remade(): The rows changed, because another object or none is shown. changed(): The
-    values of the same rows changed.
+    Signals:
+        remade(): The rows changed, because another object or none is shown.
+        changed(): The values of the same rows changed.
 
-    Attributes: rows: Fields, in order. title: Name of the object, or "". note: Text in place of
-    fields or below them. set_typing: Called at the start and end of typing a value, which becomes
-    one undo step.
+    Attributes:
+        rows: Fields, in order.
+        title: Name of the object, or "".
+        note: Text in place of fields or below them.
+        set_typing: Called at the start and end of typing a value, which becomes one undo step.
     """
 
     remade = Signal()

@@ -50,7 +50,9 @@ def field_of(row: FieldRow) -> Field | DrivenField:
 class FormView(QScrollArea):
     """View of the fields of a model, rebuilt when its rows change.
 
-    Attributes: fields: Editable fields by name. groups: Groups by title.
+    Attributes:
+        fields: Editable fields by name.
+        groups: Groups by title.
     """
 
     def __init__(self, model: FormModel, name: str, title: str) -> None:
@@ -142,7 +144,8 @@ class Rows(QWidget):
 class Group(QWidget):
     """Rows under a heading that collapses them.
 
-    Signals: toggled(str, bool): The user opened (True) or closed the group.
+    Signals:
+        toggled(str, bool): The user opened (True) or closed the group.
     """
 
     toggled = Signal(str, bool)

@@ -21,9 +21,12 @@ _EDIT = 1
 class EditCommand(QUndoCommand):
     """An undo command.
 
-    Args: step: The step. history: The history it belongs to. stretch: Number that is equal for
-    steps that may merge. typing: Whether the step is part of typing a value. moment: Time of the
-    step in seconds.
+    Args:
+        step: The step.
+        history: The history it belongs to.
+        stretch: Number that is equal for steps that may merge.
+        typing: Whether the step is part of typing a value.
+        moment: Time of the step in seconds.
     """
 
     def __init__(
@@ -63,10 +66,12 @@ class EditCommand(QUndoCommand):
 class History(QObject):
     """Undo history of one stage.
 
-    Signals: step(Step): Apply this step: a new one, a redone one, or the inverse of one.
+    Signals:
+        step(Step): Apply this step: a new one, a redone one, or the inverse of one.
 
-    Attributes: stack: Qt's undo stack; clean while the edits equal the saved ones. now: Clock in
-    seconds, which distinguishes drags from single changes.
+    Attributes:
+        stack: Qt's undo stack; clean while the edits equal the saved ones.
+        now: Clock in seconds, which distinguishes drags from single changes.
     """
 
     step = Signal(object)

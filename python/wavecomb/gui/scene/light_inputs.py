@@ -26,10 +26,15 @@ _KINDS = {"number": NUMBER, "colour": COLOUR, "flag": SWITCH}
 class LightInput:
     """An input of a light.
 
-    Attributes: name: Name of the input in the window. input: UsdLux name of the input, without
-    "inputs:". label: Label in the form. kind: Kind of field, see ``form_model``. default: Value if
-    nothing is authored. bounds: Range of a number, or of each component of a colour. tip: Tooltip
-    with the effect. group: Heading above the field, or "".
+    Attributes:
+        name: Name of the input in the window.
+        input: UsdLux name of the input, without "inputs:".
+        label: Label in the form.
+        kind: Kind of field, see ``form_model``.
+        default: Value if nothing is authored.
+        bounds: Range of a number, or of each component of a colour.
+        tip: Tooltip with the effect.
+        group: Heading above the field, or "".
     """
 
     name: str

@@ -97,7 +97,8 @@ class LightsModel(HeadedModel):
 class LightForm(FormModel):
     """Form of one light.
 
-    Attributes: path: Path of its prim, "" for the soft dome, None if no light is shown.
+    Attributes:
+        path: Path of its prim, "" for the soft dome, None if no light is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:

@@ -32,10 +32,14 @@ if TYPE_CHECKING:
 class ListAndForm(QWidget):
     """A list, and the form of its selected row. The selection survives rereading the list.
 
-    Args: model: Rows of the list. form: Fields of one row. show: Shows the fields of a row, or no
-    fields for None. name: Object name in the singular, such as "light". title: Accessible name in
-    the singular, such as "Light". tip: Tooltip of the list. widths: Widths of columns after the
-    first, in font heights.
+    Args:
+        model: Rows of the list.
+        form: Fields of one row.
+        show: Shows the fields of a row, or no fields for None.
+        name: Object name in the singular, such as "light".
+        title: Accessible name in the singular, such as "Light".
+        tip: Tooltip of the list.
+        widths: Widths of columns after the first, in font heights.
     """
 
     def __init__(

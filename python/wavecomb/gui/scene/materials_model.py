@@ -52,8 +52,11 @@ LABELS = {"conductor_eta": "eta", "conductor_k": "k"}
 class Row:
     """A row of the list: a material prim, or a material that the loader made.
 
-    Attributes: path: Path of the prim, or "" if there is none. name: Name for people. program:
-    Shading program. ids: Indices of its materials in the scene.
+    Attributes:
+        path: Path of the prim, or "" if there is none.
+        name: Name for people.
+        program: Shading program.
+        ids: Indices of its materials in the scene.
     """
 
     path: str
@@ -149,7 +152,8 @@ class MaterialsModel(HeadedModel):
 class MaterialForm(FormModel):
     """Form of one material, with the headings of its MaterialX definition.
 
-    Attributes: row: The material; None if none is shown.
+    Attributes:
+        row: The material; None if none is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 class RenderSync:
     """Base of ``SceneEdits``, which reads materials and lights of the stage and updates the render.
 
-    Attributes: session: The session whose scene follows the edits. stage_edits: Edits of its open
-    stage.
+    Attributes:
+        session: The session whose scene follows the edits.
+        stage_edits: Edits of its open stage.
     """
 
     session: Session

@@ -31,13 +31,16 @@ class SceneEdits(QObject, RenderSync):
     Edits of visibility and variants load the stage again. Edits of materials and lights change the
     existing scene immediately.
 
-    Signals: reset(): Another stage is open, or none; earlier prims are invalid.
-    structure_changed(): Prims may have been added or removed. scene_changed(): The stage was loaded
-    (again); indices of materials and lights changed. changed(): Something was edited, undone or
-    redone.
+    Signals:
+        reset(): Another stage is open, or none; earlier prims are invalid.
+        structure_changed(): Prims may have been added or removed.
+        scene_changed(): The stage was loaded (again); indices of materials and lights changed.
+        changed(): Something was edited, undone or redone.
 
-    Attributes: history: Undo history. edits: Edits of the open stage; None without a stage. solo:
-    The light that is shown alone, or None.
+    Attributes:
+        history: Undo history.
+        edits: Edits of the open stage; None without a stage.
+        solo: The light that is shown alone, or None.
     """
 
     reset = Signal()
@@ -113,7 +116,9 @@ class SceneEdits(QObject, RenderSync):
     def solo_light(self, path: str | None, lights: Iterable[str]) -> None:
         """Shows one light and hides all others, as one undo step.
 
-        Args: path: Path of the light; None restores the state before. lights: Paths of all lights.
+        Args:
+            path: Path of the light; None restores the state before.
+            lights: Paths of all lights.
         """
         if self.edits is None:
             return

@@ -244,8 +244,11 @@ class SceneModel(QAbstractItemModel):
 def search(usd: Usd.Stage, text: str, step: int = 500) -> Iterator[list[Sdf.Path]]:
     """Finds prims whose name or type contains a text, or whose path does if the text has a "/".
 
-    Args: usd: The stage. text: The text; case is ignored. step: Number of prims searched per
-    yielded list, so that the caller can do other work between.
+    Args:
+        usd: The stage.
+        text: The text; case is ignored.
+        step: Number of prims searched per yielded list, so that the caller can do other work
+            between.
     """
     wanted = text.casefold()
     by_path = "/" in wanted

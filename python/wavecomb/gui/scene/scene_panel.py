@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 class ScenePanel(QWidget):
     """Panel with tabs, whose selection is synchronised with the session.
 
-    Signals: selected(str): A prim was selected, in any panel or in the image. frame_wanted(): F was
-    pressed in the tree, to frame the selected prims.
+    Signals:
+        selected(str): A prim was selected, in any panel or in the image.
+        frame_wanted(): F was pressed in the tree, to frame the selected prims.
     """
 
     selected = Signal(str)

@@ -112,7 +112,8 @@ MAX_EXPANDED = 300
 class _View(QTreeView):
     """Tree view. Space and a click on the eye toggle visibility.
 
-    Signals: frame_wanted(): F was pressed.
+    Signals:
+        frame_wanted(): F was pressed.
     """
 
     frame_wanted = Signal()

@@ -24,8 +24,9 @@ of a value that no attribute of the stage can hold."""
 class Opinion:
     """Value that the session layer has for one key.
 
-    Attributes: value: Value of the attribute, or name of the variant. type_name: Type of the
-    attribute.
+    Attributes:
+        value: Value of the attribute, or name of the variant.
+        type_name: Type of the attribute.
     """
 
     value: Any
@@ -53,9 +54,11 @@ class Solo:
 class Step:
     """One undo step.
 
-    Attributes: label: Description for people, such as "intensity of /Key". before: Opinions before
-    the step by key, None for no opinion. after: Opinions after the step, with the same keys. solo:
-    Solo state before and after; None if unchanged.
+    Attributes:
+        label: Description for people, such as "intensity of /Key".
+        before: Opinions before the step by key, None for no opinion.
+        after: Opinions after the step, with the same keys.
+        solo: Solo state before and after; None if unchanged.
     """
 
     label: str
@@ -92,9 +95,11 @@ class Step:
 class StageEdits:
     """The edits of one stage.
 
-    Attributes: stage: The stage, whose session layer holds the edits. time: Time code at which
-    attributes are read. values: Edited values that no attribute can hold, by prim and parameter.
-    They affect the image but cannot be saved.
+    Attributes:
+        stage: The stage, whose session layer holds the edits.
+        time: Time code at which attributes are read.
+        values: Edited values that no attribute can hold, by prim and parameter. They affect the
+            image but cannot be saved.
     """
 
     stage: Usd.Stage
@@ -171,7 +176,8 @@ class StageEdits:
 
         The opinions are those of ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible``.
 
-        Raises: WavecombError: A prim is inside an instance.
+        Raises:
+            WavecombError: A prim is inside an instance.
         """
         wanted = list(paths)
         opinions: dict[Key, Opinion | None] = {}
@@ -189,7 +195,8 @@ class StageEdits:
     def variant(self, path: Sdf.Path, name: str, choice: str | None) -> Step | None:
         """Plans to select a variant; None restores the selection of the stage.
 
-        Raises: WavecombError: There is no such set or variant, or the prim is inside an instance.
+        Raises:
+            WavecombError: There is no such set or variant, or the prim is inside an instance.
         """
         prim = self.stage.GetPrimAtPath(path)
         if prim and (prim.IsInstanceProxy() or prim.IsInPrototype()):

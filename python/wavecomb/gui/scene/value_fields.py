@@ -46,7 +46,8 @@ class _Spin(QDoubleSpinBox):
 
     It leaves undo and redo to the window and has no undo history.
 
-    Signals: typing(bool): The user began (True) or finished typing a value.
+    Signals:
+        typing(bool): The user began (True) or finished typing a value.
     """
 
     typing = Signal(bool)
@@ -102,9 +103,10 @@ class _Spin(QDoubleSpinBox):
 class Field(QWidget):
     """Base class of fields: a row with a reset button.
 
-    Signals: changed(value): The user changed the value: a number, a colour or a bool. reset(): The
-    user wants the value of the stage. typing(bool): The user began (True) or finished typing a
-    value.
+    Signals:
+        changed(value): The user changed the value: a number, a colour or a bool.
+        reset(): The user wants the value of the stage.
+        typing(bool): The user began (True) or finished typing a value.
     """
 
     changed = Signal(object)

@@ -16,10 +16,13 @@ if TYPE_CHECKING:
 class VariantsModel(QObject):
     """Variant sets of one prim.
 
-    Signals: changed(): ``sets`` changed.
+    Signals:
+        changed(): ``sets`` changed.
 
-    Attributes: path: Path of the prim, or None. sets: Its variant sets. editable: Whether variants
-    can be selected, which is not possible inside an instance.
+    Attributes:
+        path: Path of the prim, or None.
+        sets: Its variant sets.
+        editable: Whether variants can be selected, which is not possible inside an instance.
     """
 
     changed = Signal()

@@ -49,8 +49,10 @@ def hide(
 ) -> Words:
     """Returns the opinions that ``UsdGeom.Imageable.MakeInvisible`` would author.
 
-    Args: prim: An imageable prim. time: Time code of the stage. pending: Prims that will be hidden
-    (True) or shown (False).
+    Args:
+        prim: An imageable prim.
+        time: Time code of the stage.
+        pending: Prims that will be hidden (True) or shown (False).
     """
     known = (pending or {}).get(prim.GetPath())
     hidden = says_hidden(prim, time) if known is None else known

@@ -21,8 +21,9 @@ def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
 
     Executes the file on each call, so an edited file can be loaded again.
 
-    Raises: WavecombError: The file cannot be read or executed, or has no valid policy. The message
-    is one line that names the file and, if known, the line in it.
+    Raises:
+        WavecombError: The file cannot be read or executed, or has no valid policy. The message is
+            one line that names the file and, if known, the line in it.
     """
     path = Path(path)
     module = _run(path)
@@ -44,7 +45,9 @@ def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
 class OwnPolicy(SchedulingPolicy):
     """A loaded policy for a live render, whose exceptions become one-line errors.
 
-    Attributes: path: File of the policy. policy: The loaded policy.
+    Attributes:
+        path: File of the policy.
+        policy: The loaded policy.
     """
 
     def __init__(self, policy: SchedulingPolicy, path: str | os.PathLike[str], name: str) -> None:

@@ -19,8 +19,9 @@ class Rounds(QObject):
 
     Any change from outside ends the sequence, without restoring the original settings.
 
-    Signals: moved(int, int): Number of finished steps, and of all steps. ended(bool): Whether all
-    steps were done.
+    Signals:
+        moved(int, int): Number of finished steps, and of all steps.
+        ended(bool): Whether all steps were done.
     """
 
     moved = Signal(int, int)

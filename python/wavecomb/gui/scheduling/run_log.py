@@ -158,9 +158,12 @@ class RunLog:
     ) -> Series:
         """Adds statistics and returns the series that they belong to.
 
-        Args: stats: Statistics of the render. settings: Values of the fields in ``FIELDS``, as far
-        as known. picture: Everything else that determines the amount of work. finished: Whether the
-        render has ended. recipe: Fields of a setup that restore the settings.
+        Args:
+            stats: Statistics of the render.
+            settings: Values of the fields in ``FIELDS``, as far as known.
+            picture: Everything else that determines the amount of work.
+            finished: Whether the render has ended.
+            recipe: Fields of a setup that restore the settings.
         """
         known = {name: settings[name] for name in FIELDS if name in settings}
         look = take_look(stats)

@@ -38,7 +38,8 @@ NOTE = (
 class RunsTab(QWidget):
     """Tab that shows a log of runs.
 
-    Signals: changed(): Another run was pinned, or runs were removed, so plots must be redrawn.
+    Signals:
+        changed(): Another run was pinned, or runs were removed, so plots must be redrawn.
     """
 
     changed = Signal()

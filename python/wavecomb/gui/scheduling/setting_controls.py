@@ -133,8 +133,11 @@ def control_of(row: Choice | Number, changed: Changed) -> Control:
 def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | None = None) -> None:
     """Adds a control with its label, which shares the control's tooltip.
 
-    Args: form: The form. label: Text of the label. control: The control. field: Widget with the
-    control and its buttons, if it has any.
+    Args:
+        form: The form.
+        label: Text of the label.
+        control: The control.
+        field: Widget with the control and its buttons, if it has any.
     """
     text = QLabel(label)
     text.setBuddy(control)

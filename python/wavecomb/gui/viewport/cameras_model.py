@@ -20,7 +20,8 @@ _ROOT = QModelIndex()
 class CamerasModel(QAbstractListModel):
     """List of camera names, with paths as ``Qt.ItemDataRole.UserRole`` (None for the free camera).
 
-    Signals: moved(): ``row``, the current camera, changed.
+    Signals:
+        moved(): ``row``, the current camera, changed.
     """
 
     moved = Signal()

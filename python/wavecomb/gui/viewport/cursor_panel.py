@@ -12,7 +12,8 @@ from wavecomb.gui.viewport.session import Session
 class CursorPanel(QWidget):
     """Panel that is refilled with a short delay when the pixel or the image changes.
 
-    Attributes: follow: Check box for following the cursor.
+    Attributes:
+        follow: Check box for following the cursor.
     """
 
     def __init__(

@@ -40,8 +40,9 @@ class DirectionsView(QWidget):
     ) -> None:
         """Draws values from 0 to their maximum in false colours, with a ring.
 
-        Args: values: Array (height, 2 height); None clears the view. mark: Position of the ring,
-        from 0 to 1 in each direction, or None.
+        Args:
+            values: Array (height, 2 height); None clears the view.
+            mark: Position of the ring, from 0 to 1 in each direction, or None.
         """
         self._image, self._mark = None, mark
         if values is not None:

@@ -26,9 +26,12 @@ _NAN = (255, 0, 255)
 class Look:
     """Settings for displaying a layer.
 
-    Attributes: layer: Name of the layer. exposure: Exposure of colours, in stops. view: "Linear",
-    "Neutral" or an OCIO view. low: Lower end of the false colours; None takes it from the image.
-    high: Upper end of the false colours; None takes it from the image.
+    Attributes:
+        layer: Name of the layer.
+        exposure: Exposure of colours, in stops.
+        view: "Linear", "Neutral" or an OCIO view.
+        low: Lower end of the false colours; None takes it from the image.
+        high: Upper end of the false colours; None takes it from the image.
     """
 
     layer: str = "beauty"
@@ -48,7 +51,8 @@ def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
 
     "Linear" and "Neutral" are ``wavecomb.picture.image.display`` with "clamp" and "neutral".
 
-    Raises: WavecombError: There is no such view.
+    Raises:
+        WavecombError: There is no such view.
     """
     if view in (LINEAR, NEUTRAL):
         transfer: image.Transfer = "clamp" if view == LINEAR else "neutral"
@@ -64,8 +68,9 @@ def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
 def show(layer: NDArray[Any], look: Look) -> Shown:
     """Converts a layer to screen pixels.
 
-    Args: layer: (height, width) or (height, width, channels). look: Display settings;
-    ``look.layer`` is the name of the layer.
+    Args:
+        layer: (height, width) or (height, width, channels).
+        look: Display settings; ``look.layer`` is the name of the layer.
     """
     light = functools.partial(develop, exposure=look.exposure, view=look.view)
     return show_layer(layer, look.layer, light, low=look.low, high=look.high)

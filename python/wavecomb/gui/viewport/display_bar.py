@@ -57,8 +57,10 @@ def _title(layer: str) -> str:
 class DisplayBar(QToolBar):
     """Tool bar of display settings. Choosing a layer that is not rendered restarts the render.
 
-    Attributes: layer: Control of the layer. exposure: Control of the exposure in stops. view:
-    Control of the tone mapping.
+    Attributes:
+        layer: Control of the layer.
+        exposure: Control of the exposure in stops.
+        view: Control of the tone mapping.
     """
 
     def __init__(self, session: Session, viewport: Viewport, parent: QWidget | None = None) -> None:

@@ -59,9 +59,13 @@ class Edit:
 class Task:
     """Description of the next render.
 
-    Attributes: setup: Checked settings. version: Version number of its frames. edit: Changes to
-    apply first. moving: Whether only a reduced image is wanted. loaded: The loaded stage, for
-    statistics. renderer: Renderer to use from now on; None keeps the current one.
+    Attributes:
+        setup: Checked settings.
+        version: Version number of its frames.
+        edit: Changes to apply first.
+        moving: Whether only a reduced image is wanted.
+        loaded: The loaded stage, for statistics.
+        renderer: Renderer to use from now on; None keeps the current one.
     """
 
     setup: Setup
@@ -289,8 +293,11 @@ def _apply(renderer: Renderer, edit: Edit) -> None:
 def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> int:
     """Returns the smallest reduction that renders one sample per pixel within a time limit.
 
-    Args: pixels: Pixels of the full image. rate: Samples per second; 0 if unknown. overhead:
-    Constant time of a render, in seconds. limit: Time limit in seconds.
+    Args:
+        pixels: Pixels of the full image.
+        rate: Samples per second; 0 if unknown.
+        overhead: Constant time of a render, in seconds.
+        limit: Time limit in seconds.
 
     >>> reduced_scale(1_000_000, 2_000_000.0, 0.01, 0.06)
     4

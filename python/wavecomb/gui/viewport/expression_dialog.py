@@ -38,8 +38,11 @@ def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
 def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str:
     """Returns why an expression cannot be a layer, or "" if it can.
 
-    Args: setup: Setup of the render. name: Name of the layer, without ``lpe_``. text: The
-    expression. groups: Light groups of the stage.
+    Args:
+        setup: Setup of the render.
+        name: Name of the layer, without ``lpe_``.
+        text: The expression.
+        groups: Light groups of the stage.
     """
     if not text.strip():
         return "Write an expression, such as C<RD>L, or choose a named one."
@@ -57,9 +60,12 @@ def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str
 class ExpressionDialog(QDialog):
     """Dialog that asks for a name and an expression.
 
-    Attributes: known: Box of named expressions. name: Field for the name of the layer. text: Field
-    for the expression. note: Label with the problem of the expression. show_layer: Button that adds
-    and shows the layer.
+    Attributes:
+        known: Box of named expressions.
+        name: Field for the name of the layer.
+        text: Field for the expression.
+        note: Label with the problem of the expression.
+        show_layer: Button that adds and shows the layer.
     """
 
     def __init__(
@@ -67,8 +73,10 @@ class ExpressionDialog(QDialog):
     ) -> None:
         """Creates the dialog without changing the render.
 
-        Args: session: Session whose render gets the layer. shown: Called with the name of the layer
-        after the render was restarted with it. parent: Parent of the dialog.
+        Args:
+            session: Session whose render gets the layer.
+            shown: Called with the name of the layer after the render was restarted with it.
+            parent: Parent of the dialog.
         """
         super().__init__(parent)
         self.setObjectName("expression")

@@ -25,14 +25,18 @@ _FIELDS = ("albedo", "normal", "depth", "samples", "error", "variance")
 class Frame:
     """An image of a live render. Its arrays must not be modified.
 
-    Attributes: beauty: (height, width, 3), linear Rec.709. Pixels without samples hold values of
-    the reduced image of the same version. layers: Layers of ``setup.aovs`` by name: (height, width)
-    or (height, width, channels). denoised: (height, width, 3), perhaps of an earlier frame of this
-    version; None if missing. status: samples_done, samples_total, passes, seconds, error and so on,
-    as in ``Snapshot.status``. version: Version of scene and setup. A session never shows an older
-    version again. scale: Divisor of width and height; 1 is full size. final: Whether the render has
-    ended. setup: Settings of the render. picture: Result as of `wavecomb.render`, for final frames
-    at full size, else None.
+    Attributes:
+        beauty: (height, width, 3), linear Rec.709. Pixels without samples hold values of the
+            reduced image of the same version.
+        layers: Layers of ``setup.aovs`` by name: (height, width) or (height, width, channels).
+        denoised: (height, width, 3), perhaps of an earlier frame of this version; None if missing.
+        status: samples_done, samples_total, passes, seconds, error and so on, as in
+            ``Snapshot.status``.
+        version: Version of scene and setup. A session never shows an older version again.
+        scale: Divisor of width and height; 1 is full size.
+        final: Whether the render has ended.
+        setup: Settings of the render.
+        picture: Result as of `wavecomb.render`, for final frames at full size, else None.
     """
 
     beauty: NDArray[np.float32]

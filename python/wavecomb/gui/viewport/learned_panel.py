@@ -26,7 +26,9 @@ MOST_LIGHTS = 12
 def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
     """Describes the guiding field at a surface point, or says why there is none.
 
-    Args: setup: Setup of the render. learned: Result of ``Renderer.learned``.
+    Args:
+        setup: Setup of the render.
+        learned: Result of ``Renderer.learned``.
     """
     if learned is None:
         return "Point at a surface in the viewport."
@@ -60,7 +62,8 @@ def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list
 class LearnedPanel(CursorPanel):
     """Panel that follows the cursor over the viewport, or keeps the clicked pixel.
 
-    Attributes: learned: The shown result of ``Renderer.learned``, or None.
+    Attributes:
+        learned: The shown result of ``Renderer.learned``, or None.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:

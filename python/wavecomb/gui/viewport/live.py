@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 class News:
     """An ``engine.Listener`` that keeps the newest item of each kind until it is taken.
 
-    Args: told: Port that gets None when the first new item arrives.
+    Args:
+        told: Port that gets None when the first new item arrives.
     """
 
     def __init__(self, told: Port) -> None:
@@ -88,15 +89,21 @@ IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "sto
 class Live(QObject):
     """A live render with separate settings. All methods are for the UI thread; none blocks.
 
-    Attributes: setup: Settings. last_frame: The last emitted frame, or None. version: Version of
-    scene and settings. oldest: Oldest version whose frames may still be shown. state: The last
-    emitted state. renderer: The core's renderer, or None.
+    Attributes:
+        setup: Settings.
+        last_frame: The last emitted frame, or None.
+        version: Version of scene and settings.
+        oldest: Oldest version whose frames may still be shown.
+        state: The last emitted state.
+        renderer: The core's renderer, or None.
 
-    Signals: frame(Frame): A new frame of the newest version. statistics(dict): Statistics
-    (docs/statistics.md), about twice per second during a render. setup_changed(Setup): Settings
-    changed. edited(int): Scene or settings changed; carries the new version. state_changed(str):
-    "idle", "rendering", "paused", "stopped" or "finished". failed(str), warned(str): Message in one
-    line.
+    Signals:
+        frame(Frame): A new frame of the newest version.
+        statistics(dict): Statistics (docs/statistics.md), about twice per second during a render.
+        setup_changed(Setup): Settings changed.
+        edited(int): Scene or settings changed; carries the new version.
+        state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
+        failed(str), warned(str): Message in one line.
     """
 
     frame = Signal(object)
@@ -144,7 +151,8 @@ class Live(QObject):
     def change(self, **values: Any) -> bool:
         """Changes fields of the setup and restarts. Emits ``failed`` if a value is invalid.
 
-        Returns: Whether the setup was changed.
+        Returns:
+            Whether the setup was changed.
         """
         try:
             new = self.setup.changed(**values)
@@ -168,8 +176,10 @@ class Live(QObject):
     def edit(self, edit: Edit, *, moving: bool = False) -> None:
         """Changes the scene and restarts.
 
-        Args: edit: The changes. moving: Whether similar edits follow. Images are reduced until
-        ``settle``, or until no edit came for some time.
+        Args:
+            edit: The changes.
+            moving: Whether similar edits follow. Images are reduced until ``settle``, or until no
+                edit came for some time.
         """
         self._pending.add(edit)
         now = time.perf_counter()

@@ -25,10 +25,12 @@ UPS = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 class Pose:
     """A camera, with the parameters of ``Renderer.edit(camera=...)``.
 
-    Attributes: to_world: (4, 4) for row vectors; the camera looks along -z. window: x0, x1, y0, y1
-    on the plane z = -1, for an orthographic camera across its axis, for a latlong camera in
-    radians. others: Other values of ``camera_parameters()`` that differ from their defaults. path:
-    Path of the camera prim with this pose; None for a free camera.
+    Attributes:
+        to_world: (4, 4) for row vectors; the camera looks along -z.
+        window: x0, x1, y0, y1 on the plane z = -1, for an orthographic camera across its axis, for
+            a latlong camera in radians.
+        others: Other values of ``camera_parameters()`` that differ from their defaults.
+        path: Path of the camera prim with this pose; None for a free camera.
     """
 
     to_world: Matrix
@@ -110,9 +112,12 @@ VIEWS = ("front", "back", "right", "left", "top", "bottom")
 def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> Pose:
     """Rotates the camera about a point like a turntable, with a level horizon.
 
-    Args: pose: Initial pose. pivot: Point that keeps its position in the image. yaw: Radians about
-    the stage's up axis; positive moves the camera to its right. pitch: Radians about the camera's
-    right; positive raises the camera. up_axis: "X", "Y" or "Z".
+    Args:
+        pose: Initial pose.
+        pivot: Point that keeps its position in the image.
+        yaw: Radians about the stage's up axis; positive moves the camera to its right.
+        pitch: Radians about the camera's right; positive raises the camera.
+        up_axis: "X", "Y" or "Z".
     """
     up = np.array(UPS[up_axis])
     elevation = math.asin(float(np.clip(pose.back @ up, -1.0, 1.0)))
@@ -126,9 +131,12 @@ def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> 
 def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[float, float]) -> Pose:
     """Moves the camera so that points at ``depth`` follow the cursor.
 
-    Args: pose: Initial pose. depth: Distance along the axis, positive. across: Movement of the
-    cursor to the right, in pixels. upwards: Movement of the cursor upwards, in pixels. size: Size
-    of the image, in the same pixels.
+    Args:
+        pose: Initial pose.
+        depth: Distance along the axis, positive.
+        across: Movement of the cursor to the right, in pixels.
+        upwards: Movement of the cursor upwards, in pixels.
+        size: Size of the image, in the same pixels.
     """
     x0, x1, y0, y1 = pose.fitted(*map(round, size))
     if pose.projection == "orthographic":
@@ -151,8 +159,10 @@ def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
 def frame(pose: Pose, points: Matrix, aspect: float) -> Pose:
     """Moves the camera so that points fill the image except for a margin, keeping its direction.
 
-    Args: pose: Initial pose. points: (n, 3), such as the corners of a box. aspect: Width / height
-    of the image.
+    Args:
+        pose: Initial pose.
+        points: (n, 3), such as the corners of a box.
+        aspect: Width / height of the image.
     """
     return _framed(pose, pose.to_world[:3, :3], points, aspect)
 

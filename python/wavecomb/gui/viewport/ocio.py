@@ -70,7 +70,8 @@ def problem() -> str | None:
 def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
     """Converts linear Rec.709, finite, (h, w, 3) to 8-bit values of the display.
 
-    Raises: WavecombError: There is no such view.
+    Raises:
+        WavecombError: There is no such view.
     """
     import OpenImageIO as oiio
 

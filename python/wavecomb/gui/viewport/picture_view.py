@@ -73,7 +73,8 @@ GRID_ZOOM = 10.0
 class PictureView(QWidget):
     """View of an image with a given size in pixels. A smaller image is stretched to that size.
 
-    Signals: zoom_changed(float): Zoom in device pixels per image pixel.
+    Signals:
+        zoom_changed(float): Zoom in device pixels per image pixel.
     """
 
     zoom_changed = Signal(float)
@@ -91,8 +92,10 @@ class PictureView(QWidget):
     def set_picture(self, image: QImage | None, size: QSize, legend: Legend | None = None) -> None:
         """Sets the image.
 
-        Args: image: The image; None shows nothing. size: Size in pixels; the image may be smaller.
-        legend: Legend of false colours, or None.
+        Args:
+            image: The image; None shows nothing.
+            size: Size in pixels; the image may be smaller.
+            legend: Legend of false colours, or None.
         """
         self._image, self._legend = image, legend
         if size != self._size:
@@ -123,8 +126,9 @@ class PictureView(QWidget):
     def set_zoom(self, zoom: float | None, about: QPointF | None = None) -> None:
         """Sets the zoom in device pixels per image pixel; None fits the image to the widget.
 
-        Args: zoom: The zoom, which is clamped to limits. about: Point of the widget that stays
-        fixed; None means its centre.
+        Args:
+            zoom: The zoom, which is clamped to limits.
+            about: Point of the widget that stays fixed; None means its centre.
         """
         place = about if about is not None else QPointF(self.rect().center())
         before = self.to_picture(place)

@@ -56,12 +56,18 @@ def save_frame(
 ) -> None:
     """Writes a frame, all layers (.exr) or the displayed image (.png), never partially.
 
-    Args: frame: Frame at full size. path: File name that ends in .exr or .png. scene: Scene, for
-    the camera's matrices. loaded: Loaded stage, for the header. look: Display settings of the .png.
-    options: Arguments of ``Picture.save``.
+    Args:
+        frame: Frame at full size.
+        path: File name that ends in .exr or .png.
+        scene: Scene, for the camera's matrices.
+        loaded: Loaded stage, for the header.
+        look: Display settings of the .png.
+        options: Arguments of ``Picture.save``.
 
-    Raises: OSError, ValueError: The file cannot be written, or an option is invalid. The message is
-    one line. WavecombError: There is only a preview so far.
+    Raises:
+        OSError, ValueError: The file cannot be written, or an option is invalid. The message is one
+            line.
+        WavecombError: There is only a preview so far.
     """
     if frame.scale != 1:
         raise WavecombError("there is only a preview so far: save again a little later")

@@ -25,8 +25,11 @@ def camera_pose(
 ) -> Pose | None:
     """Returns the pose of a camera prim, or None if the prim is not a supported camera.
 
-    Args: usd: The stage. path: Path of the prim. time: Time code; None means the start of the
-    stage. origin: World position of the scene's origin.
+    Args:
+        usd: The stage.
+        path: Path of the prim.
+        time: Time code; None means the start of the stage.
+        origin: World position of the scene's origin.
     """
     from pxr import Sdf, UsdGeom
 
@@ -52,8 +55,10 @@ def edits_again(
 ) -> Edit:
     """Converts earlier edits to the indices of a scene that was loaded again.
 
-    Args: scene: The new scene. materials: Edited values by name of the material. lights: Edited
-    values by ``light_key``.
+    Args:
+        scene: The new scene.
+        materials: Edited values by name of the material.
+        lights: Edited values by ``light_key``.
     """
     numbers = {name: i for i, (name, _) in enumerate(scene.materials)}
     edit = Edit()
@@ -70,8 +75,11 @@ def edits_again(
 def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.float64] | None:
     """Returns the world bounds of a prim's geometry and lights, (2, 3), or None if it has none.
 
-    Args: usd: The stage. loaded: The loaded stage. path: Path in the form of ``Renderer.pick``:
-    "/World/Forest[12]/Leaves" is in the prim "/World/Forest".
+    Args:
+        usd: The stage.
+        loaded: The loaded stage.
+        path: Path in the form of ``Renderer.pick``: "/World/Forest[12]/Leaves" is in the prim
+            "/World/Forest".
     """
     from pxr import Gf, Sdf, UsdGeom
 

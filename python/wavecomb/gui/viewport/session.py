@@ -48,18 +48,26 @@ __all__ = ["Frame", "Live", "Pose", "Session", "Setup"]
 class Session(Live):
     """A stage, its live render, and further live renders of it with other settings (twins).
 
-    Signals: opened(LoadedStage): A stage was loaded, or loaded again after a change of its
-    contents. closing(): The USD stage is about to be reloaded from disk; receivers must release its
-    prims. busy(str): Description of background work, or "". camera_changed(Pose): The camera moved,
-    or another was chosen. selected(str | None): Path of the prim that was selected, in the image or
-    elsewhere. saved(str): A file was written. noted(LoadedStage): Its report has new findings.
+    Signals:
+        opened(LoadedStage): A stage was loaded, or loaded again after a change of its contents.
+        closing(): The USD stage is about to be reloaded from disk; receivers must release its
+            prims.
+        busy(str): Description of background work, or "".
+        camera_changed(Pose): The camera moved, or another was chosen.
+        selected(str | None): Path of the prim that was selected, in the image or elsewhere.
+        saved(str): A file was written.
+        noted(LoadedStage): Its report has new findings.
 
-    Attributes: stage: The loaded stage, or None. usd: The USD stage, or None. Edits change its
-    session layer and then call ``rebuild``. up_axis: "X", "Y" or "Z". pose: The camera, or None.
-    selection: Path of the selected prim, or None. material_edits: Values changed by
-    ``edit_material``, by the material's name. light_edits: Values changed by ``edit_light``, by the
-    light's name and its number among lights with that name. twins: Live renders of the same scene
-    and camera with separate settings.
+    Attributes:
+        stage: The loaded stage, or None.
+        usd: The USD stage, or None. Edits change its session layer and then call ``rebuild``.
+        up_axis: "X", "Y" or "Z".
+        pose: The camera, or None.
+        selection: Path of the selected prim, or None.
+        material_edits: Values changed by ``edit_material``, by the material's name.
+        light_edits: Values changed by ``edit_light``, by the light's name and its number among
+            lights with that name.
+        twins: Live renders of the same scene and camera with separate settings.
     """
 
     opened = Signal(object)
@@ -145,7 +153,8 @@ class Session(Live):
     def rebuild(self, reason: str) -> None:
         """Loads the stage again after edits of the session layer of ``usd``, keeping the camera.
 
-        Args: reason: Description of the change for people, such as "variant of /World/Car".
+        Args:
+            reason: Description of the change for people, such as "variant of /World/Car".
         """
         if self._request is None or self.usd is None:
             return
@@ -212,8 +221,9 @@ class Session(Live):
     def set_camera(self, pose: Pose, *, moving: bool = False) -> None:
         """Moves the camera.
 
-        Args: pose: New pose. Its ``path`` is None unless it is the authored pose of a camera prim.
-        moving: Whether more movements follow immediately. Images are reduced until ``settle``.
+        Args:
+            pose: New pose. Its ``path`` is None unless it is the authored pose of a camera prim.
+            moving: Whether more movements follow immediately. Images are reduced until ``settle``.
         """
         self.pose = pose
         self._edit_all(Edit(camera=pose.options()), moving=moving)
@@ -318,8 +328,10 @@ class Session(Live):
     def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
         """Writes all layers (.exr) or the displayed image (.png); ``saved`` or ``failed`` follows.
 
-        Args: path: File name that ends in .exr or .png. look: Display settings; None means the
-        beauty with default settings. **options: Arguments of ``Picture.save``.
+        Args:
+            path: File name that ends in .exr or .png.
+            look: Display settings; None means the beauty with default settings.
+            **options: Arguments of ``Picture.save``.
         """
         frame = self.last_frame
         if frame is None or self.scene is None:

@@ -64,8 +64,9 @@ class MoveCommand(QUndoCommand):
 class ViewHistory(QObject):
     """History of the poses of a session's camera.
 
-    Attributes: stack: Undo stack of movements. now: Clock in seconds, which distinguishes drags
-    from single movements.
+    Attributes:
+        stack: Undo stack of movements.
+        now: Clock in seconds, which distinguishes drags from single movements.
     """
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:

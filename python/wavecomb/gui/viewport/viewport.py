@@ -46,12 +46,16 @@ EMPTY = (
 class Viewport(PictureView):
     """View of a session's frames that moves its camera.
 
-    Attributes: look: Display settings. frame_shown: The frame on the screen, or None.
+    Attributes:
+        look: Display settings.
+        frame_shown: The frame on the screen, or None.
 
-    Signals: hovered(object): (x, y) of the pixel under the cursor, or None. picked(object): (x, y)
-    of a pixel that was clicked. shown(Frame, Look): The frame and settings that are now on the
-    screen. failed(str): Error in one line. region_mode_changed(bool): Whether the next drag chooses
-    a region.
+    Signals:
+        hovered(object): (x, y) of the pixel under the cursor, or None.
+        picked(object): (x, y) of a pixel that was clicked.
+        shown(Frame, Look): The frame and settings that are now on the screen.
+        failed(str): Error in one line.
+        region_mode_changed(bool): Whether the next drag chooses a region.
     """
 
     hovered = Signal(object)
