@@ -70,7 +70,7 @@ def list_command() -> None:
     ),
     option("--threads N", "count", "Render threads.  [default: of the suite]"),
     option("--seed N", click.IntRange(min=0), "Seed of the random order of runs."),
-    option("--time-limit MINUTES", "positive", "Start no further run after this time."),
+    option("--time-limit MINUTES", "positive", "Start no run that would end after this time."),
     option("--stages FOLDER", "path", "Folder with more stages."),
     option(
         "--progress", click.Choice(["text", "json"]),

@@ -23,7 +23,7 @@ JOB = click.argument("job", type=click.Path(), metavar="JOB")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 MAP = click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="On this machine, folder FROM of the job, its stage or its images is at TO.",
+    help="Use folder TO on this machine for FROM in the job, its stage or its images.",
 )  # fmt: skip
 
 

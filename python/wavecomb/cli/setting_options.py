@@ -67,8 +67,8 @@ def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
 
 def _option(row: Setting) -> click.Option:
     """Returns the option of a setting."""
-    # The core checks ranges. Here ``least`` only makes negative numbers an error of the command
-    # line.
+    # The core checks ranges. The command line only rejects negative numbers, and 0 if it is
+    # invalid.
     return row_option(
         [row.option, row.name],
         _Steps(row, _offered(row)) if row.steps else row.kind,
