@@ -92,7 +92,7 @@ class Results:
                     record = json.loads(line)
                     record["row"]["run_id"]
                 except (ValueError, KeyError, TypeError) as error:
-                    raise WavecombError(f"{path}: line {number} is no run") from error
+                    raise WavecombError(f"{path}: line {number} is not a run") from error
                 yield record
 
 
@@ -118,7 +118,7 @@ def load(folder: Path) -> Results:
             frame[column.name] = pandas.to_numeric(frame[column.name])
     ended = frame["status"] == "ok"
     if not ended.any():
-        raise WavecombError(f"{path}: no run came to an end")
+        raise WavecombError(f"{path}: no run succeeded")
     return Results(
         folder=folder,
         runs=frame[ended].reset_index(drop=True),
@@ -265,7 +265,7 @@ def _json(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(text) if text else {}
     except ValueError as error:
-        raise WavecombError(f"{path}: is no JSON: {error}") from error
+        raise WavecombError(f"{path}: is not JSON: {error}") from error
     return document if isinstance(document, dict) else {}
 
 

@@ -217,7 +217,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | N
         f"an order that means nothing. Geometric mean over stages and settings. {INTERVALS}, "
         f"n = {count_words(table['n'])} rounds. Hollow: the bounds."
     )
-    return forest(name, "What an order is worth beyond grouping", caption, "to placebo", panels)
+    return forest(name, "Gain of an order beyond grouping", caption, "to placebo", panels)
 
 
 def regret_figure(table: pd.DataFrame, name: str) -> Drawn | None:
@@ -228,10 +228,10 @@ def regret_figure(table: pd.DataFrame, name: str) -> Drawn | None:
         table, "cell", "policy", "regret", colour=lambda row: policy_colour(row.policy)
     )
     caption = (
-        "Render time above that of the best fixed policy of the cell. "
+        "Render time relative to the best fixed policy of the cell. "
         f"{INTERVALS}, n = {count_words(table['n'])} rounds."
     )
-    title = "Regret: what a choice costs"
+    title = "Regret: cost of a choice"
     return forest(name, title, caption, "regret", panels, centre=0.0, log=False, percent=True)
 
 
@@ -306,12 +306,14 @@ def cost_figure(
             f"r² = {fixed(line['r2'], 2)}, slope {line['slope']:.2f} "
             f"[{line['slope_low']:.2f}, {line['slope_high']:.2f}]"
         )
-        ax.set_xlabel(f"predicted, ns a record: {'calibrated' if 'calib' in column else 'average'}")
+        ax.set_xlabel(
+            f"predicted, ns per record: {'calibrated' if 'calib' in column else 'average'}"
+        )
         ax.grid()
         ax.set_aspect("equal", adjustable="datalim")
         for axis in (ax.xaxis, ax.yaxis):
             plain_logarithm(axis, (1.0, 3.0))
-    axes[0].set_ylabel("measured, ns a record")
+    axes[0].set_ylabel("measured, ns per record")
     handles, texts = axes[0].get_legend_handles_labels()
     made.legend(handles, texts, loc="outside upper left", ncols=6, handletextpad=0.1)
     caption = (
@@ -349,7 +351,7 @@ def difference_figure(
     bar.set_label("(picture − golden) / (golden + 0.01), luminance; orange is brighter")
     bar.outline.set_visible(False)
     caption = (
-        f"Scale to ±{limit:.2g}, the 99th percentile of all maps shown. What is the same in all of "
-        "them is noise of the same random numbers."
+        f"Scale to ±{limit:.2g}, the 99th percentile of all maps shown. Equal patterns in all "
+        "maps are noise of the same random numbers."
     )
     return Drawn(name, title, caption, made)

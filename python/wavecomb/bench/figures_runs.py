@@ -57,7 +57,7 @@ STACK = (
 COHERENCE = (
     ("run_length_coherence", "run length, records", True),
     ("cache_line_homogeneity", "same material", False),
-    ("texture_homogeneity", "same texture place", False),
+    ("texture_homogeneity", "same texture position", False),
     ("lane_utilisation", "lanes full", False),
 )
 
@@ -153,8 +153,10 @@ def coherence(runs: pd.DataFrame, name: str) -> Drawn | None:
     axes[0].set_ylim(len(policies) - 0.4, -0.6)
     handles, texts = axes[0].get_legend_handles_labels()
     made.legend(handles, texts, loc="outside upper left", ncols=3, handletextpad=0.1)
-    caption = "Means over runs. Run length is logarithmic; the others are shares of neighbours."
-    return Drawn(name, "What an order does to coherence", caption, made)
+    caption = (
+        "Means over runs. Run length is logarithmic; all other values are fractions of neighbours."
+    )
+    return Drawn(name, "Effect of an order on coherence", caption, made)
 
 
 def curve(

@@ -210,8 +210,7 @@ def _warnings(a: Results, b: Results) -> list[str]:
     spins = [spin_reference(results.machine.get("spins_s", ())) for results in (a, b)]
     if min(spins) > 0.0 and max(spins) > MAX_SPIN * min(spins):
         lines.append(
-            f"the machine itself took {spins[1] / spins[0]:.2f} times as long for a fixed "
-            "piece of work"
+            f"a fixed piece of work took {spins[1] / spins[0]:.2f} times as long on the machine"
         )
     for name, results in (("BEFORE", a), ("AFTER", b)):
         noise = results.machine.get("noise")
@@ -220,5 +219,7 @@ def _warnings(a: Results, b: Results) -> list[str]:
         if len(results.failed):
             lines.append(f"{len(results.failed)} runs failed in {name}")
     if a.suite_text != b.suite_text:
-        lines.append("the suites differ: configurations of one name may have other settings")
+        lines.append(
+            "the suites differ: configurations with equal names may have different settings"
+        )
     return lines

@@ -272,7 +272,7 @@ def judge(rows: Iterable[Mapping[str, Any]]) -> Noise:
     lines = []
     if good and disturbed > MAX_NOISY_RUNS * len(good):
         lines.append(
-            f"{disturbed} of {len(good)} runs were disturbed: others took over "
+            f"{disturbed} of {len(good)} runs were disturbed: other processes took over "
             f"{MAX_OTHERS:.0%} of the cores, or the calibration spin was over "
             f"{MAX_SPIN - 1:.0%} slower than at its best"
         )

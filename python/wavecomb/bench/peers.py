@@ -34,7 +34,7 @@ def check(renderers: set[str]) -> None:
     if not WORKER.is_file():
         raise WavecombError(
             f"renderer {min(renderers)}: needs benchmarks/peers/worker.py of a checkout of "
-            "Wavecomb, which is not there; leave the peers out with --only"
+            "Wavecomb, which is missing; leave the peers out with --only"
         )
     if "cycles" in renderers and not CYCLES_PYTHON.exists():
         raise WavecombError("renderer cycles: is not installed; run benchmarks/peers/setup first")
@@ -62,7 +62,7 @@ def record(stage: Path) -> Path:
     _, err = process.communicate()
     if process.returncode != 0:
         said = err.strip().splitlines()[-1:] or ["no message"]
-        raise WavecombError(f"{stage}: cannot be given to the peers: {said[0]}")
+        raise WavecombError(f"{stage}: cannot be exported to the peers: {said[0]}")
     return folder
 
 

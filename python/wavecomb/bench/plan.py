@@ -123,7 +123,7 @@ def chosen(configs: Sequence[Config], pattern: str | None) -> list[Config]:
     kept = [config for config in configs if fnmatch.fnmatch(config.name, pattern)]
     if not kept:
         some = ", ".join(config.name for config in configs[:3])
-        raise WavecombError(f"--only {pattern}: matches none of the names; they are like {some}")
+        raise WavecombError(f"--only {pattern}: matches none of the names; an example is {some}")
     return kept
 
 
@@ -244,7 +244,7 @@ def _cache_mb(path: Path, text: str, limits: Limits) -> float:
         )
     size = limits.cache_bytes.get(match[2], 0)
     if size <= 0:
-        raise WavecombError(f"{path}: this machine does not say how large its {match[2]} is")
+        raise WavecombError(f"{path}: the size of {match[2]} is unknown on this machine")
     return round(float(match[1] or 1.0) * size / 1e6, 3)
 
 

@@ -173,11 +173,11 @@ def _lead(results: Results) -> list[str]:
 
 def _findings(out: Writer) -> Section:
     note = Text(
-        "Found by the rules of docs/bench-report.md, not chosen by hand. A difference is spoken of "
-        "where its p-value, corrected for all comparisons of its table, is below 5 %.",
+        "Found by the rules of docs/bench-report.md. A difference is reported if its p-value, "
+        "corrected for all comparisons of its table, is below 5 %.",
         "note",
     )
-    return Section("What the figures say", [Lines(out.findings), note])
+    return Section("Findings", [Lines(out.findings), note])
 
 
 def _pictures(out: Writer, results: Results) -> None:
@@ -200,7 +200,7 @@ def _pictures(out: Writer, results: Results) -> None:
 
 
 def _about(out: Writer, results: Results) -> None:
-    out.begin("How to repeat it")
+    out.begin("How to repeat the benchmark")
     commands = [
         sitting["command"]
         for sitting in results.machine.get("sittings", ())
@@ -245,16 +245,16 @@ def _settings(results: Results) -> Table:
 WORDS = {
     "record": "A hit that waits for shading.",
     "round": "One repetition of all configurations, in random order.",
-    "order": "Keys, sort and moving of records: what an order of shading costs.",
-    "placebo": "random-runs: the runs of a material in an order that means nothing.",
-    "oracle": "cost-benefit with true costs, recorded before: what a cost model could win.",
+    "order": "Keys, sort and moving of records: the cost of an order of shading.",
+    "placebo": "random-runs: the runs of a material in random order.",
+    "oracle": "cost-benefit with recorded true costs: a bound for the gain of a cost model.",
     "oracle-best, oracle-worst": (
-        "the order of the runs of materials that a trace with true costs says is quickest, slowest."
+        "the fastest and the slowest order of material runs, by recorded true costs."
     ),
     "run length": "Mean number of consecutive records of one material.",
     "relMSE": "Mean of (x − r)² / (r² + 0.01) to the golden picture r.",
     "efficiency": "1 / (relMSE × render time).",
-    "regret": "Time above that of the best fixed policy, as a share of it.",
+    "regret": "Time beyond the best fixed policy, as a fraction of its time.",
     "interval": "95 %; rounds are resampled whole. docs/bench-report.md has the formulas.",
 }
 
@@ -278,8 +278,8 @@ def warnings_of(results: Results) -> list[str]:
     _, different = equality(runs)
     if different:
         lines.append(
-            f"Pictures that must be equal differ, in {len(different)} groups: times of unequal "
-            f"work are compared. {different[0]}."
+            f"Pictures that must be equal differ, in {len(different)} groups: their times are for "
+            f"unequal work. {different[0]}."
         )
     noise = machine.get("noise")
     reasons = noise.get("lines", ()) if isinstance(noise, Mapping) else ()
@@ -297,7 +297,7 @@ def warnings_of(results: Results) -> list[str]:
         first = failed.iloc[0]
         lines.append(f"{len(failed)} runs failed; the first: {first['run_id']}: {first['error']}")
     if machine.get("dirty"):
-        lines.append("The source was changed after the commit that is named.")
+        lines.append("The source was changed after the commit shown here.")
     return lines
 
 

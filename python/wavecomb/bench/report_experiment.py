@@ -168,8 +168,9 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     columns = {"shade": "shade_s", "render": "render_s", "shade + order": "shade_and_order_s"}
     metrics = compared(runs, "policy", columns)
     note = (
-        "Brackets: 95 % intervals, rounds resampled whole. At none: seconds, threads together "
-        "but for render. The verdict is on shade + order, which holds what an order costs."
+        "Brackets: 95 % intervals, rounds resampled whole. At none: seconds, summed over "
+        "threads except for render. The verdict is on shade + order, which includes the cost of an "
+        "order."
     )
     title = "Times by policy, ratio of means to none"
     out.add(ratio_table(title, metrics, "policy", note))
@@ -197,7 +198,8 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
             worst = adaptive.loc[adaptive["regret"].idxmax()]
             out.findings.append(
                 f"{name}: adaptive takes {100 * adaptive['regret'].mean():+.1f} % on average "
-                f"beside the best fixed policy of each cell, at worst {100 * worst.regret:+.1f} % "
+                f"relative to the best fixed policy of each cell, at worst "
+                f"{100 * worst.regret:+.1f} % "
                 f"{interval(100 * worst.low, 100 * worst.high, 1)} ({worst.cell})."
             )
 
@@ -227,7 +229,7 @@ def _bound_words(part: pd.DataFrame) -> str:
     """States the gain of the oracles, or returns "" without placebo and oracle."""
     known = part.dropna(subset=["placebo_ratio"]).set_index("policy")
     words = {
-        BEST: "The best order of runs that a trace with true costs gives",
+        BEST: "The best order of runs by recorded true costs",
         COSTS: "Cost-benefit with true costs",
         WORST: "The worst order of runs",
     }
@@ -265,7 +267,7 @@ def suite(out: Writer, results: Results) -> None:
         out.draw(figures_forest.cost_figure(costs, lines, "costs"))
         first = lines["calibrated_ns"] or lines["predicted_ns"]
         out.findings.append(
-            f"Calibration predicts what materials cost with r² = {fixed(first['r2'], 2)} and "
+            f"Calibration predicts the cost of materials with r² = {fixed(first['r2'], 2)} and "
             f"slope {first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
         )
 
@@ -283,8 +285,8 @@ def _roulette(out: Writer, runs: pd.DataFrame) -> None:
     out.begin("Roulette apart from order")
     out.add(
         Text(
-            "Roulette changes how much is shaded, and with it the noise; order does not. So it is "
-            "judged by efficiency, with the policy the same on both sides."
+            "Roulette changes the amount of shading, and thus the noise; order does not. So it is "
+            "judged by efficiency, with the same policy on both sides."
         ),
         ratio_table(
             "Roulette at the same policy, ratio of means to throughput", metrics, "roulette"

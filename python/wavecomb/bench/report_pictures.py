@@ -140,7 +140,7 @@ def _read(path: Path) -> NDArray[Any]:
     try:
         pixels = np.load(path, allow_pickle=False) if path.suffix == ".npy" else read_image(path)
     except (OSError, ValueError) as error:
-        raise WavecombError(f"{path}: cannot be read as a picture: {error}") from error
+        raise WavecombError(f"{path}: cannot be read as an image: {error}") from error
     if pixels.ndim != 3 or pixels.shape[2] < 3:
-        raise WavecombError(f"{path}: is no colour picture: its shape is {pixels.shape}")
+        raise WavecombError(f"{path}: is not a colour image: its shape is {pixels.shape}")
     return np.asarray(pixels[:, :, :3], np.float32)

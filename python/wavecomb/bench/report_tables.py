@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _MARKS = {"faster": "better", "slower": "worse"}
 HOLM = (
     "Verdicts at 5 %, by paired t-tests of log ratios, corrected after Holm over the table. Same "
-    "(1 %): the interval lies within 1 % of 1. Not shown: neither can be said."
+    "(1 %): the interval lies within 1 % of 1. Not shown: neither is certain."
 )
 
 
@@ -100,8 +100,8 @@ def regret_table(found: pd.DataFrame, caption: str) -> Table:
             ]
         )
     note = (
-        "Render time above that of the best fixed policy of each cell. The best of noisy means "
-        "looks a little better than it is, so regret is rather over- than understated."
+        "Render time relative to the best fixed policy of each cell. The smallest of noisy means "
+        "is biased low, so regret is overstated rather than understated."
     )
     return table(caption, ["policy", "mean regret", "worst", "where", "cells", "n"], rows, note)
 

@@ -36,7 +36,7 @@ class ResultFolder:
         """Creates the folder, which must not hold results yet."""
         if self.runs_csv.exists() or self.runs_jsonl.exists():
             raise WavecombError(
-                f"{self.path}: holds results already; add --resume to go on with them, "
+                f"{self.path}: holds results already; add --resume to continue, "
                 "or choose another folder"
             )
         try:
@@ -50,12 +50,12 @@ class ResultFolder:
     def resume(self, suite: Suite) -> None:
         """Opens the folder of the same suite and repairs incomplete files."""
         if not self.suite_toml.is_file():
-            raise WavecombError(f"{self.path}: nothing to resume here; leave --resume away")
+            raise WavecombError(f"{self.path}: nothing to resume here; leave --resume out")
         if self.suite_toml.read_text(encoding="utf-8") != suite.text:
             raise WavecombError(
                 f"{self.path}: was made with another suite than {suite.path}; "
-                "choose another folder, or give this folder's suite.toml, which names the "
-                "folder of --stages, too"
+                "choose another folder, or give this folder's suite.toml, which also names "
+                "the folder of --stages"
             )
         for name in FOLDERS:
             (self.path / name).mkdir(parents=True, exist_ok=True)
@@ -79,7 +79,7 @@ class ResultFolder:
         try:
             document: dict[str, Any] = json.loads(self.machine_json.read_text(encoding="utf-8"))
         except ValueError as error:
-            raise WavecombError(f"{self.machine_json}: is no JSON: {error}") from error
+            raise WavecombError(f"{self.machine_json}: is not JSON: {error}") from error
         return document
 
     def write_machine(self, document: dict[str, Any]) -> None:
@@ -107,7 +107,7 @@ def read_objects(path: Path) -> list[dict[str, Any]]:
             entry["row"]["run_id"]
         except (ValueError, KeyError, TypeError) as error:
             raise WavecombError(
-                f"{path}: line {number} is no run; remove that line, and --resume"
+                f"{path}: line {number} is not a run; remove that line, and --resume"
             ) from error
         objects.append(entry)
     return objects

@@ -131,7 +131,7 @@ class Sitting:
             rest = estimator.seconds(run.config)
             limit = self.options.time_limit_s
             if limit is not None and time.monotonic() - begun + rest > limit:
-                self.say(f"time limit: {len(left) - index} runs are left; --resume goes on")
+                self.say(f"time limit: {len(left) - index} runs are left; --resume continues")
                 whole = False
                 break
             self.event("begin", number=index + 1, run=run.run_id, seconds=rest)
@@ -219,7 +219,7 @@ class Sitting:
             stage = self.jobs.stage(config)
             outcome = peers.run_peer(config, stage, golden.spp, golden.seed, path, threads)
         if outcome.answer["status"] != "ok":
-            raise WavecombError(f"golden picture of {config.stage}: {outcome.answer['error']}")
+            raise WavecombError(f"golden image of {config.stage}: {outcome.answer['error']}")
 
     # ---- runs ----------------------------------------------------------------------------------
 

@@ -125,7 +125,9 @@ def with_folder(suite: Suite, folder: Path) -> Suite:
     twice = set(more) & set(suite.stages)
     if twice or len(more) < len(files):
         name = min(twice) if twice else "two of its files"
-        raise WavecombError(f"stages of {folder}: {name} has the name of another stage; rename it")
+        raise WavecombError(
+            f"stages of {folder}: {name} has the same name as another stage; rename it"
+        )
     experiments = tuple(
         experiment
         if experiment.stage_vary
