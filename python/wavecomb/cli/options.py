@@ -171,7 +171,7 @@ class StageOptions:
         return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
-        """Fills options that were not given from those of an earlier render."""
+        """Takes options that were not given from an earlier render."""
         values: dict[str, Any] = {}
         for row in rows().values():
             key, mine, other = row.key, self.values[row.key], before.get(row.key)

@@ -122,7 +122,7 @@ def retry_unrunnable(dask_scheduler: Any) -> None:
 def render_tiles(
     folder: str, maps: list[Pair], job: str, machine: str, tiles: list[tuple[int, int, int]]
 ) -> dict[str, Any]:
-    """Renders the unfinished tiles among those of a job.
+    """Renders the given tiles of a job, except finished ones.
 
     Args:
         folder: Folder of the job, on the client's machine.
