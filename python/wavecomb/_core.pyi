@@ -873,9 +873,9 @@ class Renderer:
         ``pick`` finds there; None where there is none, or before anything was learned.
 
         axis: which way the surface faces, "+x" ... "-z". density: directions that guided bounces
-        take, per steradian, (16, 16) float32, rows of Clarberg's square (learn/directions.h); None
-        where the field has no region there; else also guided_share (of bounces) and survival (of
-        the learned roulette at throughput 1, 0 where it is not known). light_shares: names of
+        take, per steradian, (16, 16) float32, rows of Clarberg's square (guiding/directions.h);
+        None where the field has no region there; else also guided_share (of bounces) and survival
+        (of the learned roulette at throughput 1, 0 where it is not known). light_shares: names of
         lights and emissive meshes with the probability of their choice there, largest first,
         counted in 4,096 choices.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a camera can be told: the rows of the core's table of cameras (scene/camera_table.h).
+"""What a camera can be told: the rows of the core's table of cameras (scene/camera/camera_table.h).
 
 Keywords of ``SceneBuilder.set_camera`` and their stub, the call that a sandbox may make, what a
 sequence takes over from frame to frame and poses of the window follow from them.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a light can be told: the rows of the core's table of lights (scene/light_table.h).
+"""Parameters of lights: the rows of the core's table (light/description/light_table.h).
 
 Keywords of ``SceneBuilder.add_light`` and their stub, the calls that a sandbox may make, what the
 loader reads of a prim and the window's fields follow from them.

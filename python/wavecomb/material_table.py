@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a material can be told: the rows of the core's table (scene/material_table.h).
+"""Parameters of materials: the core's table (material/description/material_table.h).
 
 Keywords of ``SceneBuilder.add_material`` and their stub, the calls that a sandbox may make, and
 what the loader reads of attributes of materials follow from them. Beside them, what programs read.

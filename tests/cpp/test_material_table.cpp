@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "wavecomb/scene/material_table.h"
+#include "wavecomb/material/description/material_table.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/material_parts.h"
+#include "wavecomb/material/description/variants.h"
 #include "wavecomb/scene/scene_checks.h"
 
 namespace wavecomb {

@@ -20,7 +20,7 @@ LEAST_EDGE = 64
 TILES_OF_A_WORKER = 4
 """Tiles of an image for each worker, so that workers end at about the same time."""
 _CHECK_SAMPLES = 16
-"""Samples between two looks of the core at errors (render/pass_plan.cpp)."""
+"""Samples between two looks of the core at errors (render/passes/pass_plan.cpp)."""
 _REACH = 4
 """Pixels that one look at errors reaches: a mean over two to each side, and marks that spread by
 two more."""

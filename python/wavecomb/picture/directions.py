@@ -13,7 +13,7 @@ def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
     """Points (u, v) in [0, 1] of unit vectors, (..., 3) -> (..., 2).
 
     P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008, as
-    learn/directions.h has it.
+    guiding/directions.h has it.
 
     >>> square_points(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])).tolist()
     [[0.5, 0.5], [1.0, 0.5]]

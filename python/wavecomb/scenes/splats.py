@@ -92,7 +92,7 @@ def read_capture(path: Path) -> Splats:
 def basis(directions: FloatArray) -> FloatArray:
     """Real spherical harmonics up to degree 3 of unit directions (n, 3): (n, 16).
 
-    With the phase of Condon and Shortley, as curve/harmonics.h has them.
+    With the phase of Condon and Shortley, as geometry/gaussian_splat/harmonics.h has them.
     """
     x, y, z = directions.T
     xx, yy, zz = x * x, y * y, z * z

@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "wavecomb/core/hash.h"
-#include "wavecomb/curve/splat.h"
-#include "wavecomb/surface/hit.h"
-#include "wavecomb/surface/presence.h"
-#include "wavecomb/surface/uv.h"
+#include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/geometry/hit/uv.h"
+#include "wavecomb/material/inputs/presence.h"
 
 namespace wavecomb {
 namespace {
@@ -104,7 +104,8 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
                     keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[instance].material, mesh, prim, true);
-  // The transmittance of shadow rays handles medium boundaries separately (medium/interiors.h).
+  // The transmittance of shadow rays handles medium boundaries separately
+  // (medium/nested/nested_media.h).
   if (keys.ray_kind == kSeenByShadowRays && scene.interiors.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
   const Vec2<float> uv = hit_uv<float>(scene.meshes, mesh, prim, u, v, true);

@@ -3,7 +3,7 @@
 /// (docs/aovs.md).
 ///
 /// To add one, add a row at the end of WAVECOMB_AOVS and a line that provides its value
-/// (integrate/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
+/// (aov/path_aovs.h). Film storage, layer, checkpoint block, and the names in Python, on the
 /// command line and in the window follow from the row.
 #pragma once
 

@@ -8,9 +8,9 @@
 #include <variant>
 #include <vector>
 
-#include "wavecomb/scene/camera_table.h"
-#include "wavecomb/scene/light_table.h"
-#include "wavecomb/scene/material_table.h"
+#include "wavecomb/light/description/light_table.h"
+#include "wavecomb/material/description/material_table.h"
+#include "wavecomb/scene/camera/camera_table.h"
 
 namespace wavecomb {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/contents.h"
-#include "wavecomb/scene/interior.h"
+#include "wavecomb/medium/description/glass_contents.h"
+#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"

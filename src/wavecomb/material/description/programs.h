@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Shading programs, of which each material uses one. Ids, names, kernels, the parameters of
+/// materials, and compile units are derived from this list.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace wavecomb {
+
+/// Maximum number of parameters specific to one program.
+inline constexpr size_t kMaxProgramParameters = 8;
+
+/// A numeric parameter that only materials of one program have. Its name must be unique among all
+/// parameters.
+struct ProgramParameter {
+  const char* name = nullptr;
+  float standard = 0;
+  float least = 0, most = 0;
+};
+
+/// One row for each program:
+///
+///   name, class of its BSDF without "Bsdf", whether its materials may emit, modelled cost of a
+///   record in ns (for reproducible renders), then its specific parameters as {"name", default,
+///   least, most}
+///
+/// The code is in material/programs/NAME.h, which material/program_table.h includes for tests. A
+/// row starts with P if the class has variants with some parts only
+/// (material/description/variants.h), and with X otherwise. CMake also reads this list, which
+/// requires two spaces and one row on each line. Add new programs at the end, since fingerprints
+/// contain the ids.
+#define WAVECOMB_PROGRAMS(X, P)                                                             \
+  X(diffuse, Diffuse, false, 60)                                                            \
+  X(metal, Metal, false, 75)                                                                \
+  X(dielectric, Dielectric, false, 70)                                                      \
+  X(plastic, Plastic, false, 85)                                                            \
+  X(emissive, Emissive, true, 20)                                                           \
+  P(principled, Principled, true, 110)                                                      \
+  P(openpbr, OpenPbr, true, 300)                                                            \
+  X(hair, Hair, false, 350, {"azimuthal_roughness", 0.3f, 0, 1}, {"scale_tt", 0.5f, 0, 10}, \
+    {"scale_trt", 2, 0, 10}, {"cuticle_tilt", 0, -90, 90}, {"tint_r", 1, 0, 1},             \
+    {"tint_tt", 1, 0, 1}, {"tint_trt", 1, 0, 1})
+
+/// Programs for collisions in media (path/media.h), in the same format. No mesh can use them,
+/// and their code is in the folder of the medium.
+#define WAVECOMB_MEDIUM_PROGRAMS(M) M(volume, Volume, false, 150)
+
+enum class ProgramId : uint8_t {
+#define WAVECOMB_PROGRAM(name, Class, ...) k##Class,
+  WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+};
+
+struct ProgramInfo {
+  const char* name;
+  bool can_emit;   ///< reads the emission input
+  float model_ns;  ///< estimated cost of each record
+  std::array<ProgramParameter, kMaxProgramParameters> own;
+
+  constexpr size_t own_count() const {
+    size_t count = 0;
+    while (count < own.size() && own[count].name) ++count;
+    return count;
+  }
+};
+/// All programs, indexed by ProgramId.
+inline constexpr ProgramInfo kPrograms[] = {
+#define WAVECOMB_PROGRAM(name, Class, emits, ns, ...) {#name, emits, ns, {{__VA_ARGS__}}},
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+};
+inline constexpr const char* kProgramNames[] = {
+#define WAVECOMB_PROGRAM(name, ...) #name,
+    WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
+#undef WAVECOMB_PROGRAM
+};
+inline constexpr uint32_t kProgramCount = sizeof(kPrograms) / sizeof(ProgramInfo);
+#define WAVECOMB_PROGRAM(...) +1
+inline constexpr uint32_t kMediumProgramCount = 0 WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM);
+#undef WAVECOMB_PROGRAM
+/// Number of surface programs, which come first.
+inline constexpr uint32_t kSurfaceProgramCount = kProgramCount - kMediumProgramCount;
+
+constexpr const ProgramInfo& info_of(ProgramId program) {
+  return kPrograms[static_cast<size_t>(program)];
+}
+/// Returns whether a program reads the emission input.
+constexpr bool can_emit(ProgramId program) {
+  return info_of(program).can_emit;
+}
+
+}  // namespace wavecomb
