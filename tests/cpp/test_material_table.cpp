@@ -23,7 +23,7 @@ TEST(ProgramList, ModelCostsAreThoseOfBeforeThereWasAList) {
     EXPECT_STREQ(kPrograms[i].name, names[i]);
     EXPECT_STREQ(kProgramNames[i], names[i]);
     EXPECT_EQ(kPrograms[i].model_ns, ns[i]);
-    EXPECT_EQ(kPrograms[i].can_emit, i >= 4);
+    EXPECT_EQ(can_emit(static_cast<ProgramId>(i)), i >= 4);
     EXPECT_EQ(kPrograms[i].own_count(), 0u);
   }
   for (uint32_t i = 0; i < kProgramCount; ++i)

@@ -70,9 +70,11 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
   const auto& materials = scene.material_part()->shaded;
   std::vector<uint8_t> fibres(geometry.meshes.size(), 0);
   if (std::none_of(materials.begin(), materials.end(),
-                   [](const Material& m) { return m.program == ProgramId::kHair; }))
+                   [](const Material& m) { return has_trait(m.program, program_trait::kFibre); }))
     return fibres;
-  const auto is_other = [&](uint32_t m) { return materials[m].program != ProgramId::kHair; };
+  const auto is_other = [&](uint32_t m) { 
+    return !has_trait(materials[m].program, program_trait::kFibre);
+  };
   // Materials that meshes without one inherit from their instances; the world is instance 0.
   std::vector<uint8_t> group_hands_on(geometry.groups.size(), 0), mesh_gets(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)

@@ -67,11 +67,12 @@ void AovTables::keep_expressions(const Scene& scene, const Settings& settings) {
   const std::vector<uint8_t> objects = scene.lights_of_objects();
   const LightSet& set = scene.light_set();
   for (size_t i = 0; i < groups.size(); ++i) {
-    const bool is_dome =
-        i < set.first_triangle() && set.records[i].kind == static_cast<uint32_t>(LightKind::kDome);
-    const PathEnd end = is_dome      ? PathEnd::kBackground
-                        : objects[i] ? PathEnd::kObject
-                                     : PathEnd::kLight;
+    const bool is_background =
+        i < set.first_triangle() &&
+        info_of(static_cast<LightKind>(set.records[i].kind)).has(light_trait::kBackground);
+    const PathEnd end = is_background ? PathEnd::kBackground
+                        : objects[i]  ? PathEnd::kObject
+                                      : PathEnd::kLight;
     end_of_light.push_back(path_end(end, groups[i]));
   }
   if (const LightView lights = scene.view().lights; lights.has_effects)

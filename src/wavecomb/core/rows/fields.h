@@ -118,11 +118,14 @@ inline constexpr size_t kFieldWords = detail::WordsOf<Row<float>>::value;
 template <template <typename> class Row>
 inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 
-/// Returns the word index of a member in a row or record: word_of(&Row<float>::slot).
+/// Returns the word index of a member in a row or record: word_of(&Row<float>::slot). Compilers
+/// reduce it to a constant.
 template <typename Record, typename Member>
-inline uint32_t word_of(Member Record::* member) {
-  static_assert(sizeof(member) == sizeof(ptrdiff_t));  // a byte offset in the Itanium ABI
-  return static_cast<uint32_t>(std::bit_cast<ptrdiff_t>(member) / 4);
+WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
+  static_assert(std::is_standard_layout_v<Record>);
+  static constexpr Record kRecord{};
+  const auto address = [](const auto& of) { return reinterpret_cast<const std::byte*>(&of); };
+  return static_cast<uint32_t>((address(kRecord.*member) - address(kRecord)) / 4);
 }
 
 /// Returns the words of a row, by lane, for store_rows. Words beyond the fields are 0.

@@ -38,6 +38,8 @@ inline constexpr uint32_t kSeen = 8;       ///< rays can hit its shape
 inline constexpr uint32_t kPictured = 16;  ///< supports a texture
 inline constexpr uint32_t kInfinite = 32;  ///< surrounds the scene at infinite distance
 inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
+/// Its radiance is the background of light path expressions.
+inline constexpr uint32_t kBackground = 128;
 }  // namespace light_trait
 
 /// Description of a light parameter. Contract: lives as long as the program.

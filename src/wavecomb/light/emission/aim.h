@@ -63,34 +63,23 @@ template <typename F>
 
 /// Returns the solid angle density with which the finite light `light`, without aiming, emits paths
 /// from `p` along d.
-template <typename F>
-inline F own_direction_density(LightKind kind, const LightReader<F>& light, const Vec3<F>& p,
-                               const Vec3<F>& d) {
-  Vec3<F> n = light.n();
-  if (kind == LightKind::kSphere || kind == LightKind::kCylinder) {
-    n = p - light.p();
-    if (kind == LightKind::kCylinder) {
-      const Vec3<F> axis = light.u();
-      n = n - axis * F(dot(n, axis) / length_squared(axis));
-    }
-    const F size = length(n);
-    n = n * F(1.f / select(size > 0.f, size, F(1.f)));
-  }
-  const F own = max(dot(n, d), F(0.f)) * kInvPi;
-  return kind == LightKind::kSphere ? select(light.radius() == 0.f, F(kInv4Pi), own) : own;
-}
-
-inline bool is_infinite(LightKind kind) {
-  return kind == LightKind::kDistant || kind == LightKind::kDome;
+template <typename Kind, typename F>
+inline F own_direction_density(const LightReader<F>& light, const Vec3<F>& p, const Vec3<F>& d) {
+  const F by_cosine =
+      max(dot(Kind::template emission_normal<F>(light, p), d), F(0.f)) * kInvPi;
+  return select(Kind::template is_delta<F>(light), F(kInv4Pi), by_cosine);
 }
 
 /// Returns g for paths from `light` that arrive at `from` along -dir over the distance t.
-template <typename F>
-inline F aim_of_kind(const LightView& view, LightKind kind, const LightReader<F>& light,
-                     const Vec3<F>& from, const Vec3<F>& dir, const F& t) {
-  if (is_infinite(kind)) return aim_from_afar<F>(view, from, dir);
-  const Vec3<F> p = fma(dir, t, from);
-  return aim_from_near<F>(view, p, -dir, own_direction_density<F>(kind, light, p, -dir));
+template <typename Kind, typename F>
+inline F aim_of_kind(const LightView& view, const LightReader<F>& light, const Vec3<F>& from,
+                     const Vec3<F>& dir, const F& t) {
+  if constexpr (Kind::kIsInfinite) {
+    return aim_from_afar<F>(view, from, dir);
+  } else {
+    const Vec3<F> p = fma(dir, t, from);
+    return aim_from_near<F>(view, p, -dir, own_direction_density<Kind, F>(light, p, -dir));
+  }
 }
 
 /// Spheres that the lanes select with a random number in [0, 1).

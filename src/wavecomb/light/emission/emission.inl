@@ -43,14 +43,17 @@ inline F size_of_terms(const Vec3<F>& p, const Vec3<F>& u, const Vec3<F>& v) {
   return F(most(p) + most(u)) + most(v);
 }
 
-/// Returns the lanes with point lights and distant lights without an angle, which no bounce can
-/// hit.
+/// Returns the lanes whose light no bounce can hit: point lights, and distant lights without an
+/// angle.
 template <typename F>
-inline Mask<F> is_delta_light(const LightReader<F>& light) {
-  const UInt<F> kind = light[&LightRecord::kind];
-  const auto is = [&](LightKind k) { return Mask<F>(kind == UInt<F>(static_cast<uint32_t>(k))); };
-  return (is(LightKind::kSphere) & (light.radius() == 0.f)) |
-         (is(LightKind::kDistant) & (light.one_minus_cos() == 0.f));
+inline Mask<F> is_delta_light(const LightReader<F>& light, const Mask<F>& active) {
+  Mask<F> delta(false);
+  for_each_kind<F>(light[&LightRecord::kind], active, [&](LightKind kind, const Mask<F>& lanes) {
+    delta = delta | (lanes & visit(kind, [&]<typename Kind>(Kind) {
+                       return Kind::template is_delta<F>(light);
+                     }));
+  });
+  return delta;
 }
 
 }  // namespace detail
@@ -91,10 +94,11 @@ template <typename F>
     detail::for_each_kind<F>(
         any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
           const detail::LightReader<F> reader(view.lights, light, lanes);
-          detail::KindEmission<F> e =
-              detail::emit_kind<F>(kind, {view, reader, r.u, r.v, r.s, r.t, lanes});
+          detail::KindEmission<F> e = visit(kind, [&]<typename Kind>(Kind) {
+            return Kind::template emit<F>({view, reader, r.u, r.v, r.s, r.t, lanes});
+          });
           if (view.aim) {
-            if (detail::is_infinite(kind))
+            if (visit(kind, []<typename Kind>(Kind) { return Kind::kIsInfinite; }))
               detail::aim_places<F>(view, r.aim, r.u, r.v, e, lanes);
             else
               detail::aim_directions<F>(view, r.aim, r.s, r.t, 1.f, e, lanes);
@@ -140,8 +144,11 @@ template <typename F>
   detail::for_each_kind<F>(
       any_light[&LightRecord::kind], others, [&](LightKind kind, const Mask<F>& lanes) {
         const detail::LightReader<F> reader(view.lights, light, lanes);
-        F one = detail::emission_density_of_kind<F>(kind, {view, reader, from, dir, t, lanes});
-        if (view.aim) one = one * detail::aim_of_kind<F>(view, kind, reader, from, dir, t);
+        const F one = visit(kind, [&]<typename Kind>(Kind) {
+          const F density = Kind::template emission_density<F>({view, reader, from, dir, t, lanes});
+          if (!view.aim) return density;
+          return F(density * detail::aim_of_kind<Kind, F>(view, reader, from, dir, t));
+        });
         put(one, reader.pick_pdf(), lanes);
       });
   return density;
@@ -160,19 +167,18 @@ template <typename F>
     const Mask<F> here = infinite & Mask<F>(light == U(i));
     if (none(here)) continue;
     const LightRecord& record = view.lights[i];
-    const bool is_delta =
-        record.kind == static_cast<uint32_t>(LightKind::kDistant) && record.one_minus_cos == 0.f;
-    const F pdf = is_delta ? F(1.f)
-                           : detail::escape_kind<F>(static_cast<LightKind>(record.kind),
-                                                    {view, record, from.p, dir, here})
-                                 .pdf;
+    const detail::LightReader<float> one(record, true);
+    const bool is_delta = detail::is_delta_light<float>(one, true);
+    const F pdf = is_delta ? F(1.f) : visit(record.kind, [&]<typename Kind>(Kind) {
+      return Kind::template escape<F>({view, record, from.p, dir, here}).pdf;
+    });
     reach.density = select(here, F(pdf * infinite_pick_pdf(view, i)), reach.density);
     if (is_delta) reach.is_delta = reach.is_delta | here;
   }
   const Mask<F> placed = active & not_(triangle) & not_(infinite);
   if (none(placed)) return reach;
   const detail::LightReader<F> reader(view.lights, light, placed);
-  const Mask<F> point = placed & detail::is_delta_light<F>(reader);
+  const Mask<F> point = detail::is_delta_light<F>(reader, placed);
   const Mask<F> area = placed & not_(point);
   if (any(area))
     reach.density = select(area, light_hit<F>(view, light, from, dir, t, area).pdf, reach.density);

@@ -156,8 +156,18 @@ inline KindEmission<F> emit_cylinder(const EmissionQuery<F>& q) {
 namespace wavecomb {
 
 /// Kind of cylinder lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
-struct CylinderKind : NoEscape {
+struct CylinderKind : FiniteKind {
   static LightKindInfo describe();
+  template <typename F>
+  static Vec3<F> emission_normal(const detail::LightReader<F>& light, const Vec3<F>& p) {
+    const Vec3<F> axis = light.u();
+    const Vec3<F> n = p - light.p();
+    return detail::unit_or_zero<F>(n - axis * F(dot(n, axis) / length_squared(axis)));
+  }
+  template <typename F>
+  static Mask<F> is_delta(const detail::LightReader<F>& /*light*/) {
+    return Mask<F>(false);
+  }
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
     return detail::sample_cylinder<F>(q.light, q.from, q.u, q.v);

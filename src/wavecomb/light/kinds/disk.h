@@ -42,7 +42,7 @@ inline KindEmission<F> emit_disk(const EmissionQuery<F>& q) {
 namespace wavecomb {
 
 /// Kind of disk lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
-struct DiskKind : NoEscape {
+struct DiskKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {

@@ -59,8 +59,12 @@ inline KindEmission<F> emit_distant(const EmissionQuery<F>& q) {
 namespace wavecomb {
 
 /// Kind of distant lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
-struct DistantKind : NoShape {
+struct DistantKind : InfiniteKind {
   static LightKindInfo describe();
+  template <typename F>
+  static Mask<F> is_delta(const detail::LightReader<F>& light) {
+    return light.one_minus_cos() == 0.f;
+  }
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
     return detail::sample_distant<F>(q.light, q.u, q.v);

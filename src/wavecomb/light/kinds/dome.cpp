@@ -74,7 +74,7 @@ LightKindInfo DomeKind::describe() {
   LightKindInfo kind;
   kind.name = "dome";
   kind.prims = {"DomeLight", "DomeLight_1"};
-  kind.traits = kPlaced | kPictured | kInfinite;
+  kind.traits = kPlaced | kPictured | kInfinite | kBackground;
   kind.parameters = {"portals"};
   kind.make = &make;
   return kind;

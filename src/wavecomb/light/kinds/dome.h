@@ -206,8 +206,12 @@ inline F dome_emission_density(const LightMeeting<F>& m) {
 namespace wavecomb {
 
 /// Kind of dome lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
-struct DomeKind : NoShape {
+struct DomeKind : InfiniteKind {
   static LightKindInfo describe();
+  template <typename F>
+  static Mask<F> is_delta(const detail::LightReader<F>& /*light*/) {
+    return Mask<F>(false);
+  }
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
     return detail::sample_dome<F>(q.view, q.index, q.light, q.from, q.u, q.v, q.lanes);

@@ -2,16 +2,12 @@
 /// List of all kinds of lights. To add a kind, add a pair of files to this folder, include its
 /// header here, and append an entry to the list.
 ///
-/// A kind is a struct <Name>Kind with
-///   describe()   the properties that the scene and the accelerator need
-///   (light/description/kind_info.h), sample       samples a direction from a point to the light,
-///   with radiance and density, hit          returns radiance and density for a ray that hits its
-///   shape, escape       returns both for a ray that leaves the scene, emit         samples the
-///   origin and direction of a light path, and emission_density    returns the density of such a
-///   path for a ray that hits the light.
-/// NoShape and NoEscape provide hit and escape for kinds that do not need them.
+/// A kind is a struct <Name>Kind that satisfies LightKindClass. It derives from InfiniteKind,
+/// FiniteKind or FlatKind (record_reader.h), which define what such kinds have in common. A kind
+/// that lacks a member does not compile.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 
 #include "wavecomb/light/kinds/cylinder.h"
@@ -37,66 +33,59 @@ static_assert(LightKind::kTriangle == kMeshLight);
 
 namespace detail {
 
-template <typename F>
-inline KindSample<F> sample_kind(LightKind kind, const LightQuery<F>& query) {
-  switch (kind) {
-#define WAVECOMB_LIGHT_KIND(name) \
-  case LightKind::k##name:        \
-    return name##Kind::sample<F>(query);
-    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
-#undef WAVECOMB_LIGHT_KIND
-  }
-  return {};
-}
-
-template <typename F>
-inline KindHit<F> hit_kind(LightKind kind, const LightMeeting<F>& meeting) {
-  switch (kind) {
-#define WAVECOMB_LIGHT_KIND(name) \
-  case LightKind::k##name:        \
-    return name##Kind::hit<F>(meeting);
-    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
-#undef WAVECOMB_LIGHT_KIND
-  }
-  return dark<F>();
-}
-
-template <typename F>
-inline KindHit<F> escape_kind(LightKind kind, const LightEscape<F>& escape) {
-  switch (kind) {
-#define WAVECOMB_LIGHT_KIND(name) \
-  case LightKind::k##name:        \
-    return name##Kind::escape<F>(escape);
-    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
-#undef WAVECOMB_LIGHT_KIND
-  }
-  return dark<F>();
-}
-
-template <typename F>
-inline KindEmission<F> emit_kind(LightKind kind, const EmissionQuery<F>& query) {
-  switch (kind) {
-#define WAVECOMB_LIGHT_KIND(name) \
-  case LightKind::k##name:        \
-    return name##Kind::emit<F>(query);
-    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
-#undef WAVECOMB_LIGHT_KIND
-  }
-  return {};
-}
-
-template <typename F>
-inline F emission_density_of_kind(LightKind kind, const LightMeeting<F>& meeting) {
-  switch (kind) {
-#define WAVECOMB_LIGHT_KIND(name) \
-  case LightKind::k##name:        \
-    return name##Kind::emission_density<F>(meeting);
-    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
-#undef WAVECOMB_LIGHT_KIND
-  }
-  return F(0.f);
-}
+template <typename Kind>
+concept FiniteKindClass = requires(const LightReader<float>& light, const Vec3<float>& p) {
+  { Kind::template emission_normal<float>(light, p) } -> std::same_as<Vec3<float>>;
+};
 
 }  // namespace detail
+
+/// Members of a kind of light, as templates on the float type F:
+///   describe          properties for the scene and the accelerator (description/kind_info.h)
+///   kIsInfinite       whether it surrounds the scene
+///   sample            samples a direction from a point to the light, with radiance and density
+///   hit               radiance and density for a ray that hits its shape
+///   escape            radiance and density for a ray that leaves the scene
+///   emit              samples the origin and direction of a light path
+///   emission_density  density of such a path for a ray that hits the light
+///   is_delta          lanes whose light no ray can hit by chance, such as a point light
+///   emission_normal   finite kinds: unit normal at a point of the light; 0 if it has none
+template <typename Kind>
+concept LightKindClass =
+    requires(const detail::LightQuery<float>& query, const detail::LightMeeting<float>& meeting,
+             const detail::LightEscape<float>& escape, const detail::EmissionQuery<float>& emission,
+             const detail::LightReader<float>& light) {
+      { Kind::describe() } -> std::same_as<LightKindInfo>;
+      { Kind::kIsInfinite } -> std::convertible_to<bool>;
+      { Kind::template sample<float>(query) } -> std::same_as<detail::KindSample<float>>;
+      { Kind::template hit<float>(meeting) } -> std::same_as<detail::KindHit<float>>;
+      { Kind::template escape<float>(escape) } -> std::same_as<detail::KindHit<float>>;
+      { Kind::template emit<float>(emission) } -> std::same_as<detail::KindEmission<float>>;
+      { Kind::template emission_density<float>(meeting) } -> std::same_as<float>;
+      { Kind::template is_delta<float>(light) } -> std::same_as<Mask<float>>;
+    } && (Kind::kIsInfinite || detail::FiniteKindClass<Kind>);
+
+#define WAVECOMB_LIGHT_KIND(name) \
+  static_assert(LightKindClass<name##Kind>, "a kind of light lacks a member of LightKindClass");
+WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+
+/// Calls `f` with an object of the class of `kind`, for example RectKind, and returns the result.
+template <typename Function>
+WAVECOMB_INLINE decltype(auto) visit(LightKind kind, const Function& f) {
+  switch (kind) {
+#define WAVECOMB_LIGHT_KIND(name) \
+  case LightKind::k##name:        \
+    return f(name##Kind{});
+    WAVECOMB_LIGHT_KINDS(WAVECOMB_LIGHT_KIND)
+#undef WAVECOMB_LIGHT_KIND
+  }
+  __builtin_unreachable();
+}
+/// For the kind number of a record.
+template <typename Function>
+WAVECOMB_INLINE decltype(auto) visit(uint32_t kind, const Function& f) {
+  return visit(static_cast<LightKind>(kind), f);
+}
 
 }  // namespace wavecomb

@@ -77,8 +77,12 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
 
 /// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh lights are
 /// never selected themselves; their triangles have separate rows.
-struct TriangleKind : NoEscape, NoShape {
+struct TriangleKind : FlatKind {
   static LightKindInfo describe();
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+    return detail::dark<F>();
+  }
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& /*query*/) {
     return {};

@@ -191,6 +191,13 @@ inline Direction<F> make_direction(const Vec3<F>& d) {
   return {d * F(1.f / safe), select(good, length2, F(0.f)), select(good, safe, F(0.f))};
 }
 
+/// Returns v as a unit vector, or 0 if it is 0.
+template <typename F>
+inline Vec3<F> unit_or_zero(const Vec3<F>& v) {
+  const F size = length(v);
+  return v * F(1.f / select(size > 0.f, size, F(1.f)));
+}
+
 template <typename F>
 inline Color<F> not_negative(const Color<F>& c) {
   return {max(c.x, F(0.f)), max(c.y, F(0.f)), max(c.z, F(0.f))};
@@ -200,18 +207,33 @@ inline Color<F> not_negative(const Color<F>& c) {
 
 struct LightKindInfo;
 
-/// Base of kinds without radiance for rays that leave the scene.
-struct NoEscape {
+/// Base of kinds that surround the scene at infinite distance. Light paths from them start on a
+/// disk in front of the scene.
+struct InfiniteKind {
+  static constexpr bool kIsInfinite = true;
+  template <typename F>
+  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+    return detail::dark<F>();
+  }
+};
+/// Base of kinds at a position in the scene. Light paths from them leave a surface with the normal
+/// emission_normal().
+struct FiniteKind {
+  static constexpr bool kIsInfinite = false;
   template <typename F>
   static detail::KindHit<F> escape(const detail::LightEscape<F>& /*escape*/) {
     return detail::dark<F>();
   }
 };
-/// Base of kinds without a shape that rays can hit.
-struct NoShape {
+/// Base of finite kinds with one normal, that of the record.
+struct FlatKind : FiniteKind {
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
-    return detail::dark<F>();
+  static Vec3<F> emission_normal(const detail::LightReader<F>& light, const Vec3<F>& /*p*/) {
+    return light.n();
+  }
+  template <typename F>
+  static Mask<F> is_delta(const detail::LightReader<F>& /*light*/) {
+    return Mask<F>(false);
   }
 };
 

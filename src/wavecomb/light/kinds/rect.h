@@ -310,7 +310,7 @@ inline F rect_emission_density(const LightMeeting<F>& m) {
 namespace wavecomb {
 
 /// Kind of rect lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
-struct RectKind : NoEscape {
+struct RectKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {

@@ -93,8 +93,17 @@ inline F sphere_emission_density(const LightReader<F>& light) {
 namespace wavecomb {
 
 /// Kind of sphere lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h).
-struct SphereKind : NoEscape {
+struct SphereKind : FiniteKind {
   static LightKindInfo describe();
+  template <typename F>
+  static Vec3<F> emission_normal(const detail::LightReader<F>& light, const Vec3<F>& p) {
+    return detail::unit_or_zero<F>(p - light.p());
+  }
+  /// A sphere of radius 0 is a point light.
+  template <typename F>
+  static Mask<F> is_delta(const detail::LightReader<F>& light) {
+    return light.radius() == 0.f;
+  }
   template <typename F>
   static detail::KindSample<F> sample(const detail::LightQuery<F>& q) {
     return detail::sample_sphere<F>(q.light, q.from, q.u, q.v);

@@ -21,8 +21,9 @@ inline F infinite_emission_density(const LightView& view, uint32_t light, const 
   if (record.camera_only != 0) return F(0.f);
   const LightReader<F> reader(record, active);
   const float pick = view.pick_pdf ? view.pick_pdf[light] : record.pick_pdf;
-  F density = emission_density_of_kind<F>(static_cast<LightKind>(record.kind),
-                                          {view, reader, from, dir, F(0.f), active});
+  F density = visit(record.kind, [&]<typename Kind>(Kind) {
+    return Kind::template emission_density<F>({view, reader, from, dir, F(0.f), active});
+  });
   if (view.aim) density = density * aim_from_afar<F>(view, from, dir);
   return select(is_finite(density), F(density * pick), F(0.f));
 }
@@ -45,8 +46,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
     seen_from = pose.point_to_rest(from);
     along = pose.to_rest(dir);
   }
-  detail::KindHit<F> hit = detail::escape_kind<F>(static_cast<LightKind>(record.kind),
-                                                  {view, record, seen_from, along, active});
+  detail::KindHit<F> hit = visit(record.kind, [&]<typename Kind>(Kind) {
+    return Kind::template escape<F>({view, record, seen_from, along, active});
+  });
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -along, hit.radiance, active);
   const F light_pdf = hit.pdf * infinite_pick_pdf(view, light);

@@ -134,7 +134,9 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
         if (view.motions) [[unlikely]]
           from = light_pose<F>(view, index, to.time, lanes).point_to_rest(p);
         detail::KindSample<F> s =
-            detail::sample_kind<F>(kind, {view, index, light, from, u, v, lanes});
+            visit(kind, [&]<typename Kind>(Kind) {
+              return Kind::template sample<F>({view, index, light, from, u, v, lanes});
+            });
         if (view.shapings)
           s.radiance =
               detail::shaped<F>(view, light.shaping(), -s.wi, s.radiance, lanes & (s.pdf > 0.f));
@@ -165,7 +167,9 @@ LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightRe
   }
   detail::for_each_kind<F>(
       reader[&LightRecord::kind], active, [&](LightKind kind, const Mask<F>& lanes) {
-        detail::KindHit<F> hit = detail::hit_kind<F>(kind, {view, reader, origin, dir, t, lanes});
+        detail::KindHit<F> hit = visit(kind, [&]<typename Kind>(Kind) {
+          return Kind::template hit<F>({view, reader, origin, dir, t, lanes});
+        });
         if (view.shapings)
           hit.radiance = detail::shaped<F>(view, reader.shaping(), -dir, hit.radiance, lanes);
         if (view.filters) [[unlikely]]

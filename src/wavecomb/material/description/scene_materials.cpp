@@ -39,7 +39,7 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
   if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
   if (m.emits()) r.flags |= kEmits;
   r.program = static_cast<uint32_t>(m.program);
-  if (m.program == ProgramId::kOpenPbr && m.openpbr.anisotropy != 0)
+  if (has_trait(m.program, program_trait::kLayered) && m.openpbr.anisotropy != 0)
     r.textured_inputs |= kNeedsTangent;
   r.graph = m.graph;
   r.opacity_graph = m.opacity_graph;
@@ -57,7 +57,7 @@ bool wants_tangents(const Material& m, const GraphSet& graphs) {
       graph_input_bit(GraphInput::kTangent) | graph_input_bit(GraphInput::kBitangent);
   return m.has_texture(Input::kNormal) || graphs.drives(m.graph, kNormalOutput) ||
          graphs.reads(m.graph, kTangents) ||
-         (m.program == ProgramId::kOpenPbr &&
+         (has_trait(m.program, program_trait::kLayered) &&
           (m.openpbr.anisotropy != 0 || graphs.drives(m.graph, graph_parameter("anisotropy"))));
 }
 
@@ -118,7 +118,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
   for (const Material& m : shaded) {
     records.push_back(make_material_record(m, *graphs));
     if (has_own) own.push_back(make_own_record(m));
-    if (m.program == ProgramId::kOpenPbr) {
+    if (has_trait(m.program, program_trait::kLayered)) {
       records.back().openpbr = static_cast<uint32_t>(openpbr.size());
       openpbr.push_back(make_openpbr_record(m.openpbr));
       const WalkKind walk =

@@ -30,12 +30,12 @@ uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const Tex
   add(kGlows, m.emits());
   add(kMetals, m.specular_workflow || above_0("metallic", shown(Input::kMetallic, m.metallic)));
   add(kCoats, above_0("clearcoat", shown(Input::kClearcoat, m.clearcoat)));
-  if (m.program == ProgramId::kPrincipled) {
+  if (has_trait(m.program, program_trait::kTransmitsByOpacity)) {
     // Opacity as presence is handled by ray traversal, not by the BSDF.
     const bool is_presence = m.opacity_threshold > 0 || (m.presence && m.needs_presence());
     add(kPasses, !is_presence && may_pass("opacity", 1, m.opacity != 1 || m.opacity_varies()));
   }
-  if (m.program == ProgramId::kOpenPbr) {
+  if (has_trait(m.program, program_trait::kLayered)) {
     const OpenPbr& o = m.openpbr;
     add(kPasses, above_0("transmission_weight", o.transmission_weight != 0));
     const bool walks = may_walk && walk_kind(m, graphs) != WalkKind::kNone;

@@ -21,7 +21,7 @@ struct Coefficients {
 };
 
 bool is_solid(const Material& m) {
-  return m.program == ProgramId::kOpenPbr && !m.openpbr.thin_walled;
+  return has_trait(m.program, program_trait::kNests) && !m.openpbr.thin_walled;
 }
 
 /// Returns the coefficients of one channel after OpenPBR 1.1, "Translucent base": extinction is
@@ -64,7 +64,7 @@ bool is_clear(const Material& m) {
 }
 
 bool is_glass(const Material& m, const GraphSet& graphs) {
-  if (m.program == ProgramId::kDielectric) return true;
+  if (has_trait(m.program, program_trait::kGlass)) return true;
   return is_solid(m) && (m.openpbr.transmission_weight > 0 ||
                          graphs.drives(m.graph, graph_parameter("transmission_weight")));
 }

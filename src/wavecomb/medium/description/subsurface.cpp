@@ -32,7 +32,7 @@ WalkKind walk_kind(const Material& m, const GraphSet& graphs) {
   const auto driven = [&](const char* name) {
     return graphs.drives(m.graph, graph_parameter(name));
   };
-  const bool is_solid = m.program == ProgramId::kOpenPbr && !o.thin_walled &&
+  const bool is_solid = has_trait(m.program, program_trait::kSubsurface) && !o.thin_walled &&
                         o.transmission_weight == 0 && !driven("transmission_weight");
   const bool is_below = o.subsurface_weight > 0 || driven("subsurface_weight");
   const Vec3<float>& r = o.subsurface_radius;

@@ -169,15 +169,8 @@ TransportGain transport_gain(const TransportTrials& trials, double longer) {
 bool focuses_light(const Scene& scene) {
   return std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) {
     const bool varies = m.graph != kNoGraph;
-    switch (m.program) {
-      case ProgramId::kDiffuse:
-      case ProgramId::kEmissive:
-        return false;
-      case ProgramId::kDielectric:
-        return true;
-      default:
-        break;
-    }
+    if (has_trait(m.program, program_trait::kGlass)) return true;
+    if (!has_trait(m.program, program_trait::kGlossy)) return false;
     const bool passes = (m.opacity < 1 && !m.presence && m.opacity_threshold <= 0) ||
                         m.openpbr.transmission_weight > 0;
     const bool coats = m.clearcoat > 0 || m.has_texture(Input::kClearcoat);
