@@ -185,6 +185,9 @@ nb::list aov_table() {
                                            "coverage", "groups",       "expressions",
                                            "sum",      "deep",         "median"};
   static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kMedian) + 1);
+  static constexpr const char* kContents[] = {"light", "colour", "direction",
+                                              "id",    "exact",  "value"};
+  static_assert(std::size(kContents) == static_cast<size_t>(AovContent::kValue) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
     // Expressions are requested by text, and deep images are separate files.
@@ -192,6 +195,8 @@ nb::list aov_table() {
     nb::dict row;
     row["name"] = aov.name;
     row["channels"] = aov.channels;
+    row["letters"] = aov.letters;
+    row["content"] = kContents[static_cast<size_t>(aov.content)];
     row["kind"] = kKinds[static_cast<size_t>(aov.kind)];
     row["title"] = aov.title;
     rows.append(row);
