@@ -94,13 +94,13 @@ WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const
   // For a viewer inside an absorbing material, light paths do not know the length of the absorbing
   // segment.
   if (Bsdf::kAbsorbs && v.depth == 0) reached = reached & (seen < 0.f);
-  JointVertex<F> joint{select(reached, v.path.joined(), F(0.f)),
+  JointVertex<F> joint{select(reached, v.path.ratio, F(0.f)),
                        F(1.f / select(seen != 0.f, abs(seen), F(1.f))), min(linked, F(kMostRatio)),
                        Mask<F>(false), F(0.f)};
   if (v.settings.merge_scale > 0.f) [[unlikely]] {
     const F radius = v.path.cone_width * v.settings.merge_scale;
     joint.radius2 = radius * radius;
-    joint.merges = reached & (v.path.ratio < 0.f) & (joint.radius2 > 0.f);
+    joint.merges = reached & v.path.awaits_merge & (joint.radius2 > 0.f);
     if constexpr (Bsdf::kHasNonDelta)
       joint.merges = joint.merges & at.bsdf.has_non_delta();
     else
@@ -148,11 +148,11 @@ WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Inter
     offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, wo, wi);
 }
 
-/// Returns R after the bounce `b` along `world`.
+/// Sets R after the bounce `b` along `world`, and whether the path awaits a merge.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& at,
+WAVECOMB_INLINE void next_ratio(const Vertex<F, kFeatures>& v, const Interaction& at,
                              const JointVertex<F>& joint, const Vec3<F>& wo, const Vec3<F>& world,
-                             const BsdfSample<F>& b) {
+                             const BsdfSample<F>& b, PathState<F>& next) {
   const Mask<F> by_pdf = not_(b.is_delta) & (b.pdf > 0.f);
   const F by_density = joint.template towards<Bsdf>(v, at, wo, world, b.wi, by_pdf) /
                        select(b.pdf > 0.f, b.pdf, F(1.f));
@@ -166,10 +166,11 @@ WAVECOMB_INLINE F next_ratio(const Vertex<F, kFeatures>& v, const Interaction& a
   }
   r = min(max(r, F(0.f)), F(kMostRatio));
   if (v.settings.merge_scale > 0.f) [[unlikely]] {
-    const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & (v.path.ratio < 0.f));
-    r = select(waits & not_(joint.merges), F(-1.f), select(b.is_delta & joint.merges, F(0.f), r));
+    const Mask<F> waits = v.depth == 0 ? b.is_delta : Mask<F>(b.is_delta & v.path.awaits_merge);
+    next.awaits_merge = waits & not_(joint.merges);
+    r = select(next.awaits_merge | (b.is_delta & joint.merges), F(0.f), r);
   }
-  return r;
+  next.ratio = r;
 }
 
 }  // namespace wavecomb

@@ -23,6 +23,16 @@ struct LightPath {
   Color<F> flux;
   F weight;  ///< 1 / D
   F eta_scale;
+
+  /// Returns the state of the path on its first ray.
+  PathState<F> start() const {
+    return {.dir = emission.d,
+            .throughput = flux,
+            .eta_scale = eta_scale,
+            .o = emission.o,
+            .mis_sum = weight,
+            .light = emission.light};
+  }
 };
 
 /// Returns the number of the light path of a pixel (x | y << 16) of the whole image.
@@ -103,20 +113,22 @@ inline F light_path_time(const Settings& settings, const SampleKey<F>& key, cons
 /// Returns the state of a light path at the end of its ray of length `t`. The ray cone is that of a
 /// camera ray to the hit, so that textures are filtered as the camera sees them.
 template <typename F>
-inline PathState<F> light_path_state(const CameraSetup& camera, const Vec3<F>& d,
-                                     const Color<F>& flux, const F& weight, const F& eta_scale,
-                                     const F& ratio, const Vec3<F>& o, const UInt<F>& light,
+inline PathState<F> light_path_state(const CameraSetup& camera, const LightPathRow<F>& row,
                                      const F& t, const F& time, const Mask<F>& active) {
   F width(kConeShare * camera.step_y);
   if (camera.projection != Projection::kOrthographic)
-    width *= length(Vec3<F>(fma(d, t, o) - camera_place<F>(camera, time, active).t));
-  PathState<F> state{d, flux, weight, eta_scale, width, F(0.f), o, light};
-  state.ratio = ratio;
-  return state;
+    width *= length(Vec3<F>(fma(row.d, t, row.o) - camera_place<F>(camera, time, active).t));
+  return {.dir = row.d,
+          .throughput = row.throughput,
+          .eta_scale = row.eta_scale,
+          .cone_width = width,
+          .o = row.o,
+          .mis_sum = row.mis_sum,
+          .bounce_pdf = row.bounce_pdf,
+          .light = row.light};
 }
 
-/// Result of shading a vertex of a light path. `v.direct` is the contribution to the pixels,
-/// `v.next.pdf` is S (light_vertex.h) and `v.next.ratio` is the density p<- of the bounce.
+/// Result of shading a vertex of a light path. `v.direct` is the contribution to the pixels.
 template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;

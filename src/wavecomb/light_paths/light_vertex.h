@@ -78,7 +78,7 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
   const F cosine = abs(dot(at.s.ng, back));
   // Direction to the origin of the flux, as a bounce of a camera path would reach it.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
-  const Mask<F> afar = is_first & Mask<F>(v.path.receiver < UInt<F>(v.scene.lights.infinite_count));
+  const Mask<F> afar = is_first & Mask<F>(v.path.light < UInt<F>(v.scene.lights.infinite_count));
   c.o = select<F>(afar, at.origin(back), c.o);
   c.d = select<F>(afar, back, c.d);
   const F distance = select(afar, v.t, sqrt(c.distance2));
@@ -98,14 +98,14 @@ WAVECOMB_INLINE LitPlace<Bsdf, F, Interaction> lit_place(const Vertex<F, kFeatur
     if (v.scene.lights.by_tree && !Bsdf::kTransmits)
       receiver.normal = pack_normal<F>(select<F>(place.l.z < 0.f, -place.frame.n, place.frame.n));
     const LightReach<F> reach =
-        light_reach<F>(v.scene.lights, v.path.receiver, receiver, c.d, distance, first);
+        light_reach<F>(v.scene.lights, v.path.light, receiver, c.d, distance, first);
     // Vertices that have only delta lobes do not sample lights.
     place.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
     place.by_light_only = first & reach.is_delta;
   }
   if (v.settings.connects) {
-    const Mask<F> links = place.active & (v.path.ratio > 0.f);
-    const F linked = F(distance * distance) / select(links, v.path.ratio, F(1.f));
+    const Mask<F> links = place.active & (v.path.bounce_pdf > 0.f);
+    const F linked = F(distance * distance) / select(links, v.path.bounce_pdf, F(1.f));
     place.linked = select(links, min(linked, F(kMostRatio)), F(0.f));
   }
   return place;
@@ -189,7 +189,7 @@ WAVECOMB_INLINE void show_to_camera(const Vertex<F, kFeatures>& v, const LightPa
   if (none(looker.sees)) return;
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(looker.local), place.l);
   const F seen = place.turn(looker.w) * c.density;
-  const F others = place.others(v.path.pdf, e.pdf) * F(seen * setup.share);
+  const F others = place.others(v.path.mis_sum, e.pdf) * F(seen * setup.share);
   const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
   const Color<F> light = place.flux * e.f_cos * brightness;
   ask_whether_seen<F>(place, looker, c.to, shown_light<F>(setup, light, others), out.v);
@@ -237,7 +237,7 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
     const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(local), place.l);
     const F area = F(point.radius * point.radius) * kPi;
     const F seen = place.inverse_cos / select(sees, area, F(1.f));
-    const F others = place.others(v.path.pdf, e.pdf) * F(seen * setup.share);
+    const F others = place.others(v.path.mis_sum, e.pdf) * F(seen * setup.share);
     const F brightness = seen * (setup.share * setup.camera.exposure) / F(1.f + others);
     const Color<F> light = place.flux * e.f_cos * point.light * brightness;
     const Color<F> shown =
@@ -266,7 +266,7 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
   const F nearness = 1.f / select(looker.sees, looker.distance2, F(1.f));
   const F turn = place.turn(looker.w) * nearness;
   const F before = min(F(target.ratio * F(back * nearness)), F(kMostRatio));
-  const F others = min(F(place.others(v.path.pdf, e.pdf) * F(turn * target.pdf)), F(kMostRatio));
+  const F others = min(F(place.others(v.path.mis_sum, e.pdf) * F(turn * target.pdf)), F(kMostRatio));
   const F brightness = turn / F(F(1.f + before) + others);
   ask_whether_seen<F>(place, looker, target.from,
                       Color<F>(place.flux * e.f_cos * target.light * brightness), out);
@@ -284,7 +284,7 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
   const F over_pdf = turn / select(b.pdf > 0.f, b.pdf, F(1.f));
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(b.wi), place.l);
   Color<F> weight = e.f_cos * over_pdf;
-  F s = v.path.pdf * F(place.found(e.pdf) * over_pdf);
+  F s = v.path.mis_sum * F(place.found(e.pdf) * over_pdf);
   if (v.settings.connects) s = fma(place.linked, over_pdf, s);
   Mask<F> goes = v.active;
   if (any(b.is_delta)) {
@@ -293,7 +293,7 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
     const F angles = turn * F(abs(place.l.z) / select(z > 0.f, z, F(1.f)));
     weight = select<F>(b.is_delta, b.weight * F(angles * eta2), weight);
     const F by_angle = select(place.by_light_only, F(0.f), F(angles / eta2));
-    s = select(b.is_delta, F(v.path.pdf * by_angle), s);
+    s = select(b.is_delta, F(v.path.mis_sum * by_angle), s);
     goes = not_(b.is_delta & passes_one_way<Bsdf, F>(at.bsdf, place.l, b.wi));
   }
   if (v.wants_events()) [[unlikely]] {
@@ -302,15 +302,15 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const Place& pl
   }
   out.next.dir = d;
   out.next.throughput = place.flux * weight;
-  out.next.pdf = min(s, F(kMostRatio));
-  out.next.ratio = F(0.f);
+  out.next.mis_sum = min(s, F(kMostRatio));
+  out.next.bounce_pdf = F(0.f);
   if (v.settings.connects) {
     Mask<F> may_look = not_(b.is_delta);
     if (Bsdf::kAbsorbs) may_look = may_look & (dot(at.s.ng, d) > 0.f);
-    out.next.ratio = select(may_look, b.pdf, F(0.f));
+    out.next.bounce_pdf = select(may_look, b.pdf, F(0.f));
   }
   out.next.eta_scale = v.path.eta_scale;
-  out.next.receiver = v.path.receiver;
+  out.next.light = v.path.light;
   out.next.cone_width = out.next.cone_spread = F(0.f);
   out.next.o = at.light_path_origin(d);
   const F largest = max_component(out.next.throughput);

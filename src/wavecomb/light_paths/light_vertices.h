@@ -14,7 +14,7 @@
 
 namespace wavecomb {
 
-/// Stored vertex of a light path, in addition to the PathRow that led there and its ShadingRecord.
+/// Stored vertex of a light path, in addition to the LightPathRow that led there and its ShadingRecord.
 template <typename F>
 struct LightVertexRow {
   Vec3<F> p;
@@ -47,7 +47,7 @@ class LightVertices {
       : rows_(capacity > 0 ? SoaBlock(1, capacity * kWords) : SoaBlock()) {
     if (capacity == 0) return;
     paths = rows_.floats(0);
-    records = paths + capacity * kRowWords<PathRow>;
+    records = paths + capacity * kRowWords<LightPathRow>;
     chosen = records + capacity * kRowWords<ShadingRecord>;
     connections = chosen + capacity * kRowWords<LightVertexRow>;
   }
@@ -59,13 +59,13 @@ class LightVertices {
     std::memset(chosen, 0, slots * kRowWords<LightVertexRow> * sizeof(float));
   }
 
-  float* paths = nullptr;        ///< PathRow that arrived at the vertex
+  float* paths = nullptr;        ///< LightPathRow that arrived at the vertex
   float* records = nullptr;      ///< ShadingRecord
   float* chosen = nullptr;       ///< LightVertexRow
   float* connections = nullptr;  ///< ConnectionRow
 
  private:
-  static constexpr size_t kWords = kRowWords<PathRow> + kRowWords<ShadingRecord> +
+  static constexpr size_t kWords = kRowWords<LightPathRow> + kRowWords<ShadingRecord> +
                                    kRowWords<LightVertexRow> + kRowWords<ConnectionRow>;
   SoaBlock rows_;
 };
@@ -74,7 +74,7 @@ class LightVertices {
 /// so far, the last one replaces the stored one with probability 1 / n. Returns the lanes whose
 /// vertex was stored.
 template <typename F>
-inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth, const PathRow<F>& path,
+inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth, const LightPathRow<F>& path,
                                  const ShadingRecord<F>& record, const UInt<F>& material,
                                  const Vec3<F>& p, const Mask<F>& offered) {
   using U = UInt<F>;
@@ -89,7 +89,7 @@ inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth, const 
   row.material = select(Mask<U>(taken), material, row.material);
   store_row<LightVertexRow, F>(to.chosen, record.slot, row, offered);
   if (none(taken)) return taken;
-  store_row<PathRow, F>(to.paths, record.slot, path, taken);
+  store_row<LightPathRow, F>(to.paths, record.slot, path, taken);
   store_row<ShadingRecord, F>(to.records, record.slot, record, taken);
   return taken;
 }

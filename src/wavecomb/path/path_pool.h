@@ -2,6 +2,8 @@
 /// Storage for the paths of a wave, one slot for each path.
 #pragma once
 
+#include <cstddef>
+
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/rows/soa.h"
 #include "wavecomb/core/sampler.h"
@@ -16,23 +18,58 @@ struct RayHead {
   WAVECOMB_FIELDS(o, d)
 };
 
-/// Path between two vertices. Each vertex reads the row and overwrites it with the next ray.
+/// Subsurface body that a ray enters, where it starts a random walk.
+template <typename F>
+struct BodyEntry {
+  UInt<F> body{0u};    ///< object_of() of the body
+  UInt<F> normal{0u};  ///< packed normal at the entry, outwards
+};
+
+/// Camera path between two vertices. Each vertex reads the row and overwrites it with the next ray.
+///
+/// A ray that enters a subsurface body (enters_body()) uses neither a cone nor a receiver. The row
+/// stores its BodyEntry in their words and marks the layout by the sign bit of `pdf`. Only the
+/// member functions know this encoding.
 template <typename F>
 struct PathRow {
   Vec3<F> o, d;  ///< the ray to trace
   Color<F> throughput;
-  /// Density of the bounce that made the ray; 0 for a delta bounce or camera ray; negative if the
-  /// ray enters a subsurface body and starts a random walk.
-  F pdf;
+  F pdf;        ///< density of the bounce that made the ray; 0 for a delta bounce or camera ray
   F eta_scale;  ///< product of eta^2 of the refractions so far, for roulette
-  /// Ray cone at the origin: width in scene units, spread in radians. In a subsurface body the
-  /// width holds the bits of its packed normal. In light paths the spread holds PathState::ratio.
-  F cone_width, cone_spread;
+  F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, spread in radians
   SampleKey<F> key;
-  /// LightReceiver::normal of the vertex that made the ray; object_of() of the body if the ray
-  /// enters a subsurface body; index of the light in light paths.
-  UInt<F> receiver;
+  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray
   WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
+
+  Mask<F> enters_body() const { return pdf < 0.f; }
+  /// Makes the rays of `lanes` enter a body. Their pdf must be above 0.
+  void set_entry(const Mask<F>& lanes, const BodyEntry<F>& entry) {
+    pdf = select(lanes, F(-pdf), pdf);
+    cone_width = select(lanes, bits_float<F>(entry.normal), cone_width);
+    receiver = select(Mask<UInt<F>>(lanes), entry.body, receiver);
+  }
+  /// Returns the entry, and gives the ray a cone of width 0. The word of `receiver` continues to
+  /// hold the body, which the ray queries of the walk read there.
+  BodyEntry<F> take_entry() {
+    const BodyEntry<F> entry{receiver, float_bits<F>(cone_width)};
+    pdf = abs(pdf);
+    cone_width = F(0.f);
+    return entry;
+  }
+};
+
+/// Light path between two vertices, in the same slots as camera paths.
+template <typename F>
+struct LightPathRow {
+  Vec3<F> o, d;         ///< the ray to trace
+  Color<F> throughput;  ///< flux
+  F mis_sum;            ///< PathState::mis_sum
+  F eta_scale;
+  F unused;
+  F bounce_pdf;  ///< PathState::bounce_pdf
+  SampleKey<F> key;
+  UInt<F> light;  ///< light that the path left
+  WAVECOMB_FIELDS(o, d, throughput, mis_sum, eta_scale, unused, bounce_pdf, key, light)
 };
 
 /// Path state that only some scenes need.
@@ -93,6 +130,11 @@ inline constexpr size_t kRadianceWords = kRowWords<RadianceRow>;
 
 static_assert(kRowWords<PathRow> == 16 && kRowWords<ShadowRow> == 16, "a cache line each");
 static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
+// Stages that trace rays and draw random numbers treat both kinds of paths alike.
+static_assert(kFieldWords<LightPathRow> == kFieldWords<PathRow>);
+static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<float>, throughput) &&
+              offsetof(LightPathRow<float>, eta_scale) == offsetof(PathRow<float>, eta_scale) &&
+              offsetof(LightPathRow<float>, key) == offsetof(PathRow<float>, key));
 
 /// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. Its state
 /// is a row of one cache line, and its shadow ray is a second row, so that shading touches only the
@@ -122,11 +164,11 @@ class PathPool {
     diffuse = split ? diffuse_.floats(0) : nullptr;
   }
 
-  float* paths = nullptr;     ///< PathRow
+  float* paths = nullptr;     ///< PathRow or LightPathRow
   float* shadows = nullptr;   ///< ShadowRow
   float* radiance = nullptr;  ///< RadianceRow
   float* cold = nullptr;      ///< PathColdRow, or null
-  float* ratio = nullptr;     ///< PathState::ratio; null without light paths
+  float* ratio = nullptr;     ///< pack_ratio() of the paths; null without light paths
   float* inside = nullptr;    ///< InsideRow; null without nested dielectrics
   float* shades = nullptr;    ///< RadianceRow of VertexResult::shade; null if shadows are black
   /// RadianceRow of PathState::diffuse; null if no light has multipliers

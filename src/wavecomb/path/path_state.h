@@ -14,6 +14,7 @@
 #include "wavecomb/light_paths/light_vertices.h"
 #include "wavecomb/light_paths/merge_point.h"
 #include "wavecomb/path/features.h"
+#include "wavecomb/path/path_pool.h"
 
 namespace wavecomb {
 
@@ -69,20 +70,24 @@ template <typename F>
 struct PathState {
   Vec3<F> dir;
   Color<F> throughput;
-  /// Density of the previous bounce; 0 for a delta bounce or camera ray; negative if the bounce
-  /// entered a subsurface body.
-  F pdf;
-  F eta_scale;
-  F cone_width, cone_spread;
-  Vec3<F> o;          ///< origin of the ray that arrived
-  UInt<F> receiver;   ///< LightReceiver::normal of the previous vertex
+  F pdf{0.f};  ///< density of the previous bounce; 0 for a delta bounce or camera ray
+  F eta_scale{1.f};
+  F cone_width{0.f}, cone_spread{0.f};
+  Vec3<F> o;              ///< origin of the ray that arrived
+  UInt<F> receiver{0u};   ///< LightReceiver::normal of the previous vertex
   UInt<F> link{0u};   ///< link class of the surface that the ray left, if lights are linked
   F importance{0.f};  ///< one over the brightness of the image at the pixel; 0 if unknown
-  /// For camera paths, the ratio R of light_paths/join.h. It is 0 if no light path can produce this
-  /// path, and negative if all bounces so far were deltas and the path waits for a vertex to merge
-  /// at. For light paths, the density of the previous bounce, or 0 if the previous vertex cannot be
-  /// connected.
+  /// The ratio R of light_paths/join.h, the density of light paths relative to this path; 0 if no
+  /// light path can produce it.
   F ratio{0.f};
+  /// Whether all bounces so far were deltas and the path waits for a vertex to merge at.
+  Mask<F> awaits_merge{false};
+  Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
+  BodyEntry<F> entry{};        ///< that body
+  // Only for light paths (light_paths/light_vertex.h):
+  F mis_sum{0.f};     ///< the sum S of the MIS weight
+  F bounce_pdf{0.f};  ///< density of the previous bounce; 0 if its vertex cannot be connected
+  UInt<F> light{0u};  ///< light that the path left
   // Only for scenes with nested dielectrics (InsideRow):
   F outer{1.f};        ///< index of refraction on the other side of the surface
   UInt<F> medium{0u};  ///< material whose medium scatters here
@@ -91,15 +96,65 @@ struct PathState {
   /// multipliers.
   Color<F> diffuse{F(0.f)};
 
-  /// Returns the density of light paths relative to this camera path: max(R, 0) of
-  /// light_paths/join.h.
-  F joined() const { return max(ratio, F(0.f)); }
   LightReceiver<F> vertex_before() const {
     LightReceiver<F> from(o, receiver);
     from.time = time;
     return from;
   }
 };
+
+/// Returns the state of a camera path at the end of its ray of length `t`. Fields that are not in
+/// the row have their default values.
+template <typename F>
+WAVECOMB_INLINE PathState<F> path_state(const PathRow<F>& row, const F& t) {
+  return {.dir = row.d,
+          .throughput = row.throughput,
+          .pdf = row.pdf,
+          .eta_scale = row.eta_scale,
+          .cone_width = fma(row.cone_spread, t, row.cone_width),
+          .cone_spread = row.cone_spread,
+          .o = row.o,
+          .receiver = row.receiver};
+}
+/// Returns the row of a camera path whose next ray is that of `next`. `kMayEnter` is false if no ray
+/// can enter a subsurface body.
+template <bool kMayEnter, typename F>
+WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>& key) {
+  PathRow<F> row{.o = next.o,
+                 .d = next.dir,
+                 .throughput = next.throughput,
+                 .pdf = next.pdf,
+                 .eta_scale = next.eta_scale,
+                 .cone_width = next.cone_width,
+                 .cone_spread = next.cone_spread,
+                 .key = key,
+                 .receiver = next.receiver};
+  if constexpr (kMayEnter) row.set_entry(next.enters_body, next.entry);
+  return row;
+}
+/// Returns the row of a light path whose next ray is that of `next`.
+template <typename F>
+WAVECOMB_INLINE LightPathRow<F> light_path_row(const PathState<F>& next, const SampleKey<F>& key) {
+  return {.o = next.o,
+          .d = next.dir,
+          .throughput = next.throughput,
+          .mis_sum = next.mis_sum,
+          .eta_scale = next.eta_scale,
+          .unused = F(0.f),
+          .bounce_pdf = next.bounce_pdf,
+          .key = key,
+          .light = next.light};
+}
+/// Returns the word of PathPool::ratio: PathState::ratio, or -1 if the path awaits a merge.
+template <typename F>
+WAVECOMB_INLINE F pack_ratio(const PathState<F>& state) {
+  return select(state.awaits_merge, F(-1.f), state.ratio);
+}
+template <typename F>
+WAVECOMB_INLINE void unpack_ratio(const F& word, PathState<F>& state) {
+  state.awaits_merge = word < 0.f;
+  state.ratio = max(word, F(0.f));
+}
 
 /// Output of shading one vertex. Values of lanes outside the masks are undefined.
 template <typename F>

@@ -88,7 +88,11 @@ class PathTracer {
     F cone_at_origin = ray.width;
     const F importance =
         context_.weighs_pixels() ? picture_importance<F>(*context_.guide, x, y, true) : 0.f;
-    PathState<F> path{ray.d, Color<F>(1.f), 0.f, 1.f, 0.f, ray.spread, ray.o, 0u, 0u, importance};
+    PathState<F> path{.dir = ray.d,
+                      .throughput = Color<F>(1.f),
+                      .cone_spread = ray.spread,
+                      .o = ray.o,
+                      .importance = importance};
     ++counts_.samples;
 
     for (uint32_t depth = 0;; ++depth) {
@@ -98,7 +102,7 @@ class PathTracer {
       SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
       clock_.enter(Phase::kShade);
       bool came_out = false;
-      if (path.pdf < 0.f) {
+      if (path.enters_body) {
         if (!walk(key, depth, path, hit, came_out)) return depth;
         cone_at_origin = path.cone_width;
       }
@@ -203,13 +207,14 @@ class PathTracer {
     }
   }
 
-  /// Continues a ray that has entered a subsurface body (negative `path.pdf`) as a random walk. A
-  /// ray that hits no surface of that body continues unchanged. Sets `came_out` if the walk has
+  /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no surface of that body continues unchanged. Sets `came_out` if the walk has
   /// left the body. Returns false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& came_out) {
-    path.pdf = -path.pdf;
-    const uint32_t object = std::exchange(path.receiver, 0u);
+    path.enters_body = false;
+    path.receiver = 0u;
+    path.cone_width = 0.f;
+    const uint32_t object = path.entry.body;
     if constexpr (Media::kStreams) {
       PresenceKeys keys = rays_.keys();
       keys.object = &object;
@@ -311,15 +316,14 @@ class PathTracer {
     clock_.enter(Phase::kShade);
     const SceneView& scene = context_.scene;
     const auto at = load_row<LightVertexRow, F>(vertices_.chosen, kSlot, true);
-    const auto from = load_row<PathRow, F>(vertices_.paths, kSlot, true);
+    const auto from = load_row<LightPathRow, F>(vertices_.paths, kSlot, true);
     const auto hit = load_row<ShadingRecord, F>(vertices_.records, kSlot, true);
     counts_.add_records(depth, 1);
     if (aovs_.models_cost()) aovs_.add_cost(kSlot, context_.roulette_costs->material(at.material));
     const ConnectionTarget<F> target{offer_.row, at.depth == 0};
     const MeshHit<F> mesh_hit{hit.inst, hit.mesh, hit.prim, hit.u, hit.v, rays_.time()};
     const PathState<F> state =
-        light_path_state<F>(*context_.camera, from.d, from.throughput, from.pdf, from.eta_scale,
-                            from.cone_spread, from.o, from.receiver, hit.t, rays_.time(), true);
+        light_path_state<F>(*context_.camera, from, hit.t, rays_.time(), true);
     const LightPathSetup setup = light_path_setup(context_);
     VertexAovs<F> aovs;
     aovs.wants_events = light_aovs_.wants_events();
@@ -336,7 +340,7 @@ class PathTracer {
     if (rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
       return;
     radiance_.sum += v.direct;
-    aovs_.add_link<F>(depth, kSlot, from.receiver, v.direct, true);
+    aovs_.add_link<F>(depth, kSlot, from.light, v.direct, true);
     if (light_aovs_.wants_events())
       light_aovs_.connect<F>(aovs_.expressions(), kSlot, v.direct, true);
   }

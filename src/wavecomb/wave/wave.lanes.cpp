@@ -43,8 +43,15 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
     queue.slot[i] = i;
     const SampleKey<float> key{i * 0x9e3779b9u, i};
     store_row<PathRow, float>(wave.pool.paths, i,
-                              {Vec3<float>(0.f), d, Color<float>(0.5f), 0.3f, 1.f,
-                               0.01f * context.scene.scale, 0.f, key, 0u},
+                              {.o = Vec3<float>(0.f),
+                               .d = d,
+                               .throughput = Color<float>(0.5f),
+                               .pdf = 0.3f,
+                               .eta_scale = 1.f,
+                               .cone_width = 0.01f * context.scene.scale,
+                               .cone_spread = 0.f,
+                               .key = key,
+                               .receiver = 0u},
                               true);
     store_row<RadianceRow, float>(wave.pool.radiance, i, {}, true);
     if (wave.pool.cold) store_row<PathColdRow, float>(wave.pool.cold, i, {u, 0u, 0.f}, true);

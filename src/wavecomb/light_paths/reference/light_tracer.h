@@ -41,7 +41,7 @@ class LightTracer {
                                ? light_path_time<F>(*context_.settings, start.key, pixel, sample)
                                : 0.f);
     if (light_aovs_.wants_events()) light_aovs_.begin<F>(kOnlySlot, e.light, true);
-    PathState<F> path{e.d, start.flux, start.weight, start.eta_scale, 0.f, 0.f, e.o, e.light};
+    PathState<F> path = start.start();
     for (uint32_t depth = 0;; ++depth) {
       clock_.enter(Phase::kTrace);
       const SingleHit hit = rays_.intersect(path.o, path.dir, kInfinity, depth);
@@ -65,7 +65,7 @@ class LightTracer {
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          bring(pixel, sample, depth, path.receiver, out);
+          bring(pixel, sample, depth, path.light, out);
       }
       if (!v.alive) return;
       path = v.next;
@@ -87,11 +87,9 @@ class LightTracer {
 
   void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,
             uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
-    const PathRow<F> row{path.o,     path.dir, path.throughput, path.pdf, path.eta_scale, 0.f,
-                         path.ratio, key,      path.receiver};
     const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
                                   hit.inst, mesh,  hit.geom, kOnlySlot};
-    if (keep_light_vertex<F>(vertices_, depth, row, record, material, out.p, out.offered) &&
+    if (keep_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material, out.p, out.offered) &&
         light_aovs_.wants_events())
       light_aovs_.keep<F>(kOnlySlot, true);
   }
@@ -102,9 +100,8 @@ class LightTracer {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    const PathState<F> state =
-        light_path_state<F>(*context_.camera, path.dir, path.throughput, path.pdf, path.eta_scale,
-                            path.ratio, path.o, path.receiver, hit.t, rays_.time(), true);
+    const PathState<F> state = light_path_state<F>(
+        *context_.camera, light_path_row<F>(path, key), hit.t, rays_.time(), true);
     return kShadeLightVertex<F>[scene.material_program[material]](
         {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, &aovs, true},
         setup_, nullptr);

@@ -67,7 +67,7 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
     add_radiance<F>(wave.pool.radiance, slot, c, active);
     if (wave.aovs.wants_links()) [[unlikely]] {
       const auto light =
-          gather_field<F>(wave.light_vertices.paths, &PathRow<float>::receiver, slot, active);
+          gather_field<F>(wave.light_vertices.paths, &LightPathRow<float>::light, slot, active);
       wave.aovs.add_link<F>(depth, slot, light, c, active);
       if (wave.light_aovs.wants_events())
         wave.light_aovs.connect<F>(wave.aovs.expressions(), slot, c, active);

@@ -31,10 +31,8 @@ void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task
       scatter_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot,
                        light_path_time<F>(settings, path.key, pixel, sample), active);
     const Emission<F>& e = path.emission;
-    store_row<PathRow, F>(
-        wave.pool.paths, slot,
-        {e.o, e.d, path.flux, path.weight, path.eta_scale, F(0.f), F(0.f), path.key, e.light},
-        e.valid);
+    store_row<LightPathRow, F>(wave.pool.paths, slot, light_path_row<F>(path.start(), path.key),
+                               e.valid);
     if (wave.light_aovs.wants_events()) [[unlikely]]
       wave.light_aovs.begin<F>(slot, e.light, e.valid);
     const Mask<U> on(e.valid);

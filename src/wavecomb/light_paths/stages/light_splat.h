@@ -63,7 +63,7 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
     add_splat(context, wave.splats, task.first_sample + q.slot[i] % task.samples, x, y, c);
     if (wave.light_aovs) [[unlikely]] {
       const auto light =
-          gather_field<float>(wave.pool.paths, &PathRow<float>::receiver, q.slot[i], true);
+          gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
       wave.light_aovs.show(*context.film, *context.splat_filter, q.slot[i], depth, light, x, y, c);
     }
   }

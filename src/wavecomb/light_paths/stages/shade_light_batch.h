@@ -41,10 +41,9 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
     MeshHit<F> hit{r.inst, r.mesh, r.prim, r.u, r.v};
     if (context.moves()) [[unlikely]]
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, r.slot, active);
-    const auto path = load_row<PathRow, F>(connects ? vertices.paths : pool.paths, r.slot, active);
-    const PathState<F> state =
-        light_path_state<F>(camera, path.d, path.throughput, path.pdf, path.eta_scale,
-                            path.cone_spread, path.o, path.receiver, r.t, hit.time, active);
+    const auto path =
+        load_row<LightPathRow, F>(connects ? vertices.paths : pool.paths, r.slot, active);
+    const PathState<F> state = light_path_state<F>(camera, path, r.t, hit.time, active);
     ConnectionTarget<F> target;
     if (connects)
       target = {
@@ -77,10 +76,7 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
            connects ? U(0u) : float_bits<F>(out.y)},
           v.has_shadow);
     if (any(v.alive))
-      store_row<PathRow, F>(pool.paths, r.slot,
-                            {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
-                             F(0.f), v.next.ratio, path.key, v.next.receiver},
-                            v.alive);
+      store_row<LightPathRow, F>(pool.paths, r.slot, light_path_row<F>(v.next, path.key), v.alive);
     ++wave.counts.packets;
     wave.counts.packet_lanes += kWidth<F>;
   }

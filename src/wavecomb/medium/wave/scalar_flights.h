@@ -13,10 +13,7 @@ Flight<float> Volumes::fly_inside(const SampleKey<float>& key, uint32_t depth, S
   using F = float;
   // A wave with one path.
   alignas(64) float row[kRowWords<PathRow>], place[kRowWords<InsideRow>];
-  store_row<PathRow, F>(
-      row, 0u,
-      {path.o, path.dir, path.throughput, path.pdf, path.eta_scale, 0.f, 0.f, key, path.receiver},
-      true);
+  store_row<PathRow, F>(row, 0u, path_row<false, F>(path, key), true);
   store_row<InsideRow, F>(place, 0u, inside, true);
   float o[3] = {path.o.x, path.o.y, path.o.z}, d[3] = {path.dir.x, path.dir.y, path.dir.z};
   float t = kInfinity, ratio[3] = {1, 1, 1}, absorbed[3] = {1, 1, 1}, scratch[2];

@@ -39,7 +39,7 @@ class WalksBelow {
             bool& came_out) const {
     Walkers walkers(walks_);
     walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput,
-                                         std::exchange(path.cone_width, 0.f)),
+                                         path.entry.normal),
                        0u, 0u, time, true);
     enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
     if (walkers.size() == 0) {
@@ -100,10 +100,9 @@ class WalksBelow {
       const U slot = load<U>(q.slot + i);
       store(exits + i, U(0u));
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, active);
-      const Mask<F> below = active & (path.pdf < 0.f);
+      const Mask<F> below = active & path.enters_body();
       if (none(below)) continue;
-      path.pdf = abs(path.pdf);
-      const F normal = std::exchange(path.cone_width, F(0.f));
+      const UInt<F> normal = path.take_entry().normal;
       store_row<PathRow, F>(wave.pool.paths, slot, path, below);
       const F time = scene.has_motion
                          ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, slot, below)
@@ -114,6 +113,7 @@ class WalksBelow {
     }
     if (walkers.size() == 0) return;
     PresenceKeys keys = presence_keys(wave.pool, depth, false);
+    // Holds BodyEntry::body (PathRow::take_entry).
     keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
     const auto leave = [&](const Mask<F>& lanes, const U& slot) {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
@@ -145,14 +145,14 @@ class WalksBelow {
   template <typename F>
   static Walk<F> begin_walk(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth,
                             const Vec3<F>& o, const Vec3<F>& d, const Color<F>& throughput,
-                            const F& cone_width) {
+                            const UInt<F>& entry_normal) {
     using U = UInt<F>;
     const Way<F> way(sampler, key, depth, VertexSet::kFlight);
     const Color<F> none(F(0.f));
     return {o,          d,
             throughput, F(throughput.x + throughput.y + throughput.z),
             F(0.f),     way.branch(0x51ee9u).seed,
-            U(0u),      float_bits<F>(cone_width),
+            U(0u),      entry_normal,
             way.r.y,    way.r.z,
             U(0u),      none,
             none};

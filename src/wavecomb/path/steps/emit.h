@@ -63,7 +63,7 @@ inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& sett
   if (scene.lights.sends_paths()) [[unlikely]]
     w = joint_bounce_weight<F>(
         path.pdf, hit.pdf, not_(Mask<F>(path.pdf > 0.f)),
-        F(path.joined() * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
+        F(path.ratio * emission_density<F>(scene.lights, light, path.o, path.dir, t, active)));
   if (scene.lights.has_effects) [[unlikely]]
     hit.radiance = hit.radiance * LightEffect<F>(scene.lights, light, active)
                                       .of_hit(not_(path.pdf > 0.f), depth == 0, path.diffuse);
@@ -110,7 +110,7 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
     if constexpr ((kFeatures & kJoined) != 0)
       if (v.joins_light() && v.depth > 0) [[unlikely]] {
         const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
-        others = v.path.joined() * emission_density<F>(scene.lights, base + v.hit.prim, v.path.o,
+        others = v.path.ratio * emission_density<F>(scene.lights, base + v.hit.prim, v.path.o,
                                                        v.path.dir, v.t, known);
       }
   }

@@ -16,7 +16,7 @@ inline Color<F> environment_emission(const SceneView& scene, const ShadeSettings
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> le =
       escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active, depth == 0,
-                          path.link, path.joined(), path.time, path.diffuse);
+                          path.link, path.ratio, path.time, path.diffuse);
   return clean<F>(path.throughput * le, clamp_limit(settings, depth));
 }
 
@@ -27,7 +27,7 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
   const Mask<F> delta = not_(Mask<F>(path.pdf > 0.f));
   const Color<F> all =
       path.throughput * escaped_radiance<F>(scene.lights, path.o, path.dir, path.pdf, delta, active,
-                                            depth == 0, path.link, path.joined(), path.time,
+                                            depth == 0, path.link, path.ratio, path.time,
                                             path.diffuse);
   const Mask<F> ok = active & is_finite(all.x) & is_finite(all.y) & is_finite(all.z);
   const float limit = clamp_limit(settings, depth);
@@ -37,7 +37,7 @@ inline void split_environment(const SceneView& scene, const ShadeSettings& setti
     if (!is_wanted(i)) continue;
     const Color<F> le =
         infinite_light_radiance<F>(scene.lights, i, path.o, path.dir, path.pdf, delta, active,
-                                   depth == 0, path.link, path.joined(), path.time, path.diffuse);
+                                   depth == 0, path.link, path.ratio, path.time, path.diffuse);
     add(i, select<F>(ok, path.throughput * le * scale, Color<F>(F(0.f))));
   }
 }

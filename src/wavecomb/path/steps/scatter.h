@@ -46,21 +46,17 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
     out.next.diffuse = diffuse_share<F>(at.bsdf, seen, b);
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
-    // Marks rays that enter a subsurface body for medium/subsurface/random_walk.h.
-    const Mask<F> enters = at.bsdf.enters(wo, b.wi);
-    out.next.pdf = select(enters, F(-out.next.pdf), out.next.pdf);
-    out.next.receiver =
-        select(Mask<UInt<F>>(enters), object_of(v.hit.inst, v.hit.mesh), out.next.receiver);
-    const Vec3<F> outwards = select<F>(wo.z < 0.f, -frame.n, frame.n);
-    out.next.cone_width =
-        select(enters, bits_float<F>(pack_normal<F>(outwards)), out.next.cone_width);
+    // For medium/subsurface/random_walk.h.
+    out.next.enters_body = at.bsdf.enters(wo, b.wi) & (out.next.pdf > 0.f);
+    out.next.entry = {object_of(v.hit.inst, v.hit.mesh),
+                      pack_normal<F>(select<F>(wo.z < 0.f, -frame.n, frame.n))};
   }
   // A rough bounce widens the ray cone: the half width of the lobe is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     if (v.joins_light()) [[unlikely]]
-      out.next.ratio = next_ratio<Bsdf, F>(v, at, joint, wo, d, b);
+      next_ratio<Bsdf, F>(v, at, joint, wo, d, b, out.next);
   const F largest = max_component(out.next.throughput);
   out.alive =
       v.active & (b.pdf > 0.f) & at.is_consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);

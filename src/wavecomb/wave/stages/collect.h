@@ -121,12 +121,11 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
         shape = shape & through;
         surface = surface & through;
       }
-      state = {path.d, path.throughput, path.pdf, path.eta_scale,
-               F(0.f), F(0.f),          path.o,   path.receiver};
+      state = path_state<F>(path, t);
       if (context.links() && depth > 0)
         state.link = gather_field<F>(wave.pool.cold, &PathColdRow<float>::link, slot, wanted);
       if (context.joins_light() && depth > 0)
-        state.ratio = gather<F>(wave.pool.ratio, slot, wanted);
+        unpack_ratio<F>(gather<F>(wave.pool.ratio, slot, wanted), state);
       if (wave.pool.diffuse && depth > 0) [[unlikely]]
         state.diffuse = load_row<RadianceRow, F>(wave.pool.diffuse, slot, wanted).sum;
       if (scene.lights.motions) [[unlikely]]

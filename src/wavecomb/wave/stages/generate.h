@@ -44,10 +44,17 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
                        active);
     const CameraRay<F> ray =
         camera_ray<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)), r, active, time);
-    store_row<PathRow, F>(
-        pool.paths, slot,
-        {ray.o, ray.d, Color<F>(F(1.f)), F(0.f), F(1.f), ray.width, ray.spread, key, UInt<F>(0u)},
-        active);
+    store_row<PathRow, F>(pool.paths, slot,
+                          {.o = ray.o,
+                           .d = ray.d,
+                           .throughput = Color<F>(F(1.f)),
+                           .pdf = F(0.f),
+                           .eta_scale = F(1.f),
+                           .cone_width = ray.width,
+                           .cone_spread = ray.spread,
+                           .key = key,
+                           .receiver = UInt<F>(0u)},
+                          active);
     wave.aovs.begin<F>(camera, r, slot, active);
     store(rays.ox + i, ray.o.x);
     store(rays.oy + i, ray.o.y);

@@ -43,14 +43,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       hit.time = gather_field<F>(pool.cold, &PathColdRow<float>::time, slot, active);
     const auto path = load_row<PathRow, F>(pool.paths, slot, active);
     const F t = r.t;
-    PathState<F> state{path.d,
-                       path.throughput,
-                       path.pdf,
-                       path.eta_scale,
-                       fma(path.cone_spread, t, path.cone_width),
-                       path.cone_spread,
-                       path.o,
-                       path.receiver};
+    PathState<F> state = path_state<F>(path, t);
     if (links && context.scene.mesh_lights && depth > 0) [[unlikely]]
       state.link = gather_field<F>(pool.cold, &PathColdRow<float>::link, slot, active);
     if (V::has(kMeshLights) && context.scene.mesh_lights && pool.diffuse && depth > 0) [[unlikely]]
@@ -58,7 +51,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     if (context.weighs_pixels()) [[unlikely]]
       state.importance = gather_field<F>(pool.cold, &PathColdRow<float>::importance, slot, active);
     if (joins) [[unlikely]]
-      state.ratio = gather<F>(pool.ratio, slot, active);
+      unpack_ratio<F>(gather<F>(pool.ratio, slot, active), state);
     const bool knows_inside = V::has(kInside) && pool.inside;
     if (knows_inside) [[unlikely]] {
       state.outer = gather_field<F>(pool.inside, &InsideRow<float>::outer, slot, active);
@@ -121,12 +114,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       if (pool.diffuse) [[unlikely]]
         store_row<RadianceRow, F>(pool.diffuse, slot, {v.next.diffuse}, v.alive);
     if (any(v.alive))
-      store_row<PathRow, F>(pool.paths, slot,
-                            {v.next.o, v.next.dir, v.next.throughput, v.next.pdf, v.next.eta_scale,
-                             v.next.cone_width, v.next.cone_spread, path.key, v.next.receiver},
-                            v.alive);
+      store_row<PathRow, F>(
+          pool.paths, slot,
+          path_row<(kFeatures & kBelow) != 0 && Bsdf::kWalks, F>(v.next, path.key), v.alive);
     if (joins) [[unlikely]]
-      scatter<F>(pool.ratio, v.next.ratio, slot, v.alive);
+      scatter<F>(pool.ratio, pack_ratio<F>(v.next), slot, v.alive);
     if (knows_inside) [[unlikely]]
       scatter_field<F>(pool.inside, &InsideRow<float>::crossed, slot, v.crossed, active);
     if (links) scatter_field<F>(pool.cold, &PathColdRow<float>::link, slot, v.next.link, v.alive);
