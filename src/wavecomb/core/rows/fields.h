@@ -122,7 +122,7 @@ inline constexpr size_t kRowWords = std::bit_ceil(kFieldWords<Row>);
 /// reduce it to a constant.
 template <typename Record, typename Member>
 WAVECOMB_INLINE uint32_t word_of(Member Record::* member) {
-  static_assert(std::is_standard_layout_v<Record>);
+  static_assert(std::is_trivially_copyable_v<Record>);
   static constexpr Record kRecord{};
   const auto address = [](const auto& of) { return reinterpret_cast<const std::byte*>(&of); };
   return static_cast<uint32_t>((address(kRecord.*member) - address(kRecord)) / 4);

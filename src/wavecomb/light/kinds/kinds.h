@@ -10,6 +10,7 @@
 #include <concepts>
 #include <cstdint>
 
+#include "wavecomb/light/description/kind_info.h"
 #include "wavecomb/light/kinds/cylinder.h"
 #include "wavecomb/light/kinds/disk.h"
 #include "wavecomb/light/kinds/distant.h"

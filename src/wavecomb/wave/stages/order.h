@@ -6,6 +6,7 @@
 #include "wavecomb/core/morton.h"
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/geometry/hit/uv.h"
+#include "wavecomb/material/description/variants.h"
 #include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
