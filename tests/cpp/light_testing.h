@@ -4,9 +4,9 @@
 
 #include <optional>
 
-#include "wavecomb/light/escape.h"
-#include "wavecomb/light/light.h"
-#include "wavecomb/scene/light_builder.h"
+#include "wavecomb/light/description/light_builder.h"
+#include "wavecomb/light/sampling/escape.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb::light_testing {
 

@@ -7,7 +7,7 @@
 #include "curve_testing.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/denormals.h"
-#include "wavecomb/integrate/stages/order_rays.h"
+#include "wavecomb/wave/stages/order_rays.h"
 
 namespace wavecomb {
 namespace {

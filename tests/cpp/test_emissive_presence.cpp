@@ -7,7 +7,7 @@
 #include "scene_testing.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/warp.h"
-#include "wavecomb/light/light.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb {
 namespace {

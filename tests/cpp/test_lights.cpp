@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lights: both techniques of MIS, closed forms of irradiance, textured lights, and lanes.
 /// test_light_samples.cpp has the chi-square tests.
-#include "wavecomb/light/light.h"
+#include "wavecomb/light/sampling/light_sample.h"
 
 #include <functional>
 

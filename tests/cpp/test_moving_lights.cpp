@@ -6,9 +6,9 @@
 
 #include "lane_testing.h"
 #include "light_tree_testing.h"
-#include "wavecomb/light/light.h"
-#include "wavecomb/scene/light_cluster.h"
-#include "wavecomb/scene/light_motion.h"
+#include "wavecomb/light/description/motion.h"
+#include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/light/tree/light_cluster.h"
 
 namespace wavecomb {
 namespace {

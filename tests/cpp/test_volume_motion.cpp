@@ -2,8 +2,8 @@
 // Volumes that move by their velocity fields: lookup positions and bounds.
 #include "lane_testing.h"
 #include "volume_testing.h"
-#include "wavecomb/medium/volume_emission.h"
-#include "wavecomb/scene/volume_motion.h"
+#include "wavecomb/medium/description/volume_motion.h"
+#include "wavecomb/medium/volume/volume_emission.h"
 
 namespace wavecomb {
 namespace {

@@ -5,10 +5,10 @@
 #include "lane_testing.h"
 #include "volume_testing.h"
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/medium/henyey_greenstein.h"
-#include "wavecomb/medium/tracking.h"
-#include "wavecomb/medium/volume_bsdf.h"
-#include "wavecomb/medium/volume_emission.h"
+#include "wavecomb/medium/volume/henyey_greenstein.h"
+#include "wavecomb/medium/volume/tracking.h"
+#include "wavecomb/medium/volume/volume_bsdf.h"
+#include "wavecomb/medium/volume/volume_emission.h"
 
 namespace wavecomb {
 namespace {

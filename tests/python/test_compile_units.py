@@ -18,9 +18,9 @@ from wavecomb import _core
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "editable"
 HEADERS = ROOT / "src" / "wavecomb" / "material" / "programs"
-PROGRAMS = ROOT / "src" / "wavecomb" / "scene" / "programs.h"
-MATRIX = ROOT / "src" / "wavecomb" / "integrate" / "kernel_matrix.h"
-VARIANTS = ROOT / "src" / "wavecomb" / "scene" / "material_parts.h"
+PROGRAMS = ROOT / "src" / "wavecomb" / "material" / "description" / "programs.h"
+MATRIX = ROOT / "src" / "wavecomb" / "wave" / "kernels" / "kernel_matrix.h"
+VARIANTS = ROOT / "src" / "wavecomb" / "material" / "description" / "variants.h"
 
 
 @pytest.fixture(scope="module")
@@ -86,9 +86,10 @@ def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], prog
     assert units_of[program] == expected
 
 
-BODIES = ("learn/guide.inl", "graph/run.inl", "graph/hit_point.inl", "texture/lookup.inl",
-          "surface/inputs.inl", "surface/motion.inl", "light/light.inl", "light/emission.inl",
-          "curve/surface.inl")  # fmt: skip
+BODIES = ("guiding/lookup.inl", "graph/run.inl", "material/inputs/graph_inputs.inl",
+          "texture/lookup.inl", "material/inputs/inputs.inl", "geometry/hit/motion.inl",
+          "light/sampling/light_sample.inl", "light/emission/emission.inl",
+          "geometry/hit/curve_surface.inl")  # fmt: skip
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -97,6 +98,6 @@ def test_a_shared_body_is_compiled_once_per_width(
 ) -> None:
     units = {unit for unit in units_with[body] if "/tests/" not in unit}
     widths = {1, *_core.lane_widths()}
-    few = {"learn/guide.inl": 1, "texture/lookup.inl": 1, "graph/run.inl": 1}
+    few = {"guiding/lookup.inl": 1, "texture/lookup.inl": 1, "graph/run.inl": 1}
     assert units >= {f"all_shared_{width}.cpp.o" for width in widths}
     assert len(units) <= len(widths) + few.get(body, 0), units

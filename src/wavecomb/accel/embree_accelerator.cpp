@@ -10,7 +10,7 @@
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/embree_hierarchy.h"
 #include "wavecomb/accel/triangle_list.h"
-#include "wavecomb/curve/clumps.h"
+#include "wavecomb/geometry/curve/bvh_nodes.h"
 
 namespace wavecomb {
 namespace {

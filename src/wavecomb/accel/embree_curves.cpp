@@ -7,7 +7,7 @@
 
 #include "wavecomb/accel/embree_filters.h"
 #include "wavecomb/accel/presence.h"
-#include "wavecomb/curve/intersect.h"
+#include "wavecomb/geometry/curve/intersect.h"
 
 namespace wavecomb {
 namespace {

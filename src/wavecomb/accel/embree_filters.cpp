@@ -5,7 +5,7 @@
 
 #include "wavecomb/accel/light_shapes.h"
 #include "wavecomb/accel/presence.h"
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/curve/ray.h"
+#include "wavecomb/geometry/curve/ray.h"
 
 namespace wavecomb {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "wavecomb/core/hash.h"
-#include "wavecomb/curve/splat.h"
-#include "wavecomb/surface/hit.h"
-#include "wavecomb/surface/presence.h"
-#include "wavecomb/surface/uv.h"
+#include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
+#include "wavecomb/geometry/hit/hit_material.h"
+#include "wavecomb/geometry/hit/uv.h"
+#include "wavecomb/material/inputs/presence.h"
 
 namespace wavecomb {
 namespace {
@@ -70,9 +70,11 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
   const auto& materials = scene.material_part()->shaded;
   std::vector<uint8_t> fibres(geometry.meshes.size(), 0);
   if (std::none_of(materials.begin(), materials.end(),
-                   [](const Material& m) { return m.program == ProgramId::kHair; }))
+                   [](const Material& m) { return has_trait(m.program, program_trait::kFibre); }))
     return fibres;
-  const auto is_other = [&](uint32_t m) { return materials[m].program != ProgramId::kHair; };
+  const auto is_other = [&](uint32_t m) { 
+    return !has_trait(materials[m].program, program_trait::kFibre);
+  };
   // Materials that meshes without one inherit from their instances; the world is instance 0.
   std::vector<uint8_t> group_hands_on(geometry.groups.size(), 0), mesh_gets(fibres.size(), 0);
   for (size_t i = 0; i < geometry.instance_records.size(); ++i)
@@ -104,7 +106,8 @@ bool is_present(const SceneView& scene, uint32_t instance, uint32_t mesh, uint32
                     keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[instance].material, mesh, prim, true);
-  // The transmittance of shadow rays handles medium boundaries separately (medium/interiors.h).
+  // The transmittance of shadow rays handles medium boundaries separately
+  // (medium/nested/nested_media.h).
   if (keys.ray_kind == kSeenByShadowRays && scene.interiors.is_bound(material)) return false;
   if (!has_presence<float>(scene.materials, material, true)) return true;
   const Vec2<float> uv = hit_uv<float>(scene.meshes, mesh, prim, u, v, true);

@@ -10,7 +10,7 @@
 
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/frame.h"
-#include "wavecomb/core/lanes.h"
+#include "wavecomb/core/lanes/lanes.h"
 
 namespace wavecomb {
 namespace {

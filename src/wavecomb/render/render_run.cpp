@@ -11,9 +11,9 @@
 
 #include "wavecomb/core/task_order.h"
 #include "wavecomb/film/error_map.h"
-#include "wavecomb/render/pick.h"
-#include "wavecomb/render/process_memory.h"
+#include "wavecomb/render/inspection/picking.h"
 #include "wavecomb/render/snapshot.h"
+#include "wavecomb/render/statistics/process_memory.h"
 
 namespace wavecomb {
 namespace {

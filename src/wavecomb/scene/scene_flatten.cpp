@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
-#include "wavecomb/scene/contents.h"
-#include "wavecomb/scene/interior.h"
+#include "wavecomb/medium/description/glass_contents.h"
+#include "wavecomb/medium/description/mesh_medium.h"
 #include "wavecomb/scene/parallel.h"
 #include "wavecomb/scene/scene.h"
 #include "wavecomb/scene/scene_checks.h"
@@ -155,7 +155,7 @@ std::shared_ptr<const Scene> SceneBuilder::build() {
   // A material for the exit points of subsurface random walks.
   if (std::ranges::any_of(materials_, [](const Material& m) {
         const Vec3<float>& r = m.openpbr.subsurface_radius;
-        return m.program == ProgramId::kOpenPbr && std::max({r.x, r.y, r.z}) > 0;
+        return has_trait(m.program, program_trait::kSubsurface) && std::max({r.x, r.y, r.z}) > 0;
       })) {
     geometry->exit_material = static_cast<uint32_t>(materials_.size());
     Material white = fallback;
