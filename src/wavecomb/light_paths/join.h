@@ -151,8 +151,8 @@ WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Inter
 /// Sets R after the bounce `b` along `world`, and whether the path awaits a merge.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE void next_ratio(const Vertex<F, kFeatures>& v, const Interaction& at,
-                             const JointVertex<F>& joint, const Vec3<F>& wo, const Vec3<F>& world,
-                             const BsdfSample<F>& b, PathState<F>& next) {
+                                const JointVertex<F>& joint, const Vec3<F>& wo,
+                                const Vec3<F>& world, const BsdfSample<F>& b, PathState<F>& next) {
   const Mask<F> by_pdf = not_(b.is_delta) & (b.pdf > 0.f);
   const F by_density = joint.template towards<Bsdf>(v, at, wo, world, b.wi, by_pdf) /
                        select(b.pdf > 0.f, b.pdf, F(1.f));
