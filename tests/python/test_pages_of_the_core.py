@@ -47,7 +47,9 @@ def test_files_exist(page: str) -> None:
         name = word.rpartition("/")[2]
         if re.fullmatch(r"[\w./-]+\.(h|inl|cpp|in|py|toml|txt)", word) and name not in MADE_UP:
             places = (CORE / word, ROOT / word, ROOT / "tests" / "cpp" / word)
-            is_name = "/" not in word and any(CORE.rglob(word))
+            is_name = "/" not in word and any(
+                any(folder.rglob(word)) for folder in (CORE, ROOT / "tests")
+            )
             assert is_name or any(path.exists() for path in places), f"{page}: {word}"
 
 
