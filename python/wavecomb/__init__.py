@@ -5,7 +5,7 @@
 >>> picture = wavecomb.render("mixed.usdc", size=(600, 600), spp=64)  # doctest: +SKIP
 >>> picture.save("mixed.exr")  # doctest: +SKIP
 
-Names are imported when they are first used, so that ``import wavecomb`` costs next to nothing.
+Names are imported on first use, so that ``import wavecomb`` itself is fast.
 """
 
 from __future__ import annotations

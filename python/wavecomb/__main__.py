@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``python -m wavecomb`` is the command ``wavecomb``."""
+"""Runs the command ``wavecomb`` for ``python -m wavecomb``."""
 
 from wavecomb.cli import main
 

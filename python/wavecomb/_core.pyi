@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The native core: scenes in, pictures out.
+"""The native core, which builds and renders scenes.
 
-Arrays are NumPy arrays and are not copied where said so.
+Arrays are NumPy arrays; functions say where they do not copy them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,26 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 INHERIT_MATERIAL: int
-"""Material id that means "what the instance says"."""
+"""Material id that means the material of the instance."""
 
 class Error(ValueError):
-    """Bad input; one line that names the object and says what to do."""
+    """Invalid input; the one-line message names the object and says what to do."""
 
 class VolumeGrid:
-    """Voxels in bricks of 8 x 8 x 8, and where they are.
+    """Voxels in bricks of 8 x 8 x 8, with their transform.
 
     Args:
-        origins: (n, 3): index of the first voxel of each brick; multiples of 8, each once.
-        values: float16 or float32, (n, 8, 8, 8) or (n, 8, 8, 8, 3): ``values[b, i, j, k]`` is
-            voxel ``origins[b] + (i, j, k)``. A voxel's value is that at its index; between them it
-            is linear in x, y and z.
-        index_to_object: (4, 4), from indices to the volume's own space, as USD has it (rows).
-        background: Where there is no brick.
-        name: For messages.
-        is_signed: Values may be below 0: velocities.
+        origins: (n, 3) index of the first voxel of each brick; distinct multiples of 8.
+        values: float16 or float32, (n, 8, 8, 8) or (n, 8, 8, 8, 3): ``values[b, i, j, k]`` is voxel
+            ``origins[b] + (i, j, k)``. The value applies at the voxel's index; between indices it
+            is interpolated linearly in x, y and z.
+        index_to_object: (4, 4) transform from indices to object space, for row vectors.
+        background: Value outside of all bricks.
+        name: Name for messages.
+        is_signed: Whether values may be negative, as velocities are.
 
-    Raises Error for values that are negative or not finite, bricks that are doubled or not at
-    multiples of 8, and grids too large to be numbered.
+    Raises Error for values that are negative or not finite, for bricks that are duplicated or not
+    at multiples of 8, and for grids with too many bricks.
     """
 
     def __init__(
@@ -44,7 +44,10 @@ class VolumeGrid:
     ) -> None: ...
     @property
     def bricks(self) -> int:
-        """Those that are kept: with a border, and without those that are background."""
+        """Number of stored bricks, which have a border.
+
+        Bricks that equal the background are omitted.
+        """
     @property
     def bytes(self) -> int: ...
 
@@ -53,10 +56,10 @@ class Scene:
 
     @property
     def triangles(self) -> int:
-        """Triangles of all meshes, each counted once."""
+        """Number of triangles of all meshes, each counted once."""
     @property
     def instanced_triangles(self) -> int:
-        """Triangles as seen, every instance counted."""
+        """Number of triangles with every instance counted."""
     @property
     def curve_segments(self) -> int: ...
     @property
@@ -65,7 +68,7 @@ class Scene:
     def splats(self) -> int: ...
     @property
     def mesh_count(self) -> int:
-        """Meshes, and prims of curves, points and splats."""
+        """Number of meshes and of prims with curves, points and splats."""
     @property
     def instance_count(self) -> int: ...
     @property
@@ -75,7 +78,7 @@ class Scene:
     def light_count(self) -> int: ...
     @property
     def lights(self) -> list[tuple[str, str]]:
-        """(name, kind) of every light but emissive meshes."""
+        """(name, kind) of every light except emissive meshes."""
     @property
     def materials(self) -> list[tuple[str, str]]:
         """(name, program) of every material."""
@@ -83,27 +86,32 @@ class Scene:
     def textures(self) -> list[tuple[str, int]]:
         """(name, bytes) of every texture."""
     def fingerprint(self, arrays: bool = True) -> dict[str, str]:
-        """Hashes of what decides over the picture, and of names: geometry, materials, textures,
-        lights, camera, names.
+        """Returns hashes of everything that affects the image, and of names.
 
-        arrays: geometry and textures, too, of which every byte is read."""
+        The keys are geometry, materials, textures, lights, camera and names. ``arrays`` includes
+        geometry and textures, which requires reading all of their bytes.
+        """
     @property
     def camera(self) -> dict[str, Any]:
-        """As set_camera takes it, but for motion; its transform is to_world (4, 4)."""
+        """Arguments of set_camera without motion; the transform is to_world (4, 4)."""
     def material(self, material: int) -> dict[str, Any]:
-        """name, program and parameters of a material as add_material takes them; its textures with
-        their names as well; driven: names of parameters that a graph computes. Raises Error for an
-        id that is not there."""
+        """Returns name, program and parameters of a material in the form of add_material.
+
+        Includes the names of its textures, and driven: names of parameters that a graph computes.
+        Raises Error if the id does not exist.
+        """
     def light(self, light: int) -> dict[str, Any]:
-        """name, kind, transform and parameters of a light as add_light takes them, its group by
-        name; texture: the name of its texture, or None. Raises Error for an index that is not
-        there."""
+        """Returns name, kind, transform and parameters of a light in the form of add_light.
+
+        The group is given by name; texture is the name of its texture, or None. Raises Error if the
+        index does not exist.
+        """
     @property
     def light_groups(self) -> list[str]:
-        """Names; the first, "other", is of lights without a group."""
+        """Names of light groups; the first, "other", contains lights without a group."""
     @property
     def object_names(self) -> list[tuple[str, str]]:
-        """(object, asset) as Cryptomatte names them: meshes instance by instance, then lights."""
+        """(object, asset) names for Cryptomatte: of meshes instance by instance, then of lights."""
     @property
     def moves(self) -> bool:
         """Whether a mesh, an instance or the camera moves while the shutter is open."""
@@ -114,33 +122,33 @@ class Scene:
     def bounds_of(
         self, prim: str
     ) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
-        """World bounds of the meshes that are a prim or are in it; None where there are none."""
+        """Returns the world bounds of the meshes at and below a prim; None if there are none."""
 
 class TextureStore:
-    """Keeps the textures of scenes within a limit of memory, and the rest in a temporary file."""
+    """Limits the memory of textures and swaps the rest to a temporary file."""
 
     def __init__(self, limit_bytes: int, folder: str) -> None:
-        """``folder``: for the file, made when textures do not fit. Raises Error."""
+        """``folder`` is for the file, which is created when textures do not fit. Raises Error."""
     @staticmethod
     def obstacle() -> str:
-        """Why this system can have none; "" where it can."""
+        """Returns the reason why this system cannot have a store, or ""."""
     @property
     def limit_bytes(self) -> int: ...
     def set_waiting(self, bytes: int) -> None:
-        """Says that images of so many bytes lie ready to become textures: they count."""
+        """Counts images of this total size, which will become textures, towards the limit."""
     @property
     def statistics(self) -> dict[str, float]:
-        """``texture_store`` of docs/statistics.md, as it is now."""
+        """Current values of ``texture_store`` in docs/statistics.md."""
 
 class SceneBuilder:
-    """Collects a scene; ids are handed out from 0 in order.
+    """Collects the objects of a scene; ids start at 0 and increase in order of calls.
 
-    Transforms are in USD's row-vector convention (translation in the last row),
-    float64 or float32, shape (4, 4).
+    Transforms follow USD's row-vector convention (translation in the last row), float64 or float32,
+    shape (4, 4).
     """
 
     def __init__(self, threads: int = 0, store: TextureStore | None = None) -> None:
-        """``store``: keeps the textures that are added; None: they are in memory."""
+        """``store`` limits the memory of added textures; None keeps all in memory."""
     def add_texture(
         self,
         pixels: NDArray[Any],
@@ -150,10 +158,10 @@ class SceneBuilder:
         wrap_t: str = "repeat",
         name: str = "",
     ) -> int:
-        """Pixels (height, width, 1 to 4 channels): uint8, float16 or float32, top row first.
+        """Adds an image (height, width, 1 to 4 channels): uint8, float16 or float32, top row first.
 
-        wrap: repeat, clamp, mirror, black. srgb matters for uint8 only.
-        Tiled and mip-mapped inside.
+        Wrap modes are repeat, clamp, mirror and black. ``srgb`` matters for uint8 only. The texture
+        is stored in tiles with mip levels.
         """
     def add_tiles(
         self,
@@ -161,13 +169,13 @@ class SceneBuilder:
         tiles: list[tuple[int, int]],
         missing: tuple[float, ...],
     ) -> int:
-        """Texture id of a UDIM texture of textures that were added: (tile number, texture id).
+        """Adds a UDIM texture from added textures: (tile number, texture id).
 
-        ``missing``: linear r, g, b, alpha where there is no tile.
+        ``missing`` is the linear r, g, b and alpha of missing tiles.
         """
 
     def share_texture(self, scene: Scene, texture: int) -> int:
-        """Adds a texture of another scene, by its id there, without a copy. Raises Error."""
+        """Adds a texture of another scene by its id there, without a copy. Raises Error."""
     def add_graph(
         self,
         ops: bytes,
@@ -176,10 +184,12 @@ class SceneBuilder:
         outputs: Sequence[tuple[int, int]],
         attributes: Sequence[str] = (),
     ) -> int:
-        """A value graph, for ``add_material``: operations of 16 bytes as GraphOp in
-        graph/graph.h has them, images as (texture, stretch), outputs as (component of
-        GRAPH_PARAMETERS, operand), names of attributes of meshes. Raises Error for one that reads
-        what is not there."""
+        """Adds a value graph for ``add_material``.
+
+        ``ops`` are operations of 16 bytes, as GraphOp of graph/graph.h; ``images`` are (texture,
+        stretch); ``outputs`` are (component of GRAPH_PARAMETERS, operand); ``attributes`` are names
+        of mesh attributes. Raises Error for a graph that refers to missing objects.
+        """
     def add_material(
         self,
         program: str,
@@ -214,21 +224,23 @@ class SceneBuilder:
         opacity_graph: int | None = None,
         emission_graph: int | None = None,
     ) -> int:
-        """Programs: diffuse, metal, dielectric, plastic, emissive, principled, openpbr.
+        """Programs: diffuse, metal, dielectric, plastic, emissive, principled, openpbr, hair.
 
         textures: slot -> {"texture": id, "channel": "rgb"|"r"|"g"|"b"|"a", "scale": 4 floats,
-        "bias": 4 floats, "uv": 6 floats}; value = texel * scale + bias at
-        u' = uv[0] u + uv[1] v + uv[2], v' = uv[3] u + uv[4] v + uv[5]. Slots: base_color,
-        specular_color, emission, roughness, metallic, clearcoat, clearcoat_roughness, opacity,
-        normal (tangent space, value already in [-1, 1] after scale and bias).
-        For a metal: base_color is the reflectance at normal incidence, specular_color the tint at
-        82 degrees (black: none given, untinted).
+        "bias": 4 floats, "uv": 6 floats}; value = texel * scale + bias at u' = uv[0] u + uv[1] v +
+        uv[2], v' = uv[3] u + uv[4] v + uv[5]. Slots: base_color, specular_color, emission,
+        roughness, metallic, clearcoat, clearcoat_roughness, opacity, normal (tangent space, value
+        in [-1, 1] after scale and bias).
+
+        For a metal, base_color is the reflectance at normal incidence and specular_color the tint
+        at 82 degrees (black means untinted).
+
         openpbr, for the program of that name: diffuse_roughness, specular_weight, anisotropy,
         rotation (turns), transmission_weight, transmission_color, transmission_depth,
-        subsurface_weight, subsurface_color, subsurface_radius (mean free paths; 0: diffuse),
+        subsurface_weight, subsurface_color, subsurface_radius (mean free paths; 0 means diffuse),
         subsurface_anisotropy, fuzz_weight, fuzz_color, fuzz_roughness, coat_color, coat_ior,
         coat_darkening, film_weight, film_thickness (nanometres), film_ior, thin_walled. Its coat
-        takes clearcoat and clearcoat_roughness.
+        uses clearcoat and clearcoat_roughness.
         """
     def add_mesh(
         self,
@@ -245,14 +257,21 @@ class SceneBuilder:
         asset_length: int = 0,
         mesh_light: int | None = None,
     ) -> int:
-        """Positions (n, 3), or (s, n, 3) at s equal steps over the shutter, and normals likewise;
-        triangles (m, 3) counter-clockwise from outside; normals (n, 3) per
-        vertex or (m, 3, 3) per corner; uvs (n, 2) or (m, 3, 2); face_materials (m,). attributes:
-        name -> (rate, values (k, c) of 1 to 4 components): "constant" (k = 1), "primitive" (m),
-        "vertex" (n) or "corner" (3 m); of curves "end" (2 m) in place of the last two.
-        No copy of C-ordered arrays of these types: they are kept alive. Do not change them
-        afterwards. light_group: of what it emits. asset_length: so much of its name, a prim path,
-        names the asset that it is part of; 0: none known. mesh_light: what add_mesh_light gave."""
+        """Adds a mesh and returns its id.
+
+        positions: (n, 3), or (s, n, 3) at s equal steps over the shutter. indices: triangles (m,
+        3), counter-clockwise when seen from outside. normals: (n, 3) per vertex or (m, 3, 3) per
+        corner, with a leading axis of steps if positions have one. uvs: (n, 2) or (m, 3, 2).
+        face_materials: (m,).
+
+        attributes: name -> (rate, values (k, c) of 1 to 4 components), with the rates "constant" (k
+        = 1), "primitive" (m), "vertex" (n) and "corner" (3 m); for curves "end" (2 m) replaces the
+        last two.
+
+        C-ordered arrays of these types are not copied but kept alive; do not modify them
+        afterwards. light_group: light group of its emission. asset_length: length of the asset's
+        path within its name, a prim path; 0 if unknown. mesh_light: a result of add_mesh_light.
+        """
     def add_meshes(
         self,
         positions: NDArray[np.float32],
@@ -264,11 +283,12 @@ class SceneBuilder:
         groups: NDArray[np.uint32],
         names: list[str],
     ) -> int:
-        """Many meshes that have nothing but points and one material; the first one's id.
+        """Adds meshes that have only points and one material each; returns the first id.
 
-        Positions (n, 3) and indices (m, 3) are those of one mesh after another, of so many points
-        and triangles each; indices count from the mesh's first point. groups: to put each into;
-        0xffffffff: none. Others as in add_mesh."""
+        positions (n, 3) and indices (m, 3) contain one mesh after another, with the given numbers
+        of points and triangles; indices are relative to the mesh's first point. groups: group of
+        each mesh, or 0xffffffff for none. Other arguments are as in add_mesh.
+        """
     def replace_mesh(
         self,
         mesh: int,
@@ -281,28 +301,33 @@ class SceneBuilder:
         material: int = ...,
         attributes: Mapping[str, tuple[str, NDArray[np.float32]]] = ...,
     ) -> None:
-        """Gives a mesh other arrays, as add_mesh takes them; its name and its groups stay."""
+        """Replaces the arrays of a mesh, in the form of add_mesh.
+
+        Its name and groups are unchanged.
+        """
     def make_surfaces(
         self, descriptions: list[dict[str, Any]], threads: int = 0
     ) -> list[dict[str, Any] | str]:
-        """Subdivision surfaces and displaced polygons as triangle meshes, in parallel.
+        """Converts subdivision surfaces and displaced polygons to triangle meshes, in parallel.
 
-        Each description: level (0: polygons), points (n, 3) float32, counts (faces,) and indices
-        (corners,) int32, left_handed; from level 1 on scheme, boundary, face_varying (tokens of
-        UsdGeomMesh), smooth_triangles, and as there are holes, crease_edges (k, 2) int32 with
-        crease_sharpness (k,) float32, corner_vertices and corner_sharpness; at level 0 triangles
-        (m, 3) and triangle_faces (m,) uint32, and triangle_corners (m * 3,) for face-varying uvs.
-        As there are: matrix (4, 4) float64, row vectors; uvs and a list primvars of
+        Each description has level (0 means polygons), points (n, 3) float32, counts (faces,) and
+        indices (corners,) int32, left_handed. From level 1 on it also has scheme, boundary,
+        face_varying (tokens of UsdGeomMesh), smooth_triangles, and optionally holes, crease_edges
+        (k, 2) int32 with crease_sharpness (k,) float32, corner_vertices and corner_sharpness. At
+        level 0 it has triangles (m, 3) and triangle_faces (m,) uint32, and triangle_corners (m *
+        3,) for face-varying uvs.
+
+        Optional entries: matrix (4, 4) float64 for row vectors; uvs, and a list primvars, of
         {"interpolation": "vertex", "varying" or "faceVarying", "values": (k, width) float32,
-        "width", "indices": (corners,) int32 where it is face-varying}; displacements, a list of
-        lengths and of texture uses as add_material takes them, and face_displacement (faces,)
-        int32: which of them, -1 for none. At level 0 values of face-varying primvars are those of
-        the triangles' corners (3 m, width), without indices.
+        "width", "indices": (corners,) int32 if face-varying}; displacements, a list of lengths and
+        of texture uses in the form of add_material, and face_displacement (faces,) int32, an index
+        into that list or -1 for none. At level 0, values of face-varying primvars are those of the
+        triangles' corners (3 m, width), without indices.
 
-        Returns for each either a line that says why there is no mesh, or positions, normals, uvs
-        (or None), triangles, faces (m,): face of the cage of each triangle, primvars: attributes
-        as add_mesh takes them, "vertex" or "corner", and manifold: false where edges or points had
-        to be kept sharp.
+        Returns for each description either a message why there is no mesh, or positions, normals,
+        uvs (or None), triangles, faces (m,) (cage face of each triangle), primvars (attributes in
+        the form of add_mesh, "vertex" or "corner"), and manifold (False if edges or points had to
+        be kept sharp).
         """
     def add_curves(
         self,
@@ -320,12 +345,17 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Kinds: linear-tube, cubic-tube, linear-ribbon, cubic-ribbon. Positions (n, 3), or
-        (steps, n, 3) over the shutter, of Bezier control points (points of lines), radii (n,),
-        normals of ribbons (shape of positions). segments (m,): the first of four (two) points in a
-        row, plus 2^31 where the curve goes on before it and 2^30 where it goes on after it: then
-        the point before (after) those of the segment says in which direction. uvs (m, 2, 2) at both
-        ends; face_materials (m,). Counts as a mesh; arrays are kept as in add_mesh."""
+        """Adds curves and returns their id; they count as a mesh.
+
+        Kinds: linear-tube, cubic-tube, linear-ribbon, cubic-ribbon. positions: (n, 3), or (steps,
+        n, 3) over the shutter, Bezier control points or points of lines. radii: (n,). normals:
+        shape of positions, for ribbons.
+
+        segments: (m,) index of the first of four (lines: two) consecutive points, plus 2^31 if the
+        curve continues before the segment and 2^30 if it continues after it; the adjacent point
+        then gives the direction. uvs: (m, 2, 2) at both ends. face_materials: (m,). Arrays are kept
+        as in add_mesh.
+        """
     def add_points(
         self,
         positions: NDArray[np.float32],
@@ -339,8 +369,11 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Spheres: positions (n, 3), or (steps, n, 3) over the shutter, radii (n,), uvs (n, 2),
-        face_materials (n,). Counts as a mesh; arrays are kept as in add_mesh."""
+        """Adds spheres and returns their id; they count as a mesh.
+
+        positions: (n, 3), or (steps, n, 3) over the shutter. radii: (n,). uvs: (n, 2).
+        face_materials: (n,). Arrays are kept as in add_mesh.
+        """
     def add_splats(
         self,
         positions: NDArray[np.float32],
@@ -354,14 +387,20 @@ class SceneBuilder:
         light_group: str = "",
         asset_length: int = 0,
     ) -> int:
-        """Gaussian splats: middles (n, 3), standard deviations along their axes (n, 3), which are
-        positive, quaternions w, x, y, z (n, 4), opacities (n,) from 0 to 1, and real spherical
-        harmonics (n, k, 3), k 1, 4, 9 or 16, of what their colour is above 0.5. A material of
-        program emissive, which multiplies it. Counts as a mesh; positions and harmonics are kept
-        as in add_mesh."""
+        """Adds Gaussian splats and returns their id; they count as a mesh.
+
+        positions: centres (n, 3). scales: positive standard deviations along the axes (n, 3).
+        orientations: quaternions w, x, y, z (n, 4). opacities: (n,) from 0 to 1. harmonics: real
+        spherical harmonics (n, k, 3) of the colour minus 0.5, with k 1, 4, 9 or 16. material: of
+        program emissive, which multiplies the radiance. positions and harmonics are kept as in
+        add_mesh.
+        """
     def add_group(self, name: str = "", root: str = "") -> int:
-        """A new empty group; group 0, the world, is there. root: the prim path that names of what
-        is in it begin with, and that names of its instances take the place of."""
+        """Adds an empty group; group 0, the world, always exists.
+
+        ``root`` is the prim path with which the names of its contents begin; names of instances
+        replace it.
+        """
     def add_to_group(self, group: int, mesh: int) -> None: ...
     def add_instances(
         self,
@@ -375,11 +414,14 @@ class SceneBuilder:
         asset_lengths: list[int] | None = None,
         motion: NDArray[np.float64] | None = None,
     ) -> None:
-        """Places `child` in `parent` k times: transforms (k, 4, 4); materials (k,) for meshes in it
-        that have none of their own. Nested to any depth without copies of geometry. names: prim
-        paths, one each or one for all, with numbers (k,) to tell those apart; asset_lengths: as in
-        add_mesh, one for each name. motion: (k, s, 4, 4), transforms at s equal steps over the
-        shutter, in place of transforms."""
+        """Adds k instances of `child` to `parent`.
+
+        transforms: (k, 4, 4). materials: (k,) for meshes without a material. Instances may be
+        nested to any depth, and geometry is never copied. names: prim paths, one per instance, or
+        one for all with numbers (k,) that distinguish them. asset_lengths: as in add_mesh, one per
+        name. motion: (k, s, 4, 4) transforms at s equal steps over the shutter, which replace
+        transforms.
+        """
     def add_light(
         self,
         kind: str,
@@ -417,8 +459,10 @@ class SceneBuilder:
         portals: NDArray[np.float64] | None = None,
         # ---- to here ----
     ) -> int:
-        """kind: one of light_kinds(). A parameter that it has not is not looked at.
-        wavecomb.light_table says what each is. Raises Error."""
+        """Adds a light of a kind of light_kinds(); ignores parameters that the kind does not have.
+
+        wavecomb.light_table describes the parameters. Raises Error.
+        """
     def add_mesh_light(
         self,
         transform: NDArray[Any],
@@ -446,17 +490,26 @@ class SceneBuilder:
         visible: bool = True,
         # ---- to here ----
     ) -> int:
-        """A light of the triangles of meshes, for add_mesh. transform: from the light's space, by
-        whose -z it is shaped, to that of the mesh's group. material_sync: materialGlowTintsLight,
-        independent or noMaterialResponse; give the mesh of the last one an emissive material of
-        radiance 1. Others as in add_light; visible: false where it shines
-        though rays do not meet the mesh, whose material has constant emission and opacity 0."""
+        """Adds a light that is made of the triangles of meshes, for add_mesh.
+
+        transform: from light space, in which shaping is relative to -z, to the mesh's group.
+        material_sync: materialGlowTintsLight, independent or noMaterialResponse; a mesh with the
+        last one needs an emissive material of radiance 1. visible: False if the mesh emits but is
+        invisible to rays; its material then has constant emission and opacity 0. Other parameters
+        are as in add_light.
+        """
     def add_geometry_set(self, rules: dict[str, str]) -> int:
-        """A set for lights, by the rules of a UsdCollectionMembershipQuery: prim paths to
-        exclude, explicit or expand."""
+        """Adds a geometry set for lights.
+
+        ``rules`` are those of a UsdCollectionMembershipQuery: prim path -> exclude, explicit or
+        expand.
+        """
     def add_visibility(self, path: str, rays: dict[str, bool]) -> None:
-        """Which rays see a prim and what is below it that says nothing else: "camera", "shadow",
-        "bounces"; and whether it is a "holdout", where camera rays end and bring nothing."""
+        """Sets the ray visibility of a prim and of descendants without other settings.
+
+        Keys: "camera", "shadow" and "bounces"; and "holdout", where camera rays end without
+        radiance.
+        """
     def add_volume(
         self,
         to_world: NDArray[Any],
@@ -473,18 +526,26 @@ class SceneBuilder:
         anisotropy: float = 0,
         name: str = "",
     ) -> int:
-        """A volume: extinction * density per unit of world length, of which albedo * color is
-        scattered by Henyey and Greenstein's phase function of mean cosine ``anisotropy``, and
-        radiance emission * emission_grid (or * density) per unit of world length. Without a density
-        grid it is 1 all over the box ``bounds``, of the volume's own space. ``velocity``: a grid of
-        three components with signs, of the volume's own space over a second: what is at p is what
-        the grids have at p - v(p) t, with t from ``seconds``, where the shutter opens and closes.
-        ``to_world``: (4, 4), rows. Volumes may overlap. Raises Error that names the volume."""
+        """Adds a volume.
+
+        The extinction coefficient is extinction * density per unit of world length, the
+        single-scattering albedo is albedo * color, and the phase function is that of Henyey and
+        Greenstein with mean cosine ``anisotropy``. The emitted radiance is emission * emission_grid
+        (or * density) per unit of world length. Without a density grid, density is 1 in the box
+        ``bounds`` in object space. Volumes may overlap.
+
+        ``velocity``: grid of signed vectors in object-space units per second. The value at p and
+        time t is that of the grids at p - v(p) t; ``seconds`` are the opening and closing times of
+        the shutter. ``to_world``: (4, 4) for row vectors. Raises Error that names the volume.
+        """
     def add_ies(
         self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]
     ) -> int:
-        """A profile for add_light. Angles in degrees, ascending: vertical within [0, 180],
-        horizontal from 0 to 360 or a single one; candela (horizontal, vertical). Raises Error."""
+        """Adds an IES profile for add_light.
+
+        Angles are in degrees, ascending: vertical within [0, 180], horizontal from 0 to 360 or a
+        single one. candela: (horizontal, vertical). Raises Error.
+        """
     def add_light_filter(
         self,
         transform: NDArray[Any],
@@ -497,11 +558,15 @@ class SceneBuilder:
         density: float,
         next: int | None,
     ) -> int:
-        """A filter for add_light: what light passes that crosses z = -distance of its own space at
-        (x, y); 0 or less: no such window. sides: four (a, b, c), each of which lets smoothstep(a x
-        + b y + c) by. The texture is at u = picture_u . (x, y, 1), v likewise. decay: where light
-        begins to arrive and is whole, where it begins to fade and is gone. density: how much of
-        all that there is. next: another filter. Raises Error."""
+        """Adds a light filter for add_light.
+
+        The filter acts on light that crosses the plane z = -distance of filter space at (x, y); a
+        distance of 0 or less means that there is no such window. sides: four (a, b, c), each of
+        which transmits smoothstep(a x + b y + c). The texture is read at u = picture_u . (x, y, 1)
+        and v = picture_v . (x, y, 1). decay: distances at which light starts to appear, is
+        complete, starts to fade, and vanishes. density: strength of the filter. next: another
+        filter. Raises Error.
+        """
     def set_camera(
         self,
         transform: NDArray[Any],
@@ -562,36 +627,40 @@ class SceneBuilder:
         rolling_duration: float = 0,
         # ---- to here ----
     ) -> None:
-        """Looks along -z. The renderer fits the window to the picture, as conform says. motion:
-        (s, 4, 4), transforms at s equal steps over the shutter. Raises Error for names that are not
-        known."""
+        """Sets the camera, which looks along -z.
+
+        The renderer fits the window to the image as conform says. motion: (s, 4, 4) transforms at s
+        equal steps over the shutter. Raises Error for unknown names.
+        """
     def build(self) -> Scene:
-        """Checks all that spans objects and makes the scene. Raises Error."""
+        """Validates the scene as a whole and builds it. Raises Error."""
 
 def light_kinds() -> list[tuple[str, tuple[str, ...]]]:
-    """Kinds of lights, that of meshes too, each with the types of prims that are drawn as one."""
+    """Returns the kinds of lights, including mesh lights, with their USD prim types."""
 
 def material_table() -> list[dict[str, Any]]:
-    """The parameters of materials, as wavecomb.material_table.MaterialParameter has them."""
+    """Returns the parameters of materials, fields of wavecomb.material_table.MaterialParameter."""
 
 def aov_table() -> list[dict[str, Any]]:
-    """What a render can keep beside the beauty, as wavecomb.run.aovs.Aov has it."""
+    """Returns the AOVs besides beauty, as fields of wavecomb.run.aovs.Aov."""
 
 def program_table() -> list[dict[str, Any]]:
-    """What programs read, as wavecomb.material_table.Program has it."""
+    """Returns the shading programs, as fields of wavecomb.material_table.Program."""
 
 def light_table() -> list[dict[str, Any]]:
-    """The parameters of lights, as wavecomb.light_table.LightParameter has them."""
+    """Returns the parameters of lights, as fields of wavecomb.light_table.LightParameter."""
 
 def camera_table() -> list[dict[str, Any]]:
-    """The parameters of cameras, as wavecomb.camera_table.CameraParameter has them."""
+    """Returns the parameters of cameras, as fields of wavecomb.camera_table.CameraParameter."""
 
 def setting_table() -> list[dict[str, Any]]:
-    """The settings that are one value each, as wavecomb.options.Setting has them."""
+    """Returns the settings with a single value, as fields of wavecomb.options.Setting."""
 
 class Settings:
-    """Settings of a render; attributes as keyword arguments. None sets a default that follows from
-    others."""
+    """Settings of a render; attributes are keyword arguments.
+
+    None selects a default that depends on other settings.
+    """
 
     # ---- setting_table(): tools/update_stub ----
     width: int
@@ -701,82 +770,94 @@ class Settings:
     aovs: list[str]
     def __init__(self, **settings: Any) -> None: ...
     def check(self) -> None:
-        """Raises Error naming the setting and what it may be."""
+        """Raises Error that names an invalid setting and its valid values."""
     def to_dict(self) -> dict[str, Any]: ...
 
 class Result:
-    """Pictures and figures of a render. Row 0 is the top."""
+    """Layers and statistics of a render. Row 0 is the top."""
 
     @property
     def beauty(self) -> NDArray[np.float32]:
         """(height, width, 3), linear Rec.709."""
     @property
     def albedo(self) -> NDArray[np.float32] | None:
-        """(height, width, 3); like all AOVs, None where it was not asked for."""
+        """(height, width, 3); like all AOVs, None if it was not requested."""
     @property
     def normal(self) -> NDArray[np.float32] | None:
         """(height, width, 3), world space."""
     @property
     def depth(self) -> NDArray[np.float32] | None:
-        """(height, width), along the camera's axis; infinite where nothing was hit."""
+        """(height, width), along the camera's axis; infinite for pixels without a hit."""
     @property
     def aovs(self) -> dict[str, NDArray[np.float32]]:
-        """Further AOVs that were asked for: (height, width) or (height, width, channels)."""
+        """Further requested AOVs: (height, width) or (height, width, channels)."""
     @property
     def deep(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]] | None:
-        """Samples of each pixel (height, width), and R, G, B, A, Z, ZBack of all samples (n, 6),
-        pixel by pixel, the nearest first; None unless the AOV deep was asked for."""
+        """Sample counts (height, width), and R, G, B, A, Z, ZBack of all samples (n, 6).
+
+        Samples are in pixel order, the closest first. None unless the AOV deep was requested.
+        """
     @property
     def learned(self) -> bytes:
-        """What guided it, for `learned` of another render of such a scene; empty: nothing did."""
+        """Guiding field, for `learned` of another render of the scene; empty if there is none."""
     @property
     def manifests(self) -> dict[str, dict[str, int]]:
-        """Cryptomatte level -> name -> id, of all that the picture holds."""
+        """Cryptomatte level -> name -> id of all objects in the image."""
     @property
     def samples(self) -> NDArray[np.uint32]: ...
     @property
     def error(self) -> NDArray[np.float32] | None:
-        """(height, width): what adaptive sampling goes by; infinite: not known. None unless the
-        render was adaptive or had the setting ``error``."""
+        """(height, width) error estimate of adaptive sampling; infinite if unknown.
+
+        None unless the render was adaptive or had the setting ``error``.
+        """
     @property
     def variance(self) -> NDArray[np.float32] | None:
-        """(height, width, 3): of each pixel's mean. None likewise."""
+        """(height, width, 3) variance of each pixel's mean. None in the same cases as ``error``."""
     @property
     def cancelled(self) -> bool: ...
     @property
     def costs(self) -> dict[str, dict[str, float]]:
         """{"materials": {name: ns}, "textures": {name: ns}}.
 
-        A profile that a later render can start from.
+        A cost profile from which a later render can start.
         """
     @property
     def stats(self) -> dict[str, Any]:
         """Plain ints, floats, strings, lists and dicts; docs/statistics.md has the keys."""
 
 class Snapshot:
-    """A render that stands still. Valid while Watcher.snapshot() runs: later it raises Error."""
+    """State of a paused render, valid only during Watcher.snapshot(). Later it raises Error."""
 
     @property
     def finished(self) -> bool:
-        """There is no more to come."""
+        """Whether the render is complete."""
     @property
     def status(self) -> dict[str, Any]:
-        """samples_done (those of a checkpoint too), samples_total (as expected by now where the
-        render is adaptive or timed), resumed_samples, rays, passes, active_pixels, seconds (of this
-        run), error (mean relative error at the last look, or None)."""
+        """Progress of the render.
+
+        Keys: samples_done (including those of a checkpoint), samples_total (an estimate for
+        adaptive or timed renders), resumed_samples, rays, passes, active_pixels, seconds (of this
+        run), and error (the last estimate of the mean relative error, or None).
+        """
     def beauty(self) -> NDArray[np.float32]:
-        """(height, width, 3), linear; a copy."""
+        """Returns a copy (height, width, 3), linear."""
     def samples(self) -> NDArray[np.uint32]:
-        """(height, width); a copy."""
+        """Returns a copy (height, width)."""
     def layer(self, name: str) -> NDArray[Any] | None:
-        """A layer as Result and its aovs have it, by name ("depth", "error", "cost" ...), made now;
-        None where it is not kept."""
+        """Returns a layer of Result or its aovs by name ("depth", "error" ...), computed now.
+
+        Returns None if the layer is not kept.
+        """
     @property
     def stats(self) -> dict[str, Any]:
-        """As Result.stats, so far; error is that of the last look."""
+        """Current values of Result.stats; error is the last estimate."""
     def state(self) -> dict[str, Any]:
-        """All that render(state=...) needs to go on from here: numbers, and arrays of bytes that
-        are not copied: they are valid while Watcher.snapshot() runs."""
+        """Returns the state from which render(state=...) continues.
+
+        It contains numbers, and arrays of bytes that are not copied and valid only during
+        Watcher.snapshot().
+        """
 
 def render(
     scene: Scene,
@@ -790,21 +871,27 @@ def render(
     interval: float = 0.1,
     learned: bytes | None = None,
 ) -> Result:
-    """Renders; calls progress(samples_done, samples_total) every `interval` seconds on the calling
-    thread (GIL held); returning False cancels, and the result holds what was done.
-    KeyboardInterrupt raised in the callback also stops the render. Raises Error.
-    policy: as wavecomb.SchedulingPolicy, in place of the settings' one; what its order() raises
-    comes out of here. costs: a profile to start from, as Result.costs; one that knows all materials
-    and textures spares the measuring. recorder: keeps the rays of
-    the wavefront integrator. watcher: as run.watcher.Watcher: progress(status) is called like
-    progress and answers None, "snapshot" or "stop"; snapshot(snapshot) gets the snapshots that were
-    asked for and one at the end. state: of a snapshot of a render with the same settings, to go on
-    from. learned: of another Result, to be guided by in place of what would be learned."""
+    """Renders a scene. Raises Error.
+
+    progress: called as progress(samples_done, samples_total) every `interval` seconds on the
+    calling thread with the GIL held. Returning False cancels the render; the result then holds the
+    finished samples. KeyboardInterrupt in the callback also stops the render.
+
+    policy: a wavecomb.SchedulingPolicy that replaces the policy of the settings; exceptions of its
+    order() are raised here. costs: initial profile in the form of Result.costs; a profile with all
+    materials and textures makes cost measurements unnecessary. recorder: records the rays of the
+    wavefront integrator.
+
+    watcher: a run.watcher.Watcher. Its progress(status) is called like progress and returns None,
+    "snapshot" or "stop"; its snapshot(snapshot) receives requested snapshots and one at the end.
+    state: state of a snapshot from a render with the same settings, from which this render
+    continues. learned: guiding field of another Result, which replaces training.
+    """
 
 class Renderer:
-    """A scene ready to be rendered, and to be changed.
+    """A scene with acceleration structures that can be rendered and edited.
 
-    One thread at a time may call render() and edit(), all else may be called by any thread.
+    Only one thread at a time may call render() and edit(); other methods are thread-safe.
 
     >>> renderer = wavecomb._core.Renderer(stage.scene)  # doctest: +SKIP
     >>> renderer.edit(materials={0: {"roughness": 0.2}})  # doctest: +SKIP
@@ -812,14 +899,16 @@ class Renderer:
     """
 
     def __init__(self, scene: Scene, threads: int = 0) -> None:
-        """Builds the hierarchy. threads: for that, and for edits; 0: all. Raises Error."""
+        """Builds acceleration structures. threads: for this and for edits; 0 means all.
+
+        Raises Error.
+        """
     @property
     def scene(self) -> Scene:
-        """As edited: another object after each edit, which shares with the one before what did not
-        change."""
+        """The edited scene: a new object after each edit, which shares unchanged data."""
     @property
     def version(self) -> int:
-        """Edits so far."""
+        """Number of edits."""
     def edit(
         self,
         *,
@@ -827,17 +916,18 @@ class Renderer:
         materials: dict[int, dict[str, Any]] = {},
         lights: dict[int, dict[str, Any]] = {},
     ) -> None:
-        """Changes the scene, all at once or nothing. Parameters that are not given stay.
+        """Changes the scene atomically. Parameters that are not given are unchanged.
 
-        camera: those of set_camera, or what Scene.camera gives. materials: by id, those of
-        add_material but program, name and textures. lights: by index, those of add_light but kind,
-        name, texture and group. A picture is then, bit for bit, that of a scene built with these
-        values.
+        camera: arguments of set_camera, or a value of Scene.camera. materials: arguments of
+        add_material by id, except program, name and textures. lights: arguments of add_light by
+        index, except kind, name, texture and group. Renders are then bit-identical to those of a
+        scene that was built with these values.
 
-        Costs microseconds for a camera and little for materials and colours of lights. Where a mesh
-        begins or ceases to be partly present, groups with it are built anew; then, and where a
-        light's shape or place changes, the top level, too, with the meshes that no instance holds.
-        Raises Error for a bad value, and while a render goes on.
+        A camera edit takes microseconds, and edits of materials and light colours take little time.
+        If a mesh starts or stops being partially present, the groups that contain it are rebuilt.
+        In that case, and if the shape or position of a light changes, the top level with all meshes
+        outside of instances is rebuilt as well. Raises Error for an invalid value, and during a
+        render.
         """
     def render(
         self,
@@ -851,48 +941,56 @@ class Renderer:
         picture: bool = True,
         learned: bytes | None = None,
     ) -> Result:
-        """As render(), of the scene as it is. picture: False leaves all layers of the result None,
-        for a watcher that takes what it needs of snapshots; a render that is stopped ends sooner
-        then. Raises Error while another render of this one goes on."""
-    def stop(self) -> None:
-        """Ends the render that goes on within a wave; it returns what was done. Without one: does
-        nothing."""
-    def twin(self) -> Renderer:
-        """Another renderer of the same scene, to be edited and run by itself. They share hierarchy
-        and geometry."""
-    def pick(self, x: float, y: float, width: int, height: int) -> dict[str, Any] | None:
-        """What the ray through point (x, y) of a picture of that size, (0, 0) being its top left
-        corner, meets first; None where it leaves the scene.
+        """Renders the current scene; the arguments are those of the function render().
 
-        object and asset (names as of Cryptomatte), position, depth (along the camera's axis) and
-        distance; of a surface also material (id), material_name, instance (from 1, as the AOV),
-        normal and uv; of a light's shape light (index).
+        picture: False leaves all layers of the result None, for watchers that use only snapshots;
+        stopping such a render is faster. Raises Error during another render of this object.
+        """
+    def stop(self) -> None:
+        """Stops the current render within one wave; render() then returns the finished samples.
+
+        Without a render it does nothing.
+        """
+    def twin(self) -> Renderer:
+        """Returns another renderer of the scene with separate edits.
+
+        Acceleration structures are shared.
+        """
+    def pick(self, x: float, y: float, width: int, height: int) -> dict[str, Any] | None:
+        """Returns the first hit of the ray through a point of an image of the given size.
+
+        (0, 0) is the top left corner. Returns None if the ray leaves the scene. Keys: object and
+        asset (names as in Cryptomatte), position, depth (along the camera's axis) and distance; for
+        surfaces also material (id), material_name, instance (from 1, as in the AOV), normal and uv;
+        for the shape of a light also light (index).
         """
     def learned(self, x: float, y: float, width: int, height: int) -> dict[str, Any] | None:
-        """What the render that goes on, or else the last one, has learned of the surface that
-        ``pick`` finds there; None where there is none, or before anything was learned.
+        """Returns what the current or last render learned at the surface that ``pick`` returns.
 
-        axis: which way the surface faces, "+x" ... "-z". density: directions that guided bounces
-        take, per steradian, (16, 16) float32, rows of Clarberg's square (guiding/directions.h);
-        None where the field has no region there; else also guided_share (of bounces) and survival
-        (of the learned roulette at throughput 1, 0 where it is not known). light_shares: names of
-        lights and emissive meshes with the probability of their choice there, largest first,
-        counted in 4,096 choices.
+        Returns None without a surface or before training. Keys: axis, the dominant axis of the
+        normal, "+x" ... "-z". density: density of guided bounces per steradian, (16, 16) float32,
+        rows of Clarberg's square (guiding/directions.h); None if the guiding field has no region
+        there. With a region also guided_share (the fraction of guided bounces) and survival (of the
+        trained roulette at throughput 1; 0 if unknown). light_shares: names of lights and emissive
+        meshes with their selection probabilities there, largest first, estimated from 4,096
+        selections.
         """
 
 class RayRecording:
-    """The rays of one render, kept and traced again; for benchmarks/limit.py."""
+    """Rays of one render, recorded to be traced again; for benchmarks/limit.py."""
 
     def __init__(self, scene: Scene, byte_limit: int = ...) -> None:
-        """Raises Error for a scene with partly present surfaces. A render that would keep more
-        than `byte_limit` bytes ends with an Error."""
+        """Raises Error for a scene with partially present surfaces.
+
+        A render that would record more than `byte_limit` bytes ends with an Error.
+        """
     @property
     def bytes(self) -> int: ...
     @property
     def waves(self) -> int: ...
     @property
     def rays(self) -> list[int]:
-        """Camera and bounce rays of each depth."""
+        """Number of camera and bounce rays at each depth."""
     @property
     def shadow_rays(self) -> list[int]: ...
     def replay(
@@ -903,23 +1001,24 @@ class RayRecording:
         width: tuple[int, int, int] = (16, 16, 16),
         coherent: tuple[bool | None, bool | None, bool | None] = (None, None, None),
     ) -> dict[str, Any]:
-        """Traces all rays again, in their order: by Embree alone, or as a render does.
+        """Traces all rays again in their order: with Embree alone, or as in a render.
 
-        width, coherent: of camera, bounce and shadow rays; None: as the render had it. Returns
-        wall_s, and by kind of ray thread_s, rays and hits. Raises Error for a width that Embree
-        does not have here."""
+        width, coherent: options of camera, bounce and shadow rays; None uses those of the render.
+        Returns wall_s, and thread_s, rays and hits by kind of ray. Raises Error for a width that
+        Embree does not support here.
+        """
 
 """Names for Settings.aovs."""
 
 GRAPH_CODES: tuple[str, ...]
-"""Operations of value graphs, by number."""
+"""Names of value graph operations, by code."""
 GRAPH_INPUTS: tuple[str, ...]
 GRAPH_PARAMETERS: dict[str, tuple[int, int]]
-"""Parameter that a graph may drive -> (number of its first component, how many it has)."""
+"""Parameter that a graph may drive -> (index of its first component, number of components)."""
 GRAPH_REGISTERS: int
 GRAPH_OPS: int
 GRAPH_CONSTANT: int
-"""An operand with this bit is a constant, else a register."""
+"""Bit of an operand that refers to a constant instead of a register."""
 
 def run_graph(
     ops: bytes,
@@ -930,29 +1029,31 @@ def run_graph(
     points: NDArray[np.float32],
     lanes: int = 1,
 ) -> NDArray[np.float32]:
-    """Outputs of a value graph (n, outputs) at points (n, 21): uv, its width, position, local
-    position, normal, local normal, tangent, view. Textures are white, attributes are not there.
-    ``lanes``: 1 or 16; the results are alike. Raises Error for a graph that reads what
-    is not there."""
+    """Evaluates a value graph at points (n, 21); returns (n, outputs).
+
+    The 21 values are uv, its filter width, position, local position, normal, local normal, tangent
+    and view direction. Textures are white and attributes are missing. ``lanes`` is 1 or 16 and does
+    not change results. Raises Error for a graph that refers to missing objects.
+    """
 
 def walk_albedo(color: float, anisotropy: float) -> float:
-    """The albedo of a single collision that gives a half-space a colour under even light."""
+    """Returns the single-scattering albedo that gives a half-space a colour under uniform light."""
 
 def crypto_id(name: str) -> int:
-    """A name's id in a Cryptomatte: MurmurHash3 32 with seed 0, made a usual float."""
+    """Returns the Cryptomatte id of a name: MurmurHash3 32 with seed 0, as a normal float."""
 
 def lane_widths() -> list[int]: ...
 def policies() -> list[str]:
-    """Names for Settings.policy."""
+    """Returns names for Settings.policy."""
 
 def give_back_memory() -> None:
-    """Returns freed memory to the system where the C library keeps it."""
+    """Returns freed memory that the C library caches to the operating system."""
 
 def peak_rss_bytes() -> int:
-    """The most memory this process has held."""
+    """Returns the peak memory of this process in bytes."""
 
 def build_info() -> dict[str, str]:
-    """version, compiler, library (its -march), isa (what its kernels use), tbb."""
+    """Returns version, compiler, library (its -march), isa (of its kernels) and tbb."""
 
 MAX_SUBDIVISION: int
 """Highest level of make_surfaces."""
@@ -968,19 +1069,22 @@ def edge_pixels(
     pixels_per_unit: float,
     projection: str = "perspective",
 ) -> float:
-    """Mean length in pixels of the edges of polygons, long ones counting by their length.
+    """Returns the mean length in pixels of polygon edges, weighted by length.
 
-    The greatest over transforms (k, 4, 4) to the world. Edges out of the picture count an eighth.
-    to_camera (4, 4), row vectors; centre, half: of the camera's window."""
+    Takes the maximum over transforms (k, 4, 4) to the world. Edges outside of the image count an
+    eighth. to_camera: (4, 4) for row vectors. centre, half: of the camera's window.
+    """
 
 def split_quads(
     points: NDArray[np.float32],
     indices: NDArray[np.int32],
     starts: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
-    """Corners (2 k, 3) of the two triangles of each quad, cut along the better diagonal.
+    """Returns corners (2 k, 3) of the two triangles of each quad, split along the better diagonal.
 
-    points (n, 3); indices (corners,), in range; starts (k,): first corners, None: all are quads."""
+    points: (n, 3). indices: (corners,), in range. starts: (k,) first corners; None if all faces are
+    quads.
+    """
 
 def plain_mesh(
     points: NDArray[np.float32],
@@ -999,11 +1103,12 @@ def plain_mesh(
     ]
     | None
 ):
-    """A mesh of triangles alone or of quads alone; None of any other, and of one with a mistake.
+    """Converts a mesh of only triangles or only quads; returns None for other and invalid meshes.
 
-    Corners of each face, 3 or 4; points (n, 3) under a matrix (4, 4) for row vectors, None without
-    one; their bounds (2, 3), all within the limit; of quads the corners of ``split_quads`` and the
-    points (2 k, 3) that they are at."""
+    Returns the number of corners per face, 3 or 4; points (n, 3) transformed by a matrix (4, 4) for
+    row vectors, None without a matrix; their bounds (2, 3), all within the limit; and for quads the
+    corners of ``split_quads`` and their point indices (2 k, 3).
+    """
 
 def place_shape(
     points: NDArray[np.float32],
@@ -1013,18 +1118,21 @@ def place_shape(
     *,
     limit: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]] | None:
-    """Points and normals (n, 3) under a matrix (4, 4) for row vectors, whose inverse it is given,
-    and the bounds (2, 3) of the points; None where one is not within the limit."""
+    """Transforms points and normals (n, 3) by a matrix (4, 4) for row vectors with a given inverse.
+
+    Also returns the bounds (2, 3) of the points. Returns None if a point exceeds the limit.
+    """
 
 def used_points(triangles: NDArray[np.uint32], point_count: int) -> NDArray[np.bool_] | None:
-    """Which of the points (n,) triangles (m, 3) have; None: all."""
+    """Returns a mask (n,) of the points that triangles (m, 3) use; None if all are used."""
 
 def clip_ears(corners: NDArray[np.float64], most_steps: int = ...) -> tuple[NDArray[np.int64], int]:
-    """Triangles (k - 2, 3) of a polygon in the plane, corners (k, 2), counter-clockwise, by
-    clipping ears; then how many corners were cut without a look since the steps ran out."""
+    """Splits a plane polygon (k, 2), counter-clockwise, into triangles (k - 2, 3) by clipping ears.
+
+    Also returns the number of corners that were cut without a check after the step limit.
+    """
 
 def weld_corners(
     corners: NDArray[np.int32], point_count: int, values: NDArray[np.float32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Indices (corners,) that join the corners of a point with equal values (corners, width), and
-    the values they address."""
+    """Returns indices (corners,) that merge a point's corners with equal values, and values."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plug-in that reads .vdb and .nvdb files; ``wavecomb.vdb`` is its door."""
+"""Plug-in that reads .vdb and .nvdb files; only ``wavecomb.vdb`` imports it."""
 
 from typing import Any
 
@@ -7,17 +7,22 @@ version: str
 nano_version: int
 
 class BrokenFile(ValueError):
-    """The file is none, ends too early, or holds what no library wrote."""
+    """The file is not a VDB file, is truncated, or has invalid content."""
 
 class TooLarge(ValueError):
-    """A grid takes more memory than it may."""
+    """A grid exceeds the memory limit."""
 
 def grids(path: str, heads: bool = False) -> list[dict[str, Any]]:
-    """Of each grid name, index, type (bytes) and half, and unless ``heads`` what its topology says.
+    """Returns name, index, type (bytes) and half of each grid.
 
-    Raises BrokenFile, OSError, MemoryError."""
+    Also returns the content of its topology unless ``heads``. Raises BrokenFile, OSError or
+    MemoryError.
+    """
 
 def bricks(
     path: str, number: int, most_bytes: int, background_is_zero: bool, drops_empty: bool
 ) -> dict[str, Any]:
-    """The voxels of the grid at a place in the file. Raises as ``grids``, and TooLarge."""
+    """Returns the voxels of the grid at a position in the file.
+
+    Raises the errors of ``grids``, and TooLarge.
+    """

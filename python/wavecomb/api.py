@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages in, pictures out, from Python."""
+"""Python functions that load and render stages."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def load(
 
     Args:
         path: .usd, .usda, .usdc or .usdz.
-        options: How it is read.
-        progress: Called now and then as progress(prims read, prims found so far).
+        options: Load options.
+        progress: Called as progress(prims read, prims found so far) at intervals.
         isolate: Deprecated and without effect: a stage is read in the calling process.
         load_limit: Deprecated and without effect.
         memory_limit: Deprecated and without effect.
-        **changes: Fields of ``LoadOptions`` (camera, frame, purposes, variants, subdivision ...),
-            in place of those of ``options``.
+        **changes: Fields of ``LoadOptions`` (camera, frame, purposes, variants, subdivision ...)
+            that replace those of ``options``.
 
     Returns:
         The scene with a report: `.scene`, `.report`, `.camera_path`, `.seconds`.
@@ -57,7 +57,7 @@ def load(
     11547184
 
     Raises:
-        WavecombError: The stage cannot be rendered; one line that names the file or prim.
+        WavecombError: The stage cannot be rendered; the one-line message names the file or prim.
     """
     chosen = LoadOptions.of(options, changes)
     chosen.check()
@@ -69,7 +69,7 @@ def load(
 
 
 def warn_deprecated(**given: object) -> None:
-    """Warns about arguments that belonged to the process which read stages for its caller."""
+    """Warns about deprecated arguments, which applied when a child process read stages."""
     import warnings
 
     for name in (name for name, value in given.items() if value is not None):
@@ -82,10 +82,10 @@ def warn_deprecated(**given: object) -> None:
 
 
 def import_usd() -> None:
-    """Loads USD's modules.
+    """Imports USD's modules.
 
-    A Ctrl-C meanwhile comes when they are loaded: their loader swallows what it raises within it,
-    and leaves half a library.
+    Defers a Ctrl-C until they are loaded, since USD's loader swallows an exception that is raised
+    inside it and leaves a partially loaded library.
     """
     from wavecomb.run.progress import Interrupt
 
@@ -114,45 +114,46 @@ def render(
     """Renders a stage file, a loaded stage or a scene of ``SceneBuilder``.
 
     Args:
-        source: A path, what ``load`` gave, or a ``Scene``.
-        size: Width and height, pixels; by default of a path's render settings, else 600 x 600.
-        spp: Samples per pixel; with ``adaptive`` or ``noise`` the most of them.
-        progress: Called as progress(samples_done, samples_total) about ten times a second; return
-            False to stop and keep what is done. In a notebook, None shows a bar and the picture so
-            far; False shows nothing, True shows a bar on a terminal, too.
-        policy: Order of shading: a name, or an object of a ``SchedulingPolicy`` of your own. No
-            policy changes the picture.
-        costs: "auto", "measured", "model", or the ``Picture.costs`` of another render to start
-            from.
-        aovs: What to keep beside the beauty: names of docs/aovs.md, "light_NAME" for a light group,
+        source: A path, a result of ``load``, or a ``Scene``.
+        size: Width and height in pixels; by default those of a path's render settings, else 600 x
+            600.
+        spp: Samples per pixel; with ``adaptive`` or ``noise`` the maximum.
+        progress: Called as progress(samples_done, samples_total) about ten times per second; return
+            False to stop and keep the finished samples. In a notebook, None shows a bar and the
+            current image; False shows nothing, and True shows a bar on a terminal as well.
+        policy: Order of shading: the name of a policy, or an object of a ``SchedulingPolicy``
+            subclass. No policy changes the image.
+        costs: "auto", "measured", "model", or the ``Picture.costs`` of another render as initial
+            values.
+        aovs: Layers besides beauty: names of docs/aovs.md, "light_NAME" for a light group,
             "lpe:NAME=EXPRESSION", "crypto", "all"; by default a path's render vars, else albedo,
             normal and depth.
-        checkpoint: File that the state of the render is saved to, now and then and at the end.
+        checkpoint: File for the state of the render, written at intervals and at the end.
         every: Seconds between checkpoints.
-        resume: Checkpoint to go on from, of a render with the same stage and settings. The picture
-            is, bit for bit, that of a render that nothing stopped.
-        learn_from: With ``guiding``: a picture, or what its ``save_learned`` wrote, whose field
-            guides this render, too. Nothing is learned anew then.
+        resume: Checkpoint to continue, from a render with the same stage and settings. The image is
+            bit-identical to that of an uninterrupted render.
+        learn_from: With ``guiding``: a picture, or a file of its ``save_learned``, whose guiding
+            field this render uses. No training takes place then.
         isolate: Deprecated and without effect, as in ``load``.
         **options: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed, adaptive,
-            noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera,
-            frame, subdivision ...
+            noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera, frame,
+            subdivision ...
 
     >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
     >>> picture.beauty.shape  # doctest: +SKIP
     (540, 960, 3)
 
-    A stage that is rendered more than once is best loaded once; it keeps its hierarchy, and what
-    was found out of its lights, from render to render:
+    To render a stage several times, load it once; it then keeps its acceleration structures and
+    light statistics between renders:
 
     >>> stage = wavecomb.load("mixed.usdc")  # doctest: +SKIP
     >>> for seed in range(4):  # doctest: +SKIP
     ...     wavecomb.render(stage, spp=4, seed=seed).save(f"mixed{seed}.exr")
 
     Raises:
-        WavecombError: The stage cannot be rendered; the policy, the costs or the checkpoint are no
-            good.
-        wavecomb._core.Error: A setting is no good.
+        WavecombError: The stage cannot be rendered, or the policy, the costs or the checkpoint is
+            invalid.
+        wavecomb._core.Error: A setting is invalid.
     """
     from wavecomb.run.stats import make_stats
 
@@ -208,7 +209,7 @@ def _asked_for(
     settings: dict[str, Any],
     loading: Mapping[str, Any],
 ) -> tuple[tuple[int, int], Iterable[str] | None]:
-    """Size and AOVs, and the region in ``settings``: as the first render product says, if none."""
+    """Returns size and AOVs, by default of the first render product; may set the region."""
     names = ("render_settings", "product", "session_layer")
     asked = {name: loading[name] for name in names if loading.get(name) is not None}
     import_usd()
@@ -219,7 +220,8 @@ def _asked_for(
     region = choice.region(*chosen)
     if region is not None and "region" not in settings:
         settings["region"] = region
-        settings.setdefault("crop", True)  # the data window of files is that of the stage
+        # Use the stage's data window as that of the files.
+        settings.setdefault("crop", True)
     return chosen, choice.aovs if aovs is None else aovs
 
 
@@ -233,7 +235,7 @@ def _keeping(
     resume: str | os.PathLike[str] | None,
     shown: Shown | None,
 ) -> tuple[Watcher | None, dict[str, Any] | None]:
-    """Who saves checkpoints and shows what goes on, and the state to go on from."""
+    """Returns a watcher for checkpoints and progress, and the state from which to continue."""
     sinks: list[Sink] = [] if shown is None else list(shown.sinks)
     reporter = None if shown is None else shown.reporter
     if checkpoint is None and resume is None:
@@ -288,7 +290,10 @@ def _render(
     state: dict[str, Any] | None,
     learned: bytes | None,
 ) -> tuple[Result, bool]:
-    """Also whether a hierarchy was built. again: the stage, where it may be rendered once more."""
+    """Renders a scene; also returns whether acceleration structures were built.
+
+    ``again`` is a loaded stage that keeps its renderer.
+    """
     from wavecomb import _core
 
     if again is None:

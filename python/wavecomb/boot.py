@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Entry point of the Python processes that Wavecomb starts: ``python -I boot.py OPTIONS TARGET``.
+"""Entry point of Python processes that Wavecomb starts: ``python -I boot.py OPTIONS TARGET``.
 
 ``wavecomb.processes`` builds this command. Python's isolated mode ignores variables such as
-PYTHONPATH and puts neither the working folder nor the folder of a script on ``sys.path``. This file
-adds the folders that it is given, closes inherited descriptors, gives the process its own group,
-ties its life to its parent, and then runs the target, which is a module or ``-c CODE``.
+PYTHONPATH and puts neither the working folder nor a script's folder on ``sys.path``. This file adds
+the given folders, closes inherited descriptors, creates a process group, makes the process end with
+its parent, and then runs the target, which is a module or ``-c CODE``.
 
-Contract: imports nothing but the standard library, so that any Python can run it.
+Contract: imports only the standard library, so that any Python can run it.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ _PR_SET_PDEATHSIG = 1
 
 
 def end_with_parent(parent: int) -> None:
-    """Has the kernel kill this process when its parent ends, where the system is Linux.
+    """Makes the kernel kill this process when its parent ends (on Linux only).
 
-    More exactly, the kernel watches the thread of the parent that started this process.
+    More precisely, the kernel watches the parent's thread that started this process.
 
     Args:
-        parent: Process that started this one. If it has ended already, this process ends, too.
-            0 means: whichever process is the parent now.
+        parent: Process that started this one. If it has already ended, this process ends as well. 0
+            means the current parent, whichever it is.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -42,12 +42,12 @@ def end_with_parent(parent: int) -> None:
 
 
 def extended(path: Iterable[str], first: Iterable[str], last: Iterable[str]) -> list[str]:
-    """A ``sys.path`` with more folders; relative ones and the working folder are not added.
+    """Returns ``sys.path`` extended by folders, without relative ones and the working folder.
 
     Args:
         path: An isolated ``sys.path``: the standard library and site-packages.
-        first: Folders that come before site-packages, but after the standard library.
-        last: Folders that come after all others.
+        first: Folders that precede site-packages but follow the standard library.
+        last: Folders that follow all others.
     """
     here = None
     with contextlib.suppress(OSError):
@@ -65,10 +65,10 @@ def extended(path: Iterable[str], first: Iterable[str], last: Iterable[str]) -> 
 
 
 class PackageFinder:
-    """Finds the package ``wavecomb`` that this file belongs to, and nothing else."""
+    """Import finder for the ``wavecomb`` package that contains this file, and for nothing else."""
 
     def find_spec(self, name: str, path: Any, target: ModuleType | None = None) -> Any:
-        """Answers an ``import``; part of the interface of ``sys.meta_path``."""
+        """Finds a module; part of the interface of ``sys.meta_path``."""
         if name != "wavecomb":
             return None
         from importlib.util import find_spec, spec_from_file_location
@@ -81,12 +81,13 @@ class PackageFinder:
         own = os.path.join(PACKAGE, "__init__.py")
         origin = None if found is None else found.origin
         if origin is not None and os.path.realpath(origin) == os.path.realpath(own):
-            return found  # an editable installation knows more places of the package
+            # An editable installation knows further locations of the package.
+            return found
         return spec_from_file_location(name, own, submodule_search_locations=[PACKAGE])
 
 
 def close_others(kept: Iterable[int]) -> None:
-    """Closes all descriptors above standard error but these."""
+    """Closes all descriptors above standard error except the given ones."""
     with contextlib.suppress(OSError):
         for name in os.listdir("/dev/fd"):
             if int(name) > 2 and int(name) not in kept:
@@ -101,7 +102,7 @@ def _lead_group() -> None:
 
     with contextlib.suppress(OSError):
         os.setpgid(0, 0)
-    # This group is not the terminal's foreground group: writing to it must not stop the process.
+    # Outside of the terminal's foreground group, writing must not stop the process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
 
 
@@ -109,9 +110,9 @@ def main(words: Sequence[str]) -> None:
     """Runs a target.
 
     Args:
-        words: ``--parent=PID``, ``--keep=FD,FD``, ``--first=FOLDERS``, ``--last=FOLDERS`` and
-            ``--path=FOLDERS`` (also the working folder, if it is named), in any order and all
-            optional, then the target and its arguments.
+        words: Options ``--parent=PID``, ``--keep=FD,FD``, ``--first=FOLDERS``, ``--last=FOLDERS``
+            and ``--path=FOLDERS`` (which may include the working folder) in any order, then the
+            target and its arguments.
     """
     rest, options = list(words), {}
     while rest[0].startswith("--"):

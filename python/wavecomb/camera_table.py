@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a camera can be told: the rows of the core's table of cameras (scene/camera/camera_table.h).
+"""Parameters of cameras, from the core's table (scene/camera/camera_table.h).
 
-Keywords of ``SceneBuilder.set_camera`` and their stub, the call that a sandbox may make, what a
-sequence takes over from frame to frame and poses of the window follow from them.
+They determine the keywords of ``SceneBuilder.set_camera`` and its stub, the calls that a sandboxed
+process may make, the parameters that frames of a sequence share, and camera poses in the window.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class CameraParameter:
 
     Attributes:
         name: Keyword of ``set_camera``.
-        help: What it is, with its unit, a sentence.
+        help: Description with unit, one sentence.
         kind: "number", "choice", "four" (numbers) or "planes".
-        default: None where ``set_camera`` must be told.
-        least: Smallest number; None: any.
-        choices: Of a choice.
+        default: Default value; None if ``set_camera`` requires the parameter.
+        least: Smallest number; None means no limit.
+        choices: Values of a choice.
     """
 
     name: str
@@ -37,7 +37,7 @@ class CameraParameter:
 
     @property
     def annotation(self) -> str:
-        """Its type in a stub.
+        """Python type for the stub.
 
         >>> camera_parameters()["window"].annotation
         'tuple[float, float, float, float]'
@@ -52,7 +52,7 @@ class CameraParameter:
 
 @cache
 def camera_parameters() -> Mapping[str, CameraParameter]:
-    """Every parameter by name, in the table's order.
+    """Returns every parameter by name, in the table's order.
 
     >>> camera_parameters()["projection"].choices
     ('perspective', 'orthographic', 'latlong')
@@ -63,7 +63,7 @@ def camera_parameters() -> Mapping[str, CameraParameter]:
 
 
 def camera_defaults() -> dict[str, Any]:
-    """What ``set_camera`` takes where nothing is said, of all that it need not be told.
+    """Returns the defaults of ``set_camera`` for all optional parameters.
 
     >>> camera_defaults()["pixel_aspect"]
     1.0

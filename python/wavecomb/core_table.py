@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of parameters that the core has, as rows of Python."""
+"""Converts parameter tables of the core to Python rows."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ R = TypeVar("R", bound=_Named)
 
 
 def rows_by_name(row: type[R], given: Iterable[Mapping[str, Any]]) -> Mapping[str, R]:
-    """The rows of a table by name, in its order.
+    """Returns the rows of a table by name, in the table's order.
 
     Args:
-        row: Made of what the core says of each.
-        given: ``_core.setting_table()`` and the like. The core's floats become the shortest number
-            that stands for them: 0.53, and not the double next to it.
+        row: Class of a row.
+        given: Result of ``_core.setting_table()`` or a similar function. Its float32 values become
+            the shortest decimal numbers that represent them, such as 0.53.
     """
 
     def plain(value: Any) -> Any:

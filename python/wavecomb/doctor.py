@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed here and works, what is missing, and the command that brings it."""
+"""Checks the installation and names the command that installs or repairs each part."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ OK, MISSING, BROKEN = "ok", "missing", "broken"
 
 @dataclass(frozen=True)
 class Check:
-    """Something that was looked at.
+    """Result of one check.
 
     Attributes:
-        name: To people.
+        name: Name of the checked part for users.
         state: "ok", "missing" or "broken".
-        text: A version, or what is wrong; a line.
+        text: A version or an error, one line.
         needed: Whether renders need it.
-        do: The command, or the words, that would mend it; "" where nothing has to be.
+        do: Command or instruction that fixes the problem; "" if there is none.
     """
 
     name: str
@@ -37,9 +37,9 @@ class Check:
 
 
 def examine() -> dict[str, list[Check]]:
-    """Looks at everything, by heading; takes about a second.
+    """Runs all checks; returns results by heading. Takes about a second.
 
-    A broken library is a line, never an exception.
+    Broken libraries are reported and never raise exceptions.
     """
     return {
         "Wavecomb": [_package(), _try("native library", _native), _try("a picture", _picture)],
@@ -59,18 +59,18 @@ def examine() -> dict[str, list[Check]]:
 
 
 def is_fit(found: dict[str, list[Check]]) -> bool:
-    """Whether all that renders need is there and works."""
+    """Returns whether all parts that renders need work."""
     return all(one.state == OK or not one.needed for group in found.values() for one in group)
 
 
 def as_plain(found: dict[str, list[Check]]) -> dict[str, Any]:
-    """The same for programs."""
+    """Returns the results as plain data for JSON."""
     groups = {name.lower(): [asdict(one) for one in group] for name, group in found.items()}
     return {"schema": "wavecomb-doctor/1", "fit": is_fit(found), **groups}
 
 
 def lines(found: dict[str, list[Check]]) -> list[str]:
-    """The same for people."""
+    """Returns the results as lines of text."""
     out: list[str] = []
     width = max(len(one.name) for group in found.values() for one in group)
     for title, group in found.items():
@@ -84,20 +84,24 @@ def lines(found: dict[str, list[Check]]) -> list[str]:
 
 
 def _try(name: str, look: Callable[[], str]) -> Check:
-    """A check of the native part, whose text is what ``look`` says; broken where that raises."""
+    """Checks a native part whose description ``look`` returns.
+
+    An exception means that it is broken.
+    """
     try:
         return Check(name, OK, look(), True)
-    except Exception as error:  # whatever is wrong with a library is what is asked
+    # Any exception is a result of the check.
+    except Exception as error:
         return Check(name, BROKEN, _why(error), True, _rebuild())
 
 
 def _why(error: Exception) -> str:
-    """What went wrong, in a line."""
+    """Returns an error as one line."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def _rebuild() -> str:
-    """How the native part comes anew: where a source tree is imported, or what was installed."""
+    """Returns how to rebuild the native part, for a source tree or an installed wheel."""
     is_source = (Path(__file__).resolve().parents[2] / "CMakeLists.txt").is_file()
     return (
         "make build"
@@ -120,7 +124,7 @@ def _native() -> str:
 
 
 def _picture() -> str:
-    """Renders a wall under an even sky, and looks whether it has the colour that it must have."""
+    """Renders a wall under a uniform sky and checks its colour."""
     import time
 
     import numpy as np
@@ -143,7 +147,7 @@ def _picture() -> str:
 
 
 def _library(name: str, package: str, look: Callable[[], str], *, needed: bool = True) -> Check:
-    """A library that a package brings."""
+    """Checks a library that a Python package provides."""
     try:
         return Check(name, OK, look(), needed)
     except ModuleNotFoundError as error:
@@ -154,7 +158,7 @@ def _library(name: str, package: str, look: Callable[[], str], *, needed: bool =
 
 
 def _openvdb() -> Check:
-    """The plug-in for volumes, which a build may be without."""
+    """Checks the OpenVDB plug-in, which is optional."""
     from wavecomb import vdb
 
     if version := vdb.version():
@@ -183,7 +187,7 @@ def _materialx_version() -> str:
 
 
 def _embree_version() -> str:
-    """Asks the Embree that the native library has loaded."""
+    """Queries the Embree library that the native library has loaded."""
     import ctypes
 
     from wavecomb import _core  # noqa: F401
@@ -216,7 +220,7 @@ def _subdiv_version() -> str:
 
 
 def _loaded(library: str) -> str:
-    """The file of a library that this process has loaded."""
+    """Returns the file of a library that this process has loaded."""
     for line in Path("/proc/self/maps").read_text(errors="replace").splitlines():
         path = line[73:].strip() if "/" in line else ""
         if Path(path).name.startswith(library):
@@ -251,7 +255,7 @@ def _display() -> Check:
 
 
 def _machine() -> list[Check]:
-    """What ``wavecomb info --machine`` says."""
+    """Returns the rows of ``wavecomb info --machine``."""
     from wavecomb.info import machine_info, machine_rows
 
     try:

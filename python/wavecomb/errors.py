@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The error that a user sees."""
+"""Errors for users."""
 
 from __future__ import annotations
 
 
 class WavecombError(Exception):
-    """Bad input: one line that names the prim, file or option and says what to do.
+    """Invalid input; the one-line message names the prim, file or option and says what to do.
 
     The command line prints it without a traceback and exits with ``EXIT_CODE``.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Libraries that only some commands need."""
+"""Optional libraries that only some commands need."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Extra:
     """An extra of pyproject.toml.
 
     Attributes:
-        brings: What it is for, to people.
-        modules: That it installs, as imported.
+        brings: Features that it enables, for users.
+        modules: Import names of the modules that it installs.
     """
 
     brings: str
@@ -39,14 +39,14 @@ EXTRAS = {
         ("flip_evaluator", "jinja2", "matplotlib", "pandas", "scipy"),
     ),
 }
-"""By name; those for people who work on Wavecomb itself are not here."""
+"""Extras by name, without those for developers of Wavecomb."""
 
 
 def install_command(extra: str) -> str:
-    """Command that installs the packages of an extra.
+    """Returns the command that installs the packages of an extra.
 
-    It names the packages, not ``wavecomb[extra]``: no package index has Wavecomb yet, so that name
-    could be anybody's.
+    It names the packages instead of ``wavecomb[extra]``, since Wavecomb is not in a package index
+    and anybody could register its name.
 
     >>> install_command("denoise")
     "pip install 'pyoidn>=2.5'"
@@ -55,7 +55,7 @@ def install_command(extra: str) -> str:
 
 
 def requirements(extra: str) -> list[str]:
-    """Packages of an extra with their versions, from the metadata of the installed Wavecomb."""
+    """Returns the packages of an extra with version bounds, from the installed metadata."""
     try:
         lines = importlib.metadata.requires("wavecomb") or []
     except importlib.metadata.PackageNotFoundError:
@@ -69,7 +69,7 @@ def requirements(extra: str) -> list[str]:
 
 
 def _is_for_this_python(marker: str) -> bool:
-    """Whether the bounds of python_version in a marker hold."""
+    """Returns whether the python_version bounds of a marker hold."""
     bounds = re.findall(r"""python_version (<|>=) ['"](\d+)\.(\d+)['"]""", marker)
     now = sys.version_info[:2]
     return all((now < (int(a), int(b))) == (sign == "<") for sign, a, b in bounds)
@@ -79,12 +79,12 @@ def needed(module: str, what: str, extra: str = "bench") -> Any:
     """Imports a library of an extra.
 
     Args:
-        module: As imported.
-        what: Who needs it, as the subject of the message: "SSIM".
-        extra: That brings it, of pyproject.toml.
+        module: Import name.
+        what: Feature that needs it, as the subject of the message, such as "SSIM".
+        extra: Extra of pyproject.toml that contains it.
 
     Raises:
-        WavecombError: It is missing; says how to install it.
+        WavecombError: The library is missing; the message explains how to install it.
     """
     try:
         return importlib.import_module(module)
@@ -96,7 +96,7 @@ def needed(module: str, what: str, extra: str = "bench") -> Any:
 
 
 def missing_modules(extra: str) -> list[str]:
-    """Modules of an extra that are not installed; nothing is imported."""
+    """Returns the modules of an extra that are not installed, without importing any."""
     missing = []
     for module in EXTRAS[extra].modules:
         package = module.partition(".")[0]
@@ -106,11 +106,11 @@ def missing_modules(extra: str) -> list[str]:
 
 
 def check_installed(extra: str, what: str) -> None:
-    """Raises WavecombError, which says how to install it, unless an extra is installed.
+    """Raises WavecombError with installation advice unless an extra is installed.
 
     Args:
-        extra: Of pyproject.toml.
-        what: Who needs it, as the subject of the message.
+        extra: Extra of pyproject.toml.
+        what: Feature that needs it, as the subject of the message.
     """
     missing = missing_modules(extra)
     if missing:

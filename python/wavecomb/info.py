@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a stage holds, as Wavecomb would render it."""
+"""Summary of a stage as Wavecomb would render it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 _MOST_VOLUMES = 16
-"""That are listed for people."""
+"""Most volumes in the text output."""
 
 
 def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
-    """What would be rendered, as plain data.
+    """Returns the summary of a stage as plain data.
 
     Args:
-        loaded: What ``wavecomb.load`` gave.
+        loaded: Result of ``wavecomb.load``.
         stage: Name of the file.
     """
     from wavecomb.isa import library_info
@@ -63,7 +63,7 @@ def stage_info(loaded: LoadedStage, stage: str) -> dict[str, Any]:
 
 
 def machine_info() -> dict[str, Any]:
-    """What this machine has for a render, as plain data."""
+    """Returns the resources and features of this machine as plain data."""
     from wavecomb import _core, vdb
     from wavecomb.isa import library_info
     from wavecomb.machine import memory_bytes, usable_cores
@@ -83,7 +83,7 @@ def machine_info() -> dict[str, Any]:
 
 
 def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
-    """The same for people: names, and what there is."""
+    """Returns the machine's resources as names and texts."""
     from wavecomb.isa import library_text
 
     memory, limit = info["memory_bytes"], info["memory_limit_bytes"]
@@ -100,12 +100,12 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def machine_lines(info: dict[str, Any]) -> list[str]:
-    """The same as lines."""
+    """Returns the machine's resources as lines."""
     return [f"{name:13}  {text}" for name, text in machine_rows(info)]
 
 
 def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> None:
-    """The same for people."""
+    """Prints the summary of a stage."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -163,7 +163,7 @@ def print_info(info: dict[str, Any], loaded: LoadedStage, console: Console) -> N
 
 
 def _volume_rows(row: Callable[[str, str], None], volume: dict[str, Any]) -> None:
-    """A volume, and its grids below it."""
+    """Adds rows for a volume and its grids."""
     low, high = volume["bounds"]
     times = f" x {volume['count']}" if volume["count"] > 1 else ""
     what = "" if volume["grids"] else ", homogeneous"

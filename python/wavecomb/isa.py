@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which native library is used: the only one, or in a portable build the best that this CPU runs.
+"""Selects the native library: in a portable build, the best one for this CPU.
 
-A portable build (docs/building.md) brings ``wavecomb/lib/<isa>/_core`` for each instruction set,
-and ``wavecomb/_cpu``, which says what this CPU runs. ``wavecomb._core`` is then the best of them,
-chosen when it is first imported. The environment variable ``WAVECOMB_ISA`` names another.
+A portable build (docs/building.md) has ``wavecomb/lib/<isa>/_core`` for each instruction set, and
+``wavecomb/_cpu``, which detects the CPU's instruction sets. The first import of ``wavecomb._core``
+loads the best library. The environment variable ``WAVECOMB_ISA`` selects another one.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from typing import Any
 from wavecomb.errors import WavecombError
 
 ISAS = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "armv8-a")
-"""Instruction sets that there may be a library for, best first."""
+"""Supported instruction sets, best first."""
 
 VARIABLE = "WAVECOMB_ISA"
 CORE = "wavecomb._core"
 
 
 def choose(built: Sequence[str], runnable: Sequence[str], forced: str | None = None) -> str:
-    """The instruction set whose library is to be loaded.
+    """Returns the instruction set whose library is to be loaded.
 
     Args:
-        built: Those that there is a library for; not empty.
-        runnable: Those that this CPU runs.
-        forced: The one that the user wants, if any.
+        built: Instruction sets with a library; not empty.
+        runnable: Instruction sets of this CPU.
+        forced: Instruction set that the user requests, if any.
 
     Raises:
-        WavecombError: ``forced`` is unknown, not built or not for this CPU; or no library is.
+        WavecombError: ``forced`` is unknown, not built or not supported by this CPU, or no library
+            is.
     """
     there_are = ", ".join(isa for isa in ISAS if isa in built)
     if forced:
@@ -62,10 +63,10 @@ def choose(built: Sequence[str], runnable: Sequence[str], forced: str | None = N
 
 
 def libraries(places: Sequence[str]) -> dict[str, Path]:
-    """The library of each instruction set that was built, best first.
+    """Returns the library of each instruction set that was built, best first.
 
     Args:
-        places: Directories of the package, as ``wavecomb.__path__``.
+        places: Folders of the package, as in ``wavecomb.__path__``.
     """
     found: dict[str, Path] = {}
     for isa in ISAS:
@@ -78,10 +79,10 @@ def libraries(places: Sequence[str]) -> dict[str, Path]:
 
 
 def chosen_library(places: Sequence[str]) -> tuple[str, Path] | None:
-    """Instruction set and file that ``wavecomb._core`` is, or None in a build of one library.
+    """Returns instruction set and file of ``wavecomb._core``; None in a build with one library.
 
     Raises:
-        WavecombError: As choose(); or ``WAVECOMB_ISA`` is set where there is nothing to choose.
+        WavecombError: ``choose`` fails, or ``WAVECOMB_ISA`` is set in a build with one library.
     """
     built, forced = libraries(places), os.environ.get(VARIABLE)
     if not built:
@@ -98,11 +99,11 @@ def chosen_library(places: Sequence[str]) -> tuple[str, Path] | None:
 
 
 def library_info() -> dict[str, Any]:
-    """The library in use: ``library`` (its name), ``isa``, ``lanes``, and ``built``, all there are.
+    """Returns ``library`` (its name), ``isa``, ``lanes`` and ``built`` (all libraries).
 
     Raises:
-        ImportError: There is none, or it is broken.
-        WavecombError: As chosen_library().
+        ImportError: There is no library, or it is broken.
+        WavecombError: ``chosen_library`` fails.
     """
     import wavecomb
     from wavecomb import _core
@@ -117,7 +118,7 @@ def library_info() -> dict[str, Any]:
 
 
 def library_text() -> str:
-    """The same for people, in one line."""
+    """Returns ``library_info`` as one line of text."""
     info = library_info()
     lanes = ", ".join(str(width) for width in info["lanes"])
     of = f" of {', '.join(info['built'])}" if len(info["built"]) > 1 else ""
@@ -125,24 +126,24 @@ def library_text() -> str:
 
 
 class Finder:
-    """Finds ``wavecomb._core`` among the libraries of a portable build, and nothing else."""
+    """Import finder for ``wavecomb._core`` in a portable build, and for nothing else."""
 
     @staticmethod
     def find_spec(
         name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """What ``import`` asks."""
+        """Finds a module; part of the interface of ``sys.meta_path``."""
         if name != CORE or path is None:
             return None
         chosen = chosen_library(path)
         if chosen is None:
             return None
         file = str(chosen[1])
-        # The name decides what the module calls itself and its classes; the folder does not show.
+        # The module and its classes are named after this name, not after the folder.
         return spec_from_file_location(name, file, loader=ExtensionFileLoader(name, file))
 
 
 def install() -> None:
-    """Makes ``import wavecomb._core`` ask the Finder first."""
+    """Registers the finder, so that it handles ``import wavecomb._core``."""
     if Finder not in sys.meta_path:
         sys.meta_path.insert(0, Finder)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of lights: the rows of the core's table (light/description/light_table.h).
+"""Parameters of lights, from the core's table (light/description/light_table.h).
 
-Keywords of ``SceneBuilder.add_light`` and their stub, the calls that a sandbox may make, what the
-loader reads of a prim and the window's fields follow from them.
+They determine the keywords of ``SceneBuilder.add_light`` and its stub, the calls that a sandboxed
+process may make, the inputs that the loader reads, and the window's fields.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from wavecomb.core_table import rows_by_name
 
 MESH = "triangle"
-"""The kind of lights of meshes: ``SceneBuilder.add_mesh_light``."""
+"""Kind of mesh lights, for ``SceneBuilder.add_mesh_light``."""
 
 EDITABLE = ("number", "colour", "flag")
 """Kinds of values that an edit can change."""
@@ -28,18 +28,19 @@ class LightParameter:
 
     Attributes:
         name: Keyword of ``add_light``.
-        label: In a form.
-        help: What it is, with its unit, a sentence.
-        input: UsdLux's name without "inputs:"; "" where there is none of that meaning.
+        label: Label in a form.
+        help: Description with unit, one sentence.
+        input: UsdLux name without "inputs:"; "" if UsdLux has no equivalent.
         group: "emission", "shape", "shaping" or "response".
         kind: "number", "colour", "flag", "choice", "id" or "transforms".
-        refers: What an id is of: "texture", "profile", "set" or "group", which is a name.
-        default: None of an id: none.
-        least: Smallest number; None: any.
-        most: Largest number; None: any.
-        usual: Upper end of a slider where there is no largest number.
-        choices: Of a choice.
-        kinds: Kinds of light that have it.
+        refers: Kind of object that an id refers to: "texture", "profile", "set", or "group", which
+            is a name.
+        default: Default value; None for ids.
+        least: Smallest number; None means no limit.
+        most: Largest number; None means no limit.
+        usual: Upper end of a slider if there is no largest number.
+        choices: Values of a choice.
+        kinds: Kinds of light that have the parameter.
     """
 
     name: str
@@ -58,7 +59,7 @@ class LightParameter:
 
     @property
     def annotation(self) -> str:
-        """Its type in a stub.
+        """Python type for the stub.
 
         >>> light_parameters()["color"].annotation, light_parameters()["ies"].annotation
         ('tuple[float, float, float]', 'int | None')
@@ -74,7 +75,7 @@ class LightParameter:
 
 @cache
 def light_parameters() -> Mapping[str, LightParameter]:
-    """Every parameter by name, in the table's order.
+    """Returns every parameter by name, in the table's order.
 
     >>> light_parameters()["radius"].kinds
     ('disk', 'sphere', 'cylinder')
@@ -85,7 +86,7 @@ def light_parameters() -> Mapping[str, LightParameter]:
 
 
 def of_kind(kind: str) -> tuple[LightParameter, ...]:
-    """The parameters of a kind of light, in the table's order.
+    """Returns the parameters of a kind of light, in the table's order.
 
     >>> [row.name for row in of_kind("distant")][:2]
     ['color', 'angle']
@@ -95,7 +96,7 @@ def of_kind(kind: str) -> tuple[LightParameter, ...]:
 
 @cache
 def kind_of_prims() -> Mapping[str, str]:
-    """The kind of light that prims of a type are drawn as.
+    """Returns the kind of light by USD prim type.
 
     >>> kind_of_prims()["DomeLight_1"]
     'dome'

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a stage is read: one table, whose rows are the fields of ``LoadOptions``.
+"""Load options of a stage: one table whose rows are the fields of ``LoadOptions``.
 
-Keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, options of the commands and
-what checkpoints keep follow from it.
+They determine the keywords of ``load``, ``render``, ``render_frames`` and ``load_stage``, the
+options of commands, and values in checkpoints.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ CATCH = ("through", "lit", "bare")
 
 @dataclass(frozen=True)
 class Row:
-    """How an option of loading stands in commands and files.
+    """Description of a load option for commands and files.
 
     Attributes:
-        help: What it is, a sentence.
-        kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), "not" (a
-            flag that says no).
-        unset: What holds where it is not given.
-        option: Of commands; empty: none.
-        metavar: Of its value.
-        choices: The values that there are.
-        many: May be given again.
+        help: Description, one sentence.
+        kind: "text", "file", "number", "integer", "pair", "choice", "switch" (on or off), or "not"
+            (a flag that disables something).
+        unset: Description of the default.
+        option: Option of commands; "" if there is none.
+        metavar: Placeholder of its value.
+        choices: Valid values.
+        many: Whether the option may be repeated.
         least: Smallest number.
         most: Largest number.
-        above: Whether ``least`` itself is too little.
-        unit: Of numbers.
+        above: Whether ``least`` itself is excluded.
+        unit: Unit of numbers.
     """
 
     help: str
@@ -55,7 +55,7 @@ class Row:
     unit: str = ""
 
     def check(self, name: str, value: Any) -> None:
-        """Raises WavecombError, which says ``name``, for a value that is none; None is no value."""
+        """Raises WavecombError with ``name`` for an invalid value; None is always valid."""
         if value is None:
             return
         for one in value if self.many and self.choices else (value,):
@@ -95,7 +95,7 @@ class Row:
 
     @property
     def key(self) -> str:
-        """Its name among the arguments of a command, and in checkpoints."""
+        """Name among a command's arguments and in checkpoints."""
         return self.option.removeprefix("--").replace("-", "_") + "s" * (
             self.many and self.option not in ("--mask", "--payloads")
         )
@@ -107,81 +107,81 @@ def _row(default: Any, text: str, kind: str, option: str = "", **more: Any) -> A
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """How a stage is read; None: as the stage says.
+    """Load options of a stage; None means that the stage decides.
 
     Attributes:
-        camera: Path or unique name of a camera prim; None: of the render settings, else the stage's
-            first, else one that sees everything.
-        frame: Time code; None: the stage's start, else default values.
-        purposes: Of the geometry: "default", "render", "proxy", "guide"; None: as the render
-            settings say, else the first two.
-        variants: Selections: {"/World/Car{paint}": "red"}; without a path the default prim's.
-        mask: Prims to draw, with all below them, and what they need, by paths or patterns
-            (docs/stages.md); by default all.
-        payloads: Patterns of the prims whose payloads are loaded, or "none" alone; by default all.
-        holdouts: Prims that the camera sees as holes, with all below them: black, and alpha 0.
-        catchers: Prims of which only the shadows on them show, with all below them
+        camera: Path or unique name of a camera prim; None uses the camera of the render settings,
+            else the first of the stage, else one that frames everything.
+        frame: Time code; None means the stage's start, else default values.
+        purposes: Purposes of the geometry: "default", "render", "proxy", "guide"; None uses those
+            of the render settings, else the first two.
+        variants: Variant selections: {"/World/Car{paint}": "red"}; a set without a path is one of
+            the default prim.
+        mask: Paths or patterns (docs/stages.md) of prims to render, with their descendants and
+            everything they need; by default all.
+        payloads: Patterns of prims whose payloads are loaded, or "none" alone; by default all.
+        holdouts: Prims that, with their descendants, cut holes into the image: black, with alpha 0.
+        catchers: Prims that, with their descendants, show only the shadows on them
             (docs/visibility.md).
-        catch: Which of the renders of a stage with catchers it is read for: "through", the picture,
-            whose camera does not see them, or those of the catchers alone, "lit" as they are and
-            "bare" as if nothing else were there.
+        catch: Purpose of the load for a stage with catchers: "through" for the main render, whose
+            camera does not see catchers, or "lit" and "bare" for the renders of catchers with and
+            without other objects.
         session_layer: File with opinions that are stronger than the stage's.
-        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto": by the
-            size of their edges in the picture (docs/subdivision.md).
-        strand_pixels: Curves that are narrower in the picture are thinned out, and the others
-            widened, to no more than that (docs/hair.md); 0: none.
-        shutter: When it opens and closes, time codes from the frame; None: the camera's.
-        motion_blur: Whether what moves while the shutter is open is blurred; None: unless the
-            render settings disable it.
-        motion_steps: Steps of every motion, 2 to 64; None: as many as each needs, up to 8.
-        depth_of_field: Whether the camera's lens blurs; None: unless the render settings disable
-            it.
-        projection: "perspective", "orthographic" or "latlong"; None: the camera's.
-        exposure: Whether the camera's exposure multiplies light in the picture.
-        lens_settings: Of the camera's lens: {"lens_k1": "-0.1", "rolling_shutter": "top"}; they go
-            before its attributes (docs/cameras.md).
-        st_map: Picture that says how the lens distorts, in place of coefficients.
-        render_settings: Path or name of a RenderSettings prim; None: those that the stage names,
-            else the only ones under /Render (docs/cameras.md).
-        product: Path or name of one of their products; None: the first.
-        texture_limit: MB (10^6 bytes) that all textures and grids of volumes may take; None: any.
-            What does not fit of textures waits in a temporary file (docs/textures.md).
-        working_space: What the picture is computed in: "rec709", or "acescg" (docs/textures.md).
-        lights: "visible", or "hidden": no ray meets the shapes of lights, which shine all the same
-            (docs/decisions/light-shapes.md).
-        size: Width and height of the picture that automatic levels are for.
-        threads: For images, textures and subdivision; 0: all.
+        subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto" to choose
+            levels by the size of edges in the image (docs/subdivision.md).
+        strand_pixels: Width in pixels below which curves are thinned out and the remaining ones
+            widened up to this width (docs/hair.md); 0 disables it.
+        shutter: Opening and closing time relative to the frame, in time codes; None uses the
+            camera's shutter.
+        motion_blur: Whether to render motion blur; None enables it unless the render settings
+            disable it.
+        motion_steps: Steps of every motion, 2 to 64; None chooses up to 8 as needed.
+        depth_of_field: Whether to render depth of field; None enables it unless the render settings
+            disable it.
+        projection: "perspective", "orthographic" or "latlong"; None uses the camera's projection.
+        exposure: Whether the camera's exposure scales the image.
+        lens_settings: Lens settings such as {"lens_k1": "-0.1", "rolling_shutter": "top"}, which
+            override the camera's attributes (docs/cameras.md).
+        st_map: ST map image of the lens distortion, in place of coefficients.
+        render_settings: Path or name of a RenderSettings prim; None uses those that the stage
+            names, else the only ones under /Render (docs/cameras.md).
+        product: Path or name of one of their products; None uses the first.
+        texture_limit: Memory limit of textures and volume grids in MB (10^6 bytes); None means no
+            limit. Textures beyond it are swapped to a temporary file (docs/textures.md).
+        working_space: Working colour space: "rec709" or "acescg" (docs/textures.md).
+        lights: "visible", or "hidden" to make the shapes of lights invisible to all rays while they
+            still emit (docs/decisions/light-shapes.md).
+        size: Width and height of the image for which automatic levels are chosen.
+        threads: Threads for images, textures and subdivision; 0 means all.
     """
 
     camera: str | None = _row(
-        None, "Camera prim.", "text", "--camera", metavar="PATH",
+        None, "Camera prim to render from.", "text", "--camera", metavar="PATH",
         unset="of the render settings, else the first",
     )  # fmt: skip
     frame: float | None = _row(
-        None, "Time code.", "number", "--frame", metavar="T", unset="the stage's start"
+        None, "Time code of the frame.", "number", "--frame", metavar="T", unset="the stage's start"
     )
     purposes: tuple[str, ...] | None = _row(
-        None, "Geometry to take, may be given again.", "choice", "--purpose", many=True,
+        None, "Purpose of geometry to render; may be repeated.", "choice", "--purpose", many=True,
         choices=PURPOSES, unset="of the render settings, else default and render",
     )  # fmt: skip
     variants: Mapping[str, str] | None = _row(
-        None, "Variant to select, may be given again; SET=NAME is of the default prim.", "text",
+        None, "Variant to select; may be repeated. SET=NAME applies to the default prim.", "text",
         "--variant", many=True, metavar="PRIM{SET}=NAME",
     )  # fmt: skip
     lights: str = _row(
-        "visible", "Whether rays meet the shapes of lights; hidden ones shine all the same.",
+        "visible", "Whether the shapes of lights are visible; hidden lights still emit.",
         "choice", "--lights", choices=LIGHT_SHAPES, unset="visible",
     )  # fmt: skip
     shutter: tuple[float, float] | None = _row(
-        None, "When the shutter opens and closes, time codes from the frame.", "pair", "--shutter",
-        metavar="OPEN CLOSE", unset="the camera's",
+        None, "Opening and closing time of the shutter, in time codes from the frame.", "pair",
+        "--shutter", metavar="OPEN CLOSE", unset="the camera's",
     )  # fmt: skip
-    motion_blur: bool | None = _row(
-        None, "What moves is drawn as it is at the frame.", "not", "--no-motion-blur"
-    )
+    motion_blur: bool | None = _row(None, "Disable motion blur.", "not", "--no-motion-blur")
     motion_steps: int | None = _row(
-        None, "Steps of every motion over the shutter.", "integer", "--motion-steps", metavar="N",
-        least=2, most=64, unset="as many as it needs, 2 to 8",
+        None, "Number of motion steps over the shutter.", "integer", "--motion-steps", metavar="N",
+        least=2, most=64, unset="as needed, 2 to 8",
     )  # fmt: skip
     render_settings: str | None = _row(
         None, "Render settings prim, by path or name.", "text", "--render-settings", metavar="PATH",
@@ -189,76 +189,83 @@ class LoadOptions:
     )  # fmt: skip
     product: str | None = _row(
         None, "Render product, by path or name.", "text", "--product", metavar="PATH",
-        unset="of render all, else the first",
+        unset="all for render, else the first",
     )  # fmt: skip
     projection: str | None = _row(
-        None, "latlong: all directions in one picture.", "choice", "--camera-projection",
-        choices=PROJECTIONS, unset="the camera's",
+        None, "Projection of the camera; latlong shows all directions in one image.", "choice",
+        "--camera-projection", choices=PROJECTIONS, unset="the camera's",
     )  # fmt: skip
     exposure: bool = _row(
-        True, "The camera's exposure multiplies light in the picture.", "switch",
+        True, "Whether the camera's exposure scales the image.", "switch",
         "--camera-exposure", unset="on",
     )  # fmt: skip
     depth_of_field: bool | None = _row(
-        None, "What is out of focus is blurred, as the camera's fStop says.", "switch",
+        None, "Whether to render depth of field, by the camera's fStop.", "switch",
         "--depth-of-field", unset="unless the render settings disable it",
     )  # fmt: skip
     lens_settings: Mapping[str, str] | None = _row(
-        None, "Distortion, aperture or rolling shutter of the camera; may be given again.", "text",
+        None, "Distortion, aperture or rolling shutter of the camera; may be repeated.", "text",
         "--lens-setting", many=True, metavar="NAME=VALUE", unset="the camera's",
     )  # fmt: skip
     st_map: str | None = _row(
-        None, "ST map: how the lens distorts.", "file", "--st-map", metavar="FILE.exr"
+        None, "ST map of the lens distortion.", "file", "--st-map", metavar="FILE.exr"
     )
     mask: tuple[str, ...] = _row(
-        (), "Prim to draw, with all below it and what it needs, or a pattern of such; may be given "
-        "again.", "text", "--mask", many=True, metavar="PATH", unset="all",
+        (), "Prim or pattern to render, with its descendants and everything it needs; may be "
+        "repeated.", "text", "--mask", many=True, metavar="PATH", unset="all",
     )  # fmt: skip
     payloads: tuple[str, ...] = _row(
-        (), "Pattern of prims whose payloads are loaded, or none; may be given again.", "text",
+        (), "Pattern of prims whose payloads are loaded, or none; may be repeated.", "text",
         "--payloads", many=True, metavar="PATTERN", unset="all",
     )  # fmt: skip
     holdouts: tuple[str, ...] = _row(
-        (), "Prim that the camera sees as a hole, black with alpha 0, and all below it; may be "
-        "given again.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
+        (), "Prim that, with its descendants, cuts a hole into the image (black, alpha 0); may be "
+        "repeated.", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
     catchers: tuple[str, ...] = _row(
-        (), "Prim of which only the shadows on it show, as alpha, and all below it; may be given "
-        "again.", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
+        (), "Prim that, with its descendants, shows only the shadows on it, as alpha; may be "
+        "repeated.", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
-    catch: str = _row("through", "Which render of a stage with catchers.", "choice", choices=CATCH)
+    catch: str = _row(
+        "through",
+        "Render of a stage with catchers for which it is loaded.",
+        "choice",
+        choices=CATCH,
+    )
     session_layer: str | None = _row(
         None, "Layer with opinions stronger than the stage's.", "file", "--session-layer",
         metavar="FILE",
     )  # fmt: skip
     texture_limit: float | None = _row(
-        None, "Memory of textures and grids; what does not fit waits in a temporary file.",
+        None, "Memory limit of textures and grids; textures beyond it use a temporary file.",
         "number",
         "--texture-limit", metavar="MB", least=0, above=True, unit="MB", unset="any",
     )  # fmt: skip
     working_space: str = _row(
-        "rec709", "Linear colours that the picture is computed in.", "choice", "--working-space",
+        "rec709", "Linear colour space of the render.", "choice", "--working-space",
         choices=WORKING_SPACES, unset="rec709",
     )  # fmt: skip
     subdivision: str | int = _row(
         "auto",
-        "Subdivision surfaces: as polygons, refined LEVEL times (0 to 10), or by their size in the "
-        "picture.",
+        "Subdivision surfaces: off (polygons), refined LEVEL times (0 to 10), or auto, by their "
+        "size in the image.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
     strand_pixels: float = _row(
-        0.0, "Curves narrower than that in the picture are thinned out, the others widened; 0: "
-        "none.", "number", "--strand-pixels", metavar="X", least=0, unset="0",
+        0.0, "Width in pixels below which curves are thinned out and the rest widened; 0 disables "
+        "it.", "number", "--strand-pixels", metavar="X", least=0, unset="0",
     )  # fmt: skip
-    size: tuple[int, int] = _row((600, 600), "Width and height of the picture.", "pair", least=1)
-    threads: int = _row(0, "Threads that read; 0: all.", "integer", least=0)
+    size: tuple[int, int] = _row(
+        (600, 600), "Width and height of the image in pixels.", "pair", least=1
+    )
+    threads: int = _row(0, "Threads for reading; 0 means all.", "integer", least=0)
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
-        """Options with others in place of some, as Python callers give them.
+        """Returns options with some values replaced, converted from Python callers' types.
 
         Raises:
-            TypeError: There is no such option.
+            TypeError: An option does not exist.
         """
         known = {one.name for one in fields(cls)}
         unknown = [name for name in changes if name not in known]
@@ -279,34 +286,34 @@ class LoadOptions:
 
     @property
     def chooses_what_opens(self) -> bool:
-        """Whether it has options that only a file can have, which is opened by them."""
+        """Whether options are set that apply only while a file is opened."""
         return bool(self.mask or self.payloads or self.session_layer is not None)
 
     def as_dict(self) -> dict[str, Any]:
-        """By name."""
+        """Returns the options by name."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def check(self) -> None:
-        """Raises WavecombError for what no stage can have."""
+        """Raises WavecombError for values that are invalid for every stage."""
         for one in fields(self):
             row = row_of(one)
             row.check(row.option[2:].replace("-", " ") or one.name, getattr(self, one.name))
 
 
 def row_of(option: Field[Any]) -> Row:
-    """How a field of ``LoadOptions`` stands in commands."""
+    """Returns the description of a field of ``LoadOptions``."""
     return cast(Row, option.metadata["row"])
 
 
 def rows() -> dict[str, Row]:
-    """The rows of options that commands have, by the name of the field."""
+    """Returns the rows of all options that commands have, by field name."""
     return {one.name: row_of(one) for one in fields(LoadOptions) if row_of(one).option}
 
 
 def split(
     options: Mapping[str, Any], without: Iterable[str] = ()
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Keywords that are options of loading, and the others.
+    """Splits keywords into load options and others.
 
     >>> split({"camera": "/Cam", "seed": 3})
     ({'camera': '/Cam'}, {'seed': 3})
@@ -317,10 +324,10 @@ def split(
 
 
 def given(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of a command's arguments, by ``Row.key``, as fields: those that are given.
+    """Converts a command's arguments, by ``Row.key``, to fields; omits those that are not given.
 
     Raises:
-        WavecombError: A value is no good.
+        WavecombError: A value is invalid.
     """
     out: dict[str, Any] = {}
     for name, row in rows().items():
@@ -347,7 +354,7 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
 def _named_values(
     option: str, parts: Iterable[tuple[str, str, str]], form: str = "NAME=VALUE"
 ) -> dict[str, str]:
-    """Texts, parted at an equals sign, as a mapping. Raises WavecombError."""
+    """Converts texts that are split at an equals sign to a mapping; raises WavecombError."""
     values: dict[str, str] = {}
     for name, equals, value in parts:
         if not (name and equals and value):
@@ -357,6 +364,6 @@ def _named_values(
 
 
 def selections(variants: Sequence[str]) -> dict[str, str]:
-    """PRIM{SET}=NAME ... as a mapping. Raises WavecombError."""
+    """Parses PRIM{SET}=NAME texts to a mapping; raises WavecombError."""
     parts = (text.rpartition("=") for text in variants)
     return _named_values("--variant", parts, "PRIM{SET}=NAME or SET=NAME")

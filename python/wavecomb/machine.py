@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What this process may use of the machine."""
+"""Resources of the machine that this process may use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tempfile
 
 
 def usable_cores() -> int:
-    """Cores that this process may run on."""
+    """Returns the number of cores that this process may run on."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:
@@ -16,7 +16,7 @@ def usable_cores() -> int:
 
 
 def memory_bytes() -> int | None:
-    """Memory of the machine; None where it does not say."""
+    """Returns the memory of the machine in bytes; None if unknown."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
@@ -24,14 +24,14 @@ def memory_bytes() -> int | None:
 
 
 def give_back_memory() -> None:
-    """Hands memory that was freed to the system."""
+    """Returns freed memory to the operating system."""
     from wavecomb import _core
 
     _core.give_back_memory()
 
 
 def temporary_folder() -> str:
-    """Where temporary files go: ``TMPDIR``, else /var/tmp, which is on a disk, else /tmp."""
+    """Returns the folder for temporary files: ``TMPDIR``, else /var/tmp (on a disk), else /tmp."""
     chosen = os.environ.get("TMPDIR")
     if chosen:
         return chosen

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of materials: the core's table (material/description/material_table.h).
+"""Parameters of materials and programs, from the core's tables (material/description/material_table.h).
 
-Keywords of ``SceneBuilder.add_material`` and their stub, the calls that a sandbox may make, and
-what the loader reads of attributes of materials follow from them. Beside them, what programs read.
+They determine the keywords of ``SceneBuilder.add_material`` and its stub, the calls that a
+sandboxed process may make, and the material attributes that the loader reads.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class MaterialParameter:
     Attributes:
         name: Keyword of ``add_material``.
         kind: "number", "colour" or "flag".
-        default: That of UsdPreviewSurface.
-        program: The one that has it to itself; "" where materials of all can be told it.
-        least: Smallest number of a program's own; None: any.
-        most: Largest one.
+        default: Default, as in UsdPreviewSurface.
+        program: The only program with this parameter; "" if all materials accept it.
+        least: Smallest number of such a parameter; None means no limit.
+        most: Largest number; None means no limit.
     """
 
     name: str
@@ -37,7 +37,7 @@ class MaterialParameter:
 
     @property
     def annotation(self) -> str:
-        """Its type in a stub.
+        """Python type for the stub.
 
         >>> material_parameters()["emission"].annotation
         'tuple[float, float, float]'
@@ -47,24 +47,24 @@ class MaterialParameter:
 
     @property
     def attribute(self) -> str:
-        """Of a program's own: the attribute of a material's prim that gives it."""
+        """Attribute of the material prim, for parameters of a single program."""
         return f"wavecomb:{self.name}"
 
     def in_range(self, value: float) -> float:
-        """The nearest number that it can be."""
+        """Clamps a number to the valid range."""
         least = value if self.least is None else max(value, self.least)
         return least if self.most is None else min(least, self.most)
 
 
 @dataclass(frozen=True)
 class Program:
-    """What a program reads of its materials.
+    """A shading program and the parameters that it reads.
 
     Attributes:
-        name: As ``add_material`` takes it.
-        inputs: What textures can drive, as ``add_material`` calls it.
-        reads_ior: The index of refraction says something.
-        has_more: It has a whole set of parameters beside them, as openpbr.
+        name: Name for ``add_material``.
+        inputs: Parameters that textures can drive, by their names in ``add_material``.
+        reads_ior: Whether it uses the index of refraction.
+        has_more: Whether it has further parameters, as openpbr has.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Program:
 
     @property
     def reads(self) -> frozenset[str]:
-        """Its parameters that UsdPreviewSurface has, too.
+        """Parameters that it shares with UsdPreviewSurface.
 
         >>> sorted(programs()["plastic"].reads)
         ['base_color', 'ior', 'normal', 'roughness']
@@ -87,7 +87,7 @@ class Program:
 
 @cache
 def material_parameters() -> Mapping[str, MaterialParameter]:
-    """Every parameter by name, in the table's order.
+    """Returns every parameter by name, in the table's order.
 
     >>> material_parameters()["roughness"].default
     0.5
@@ -98,13 +98,13 @@ def material_parameters() -> Mapping[str, MaterialParameter]:
 
 
 def own_parameters(program: str) -> tuple[MaterialParameter, ...]:
-    """What a program has to itself, in the table's order."""
+    """Returns the parameters that only this program has, in the table's order."""
     return tuple(row for row in material_parameters().values() if row.program == program)
 
 
 @cache
 def programs() -> Mapping[str, Program]:
-    """Every program by name.
+    """Returns every program by name.
 
     >>> programs()["emissive"].inputs
     ('emission',)
@@ -116,7 +116,7 @@ def programs() -> Mapping[str, Program]:
 
 @cache
 def preview_programs() -> tuple[str, ...]:
-    """The programs that a UsdPreviewSurface can ask for.
+    """Returns the programs that a UsdPreviewSurface can select.
 
     >>> "principled" in preview_programs(), "openpbr" in preview_programs()
     (True, False)

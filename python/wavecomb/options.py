@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a render can be told: the rows of the core's table of settings (core/settings_table.h).
+"""Settings of a render, from the core's table (core/settings_table.h).
 
-Keywords of ``wavecomb.render``, options of the commands, the window's fields and a suite's keys
-follow from them.
+They determine the keywords of ``wavecomb.render``, the options of commands, the window's fields and
+the keys of benchmark suites.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from wavecomb.core_table import rows_by_name
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting that is one value.
+    """A setting with a single value.
 
     Attributes:
-        name: Of the attribute of ``wavecomb.Settings`` and the keyword.
-        label: In a form.
-        help: What it is, a sentence.
+        name: Attribute of ``wavecomb.Settings``, and keyword.
+        label: Label in a form.
+        help: Description, one sentence.
         kind: "integer", "number", "flag", "choice" or "text".
-        default: None where it follows from other settings.
-        least: Smallest number; None: any.
-        most: Largest number; None: any.
-        zero: What 0 stands for, where it stands for something.
-        steps: The numbers that there are, beside 0; empty: all.
-        choices: Value -> what it does; of a choice.
-        group: "picture": what the picture is; "work": how much is done for it; "order": what
-            computes it, and in which order.
-        changes_picture: Whether the picture depends on it.
-        changes_bits: Whether the bits of the beauty image depend on it, where each pixel has as
-            many samples. Costs may, with cost-aware roulette.
-        changes_expectation: Whether the picture that more and more samples tend to depends on it.
+        default: Default value; None if it depends on other settings.
+        least: Smallest number; None means no limit.
+        most: Largest number; None means no limit.
+        zero: Meaning of 0, if it is special.
+        steps: Valid numbers besides 0; empty means all.
+        choices: Value -> its effect, for a choice.
+        group: "picture" (content of the image), "work" (amount of computation), or "order"
+            (execution).
+        changes_picture: Whether the image depends on it.
+        changes_bits: Whether the bits of the beauty image depend on it at equal sample counts.
+            Costs do with cost-aware roulette.
+        changes_expectation: Whether the expectation of the image depends on it.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Setting:
 
     @property
     def option(self) -> str:
-        """The option of a command.
+        """Option of commands.
 
         >>> settings()["wave_size"].option
         '--wave-size'
@@ -64,7 +64,7 @@ class Setting:
 
     @property
     def annotation(self) -> str:
-        """Its type in a stub.
+        """Python type for the stub.
 
         >>> settings()["light_weights"].annotation
         'Literal["calibrated", "power"]'
@@ -77,7 +77,7 @@ class Setting:
 
 @cache
 def settings() -> Mapping[str, Setting]:
-    """Every setting by name, in the table's order.
+    """Returns every setting by name, in the table's order.
 
     >>> settings()["wave_size"].zero
     'automatic'
@@ -88,7 +88,7 @@ def settings() -> Mapping[str, Setting]:
 
 
 def names(group: str, *, without: Iterable[str] = ()) -> tuple[str, ...]:
-    """The settings of a group, in the table's order.
+    """Returns the settings of a group, in the table's order.
 
     >>> names("work")[:2]
     ('roulette', 'roulette_depth')
@@ -101,7 +101,7 @@ def names(group: str, *, without: Iterable[str] = ()) -> tuple[str, ...]:
 
 @cache
 def expectation() -> tuple[str, ...]:
-    """The settings that the picture depends on which more and more samples tend to.
+    """Returns the settings on which the expectation of the image depends.
 
     >>> "max_depth" in expectation(), "seed" in expectation()
     (True, False)
@@ -110,7 +110,7 @@ def expectation() -> tuple[str, ...]:
 
 
 def default_text(setting: Setting) -> str:
-    """The default for people.
+    """Returns the default as text.
 
     >>> default_text(settings()["threads"]), default_text(settings()["spp"])
     ('all', '64')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Path maps: folders that lie elsewhere on this machine than a job and its stage name them."""
+"""Path maps: replace folder names of a job and its stage by those of this machine."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from collections.abc import Iterable
 from wavecomb.errors import WavecombError
 
 Pair = tuple[str, str]
-"""A folder as a job and its stage name it, and where it lies here; both absolute."""
+"""A folder as the job and its stage name it, and on this machine; both absolute."""
 
 VARIABLE = "WAVECOMB_PATH_MAPS"
-"""JSON: pairs of folders. Set for the workers of a farm; nothing else sets it."""
+"""Environment variable with folder pairs as JSON, which is set only for workers of a farm."""
 
 
 def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
-    """Pairs of "FROM=TO".
+    """Parses texts of the form "FROM=TO".
 
     >>> parse_maps(["/Volumes/share=/share"])
     (('/Volumes/share', '/share'),)
 
     Raises:
-        WavecombError: A text is no such pair.
+        WavecombError: A text is invalid.
     """
     found = []
     for text in texts:
@@ -35,26 +35,28 @@ def parse_maps(texts: Iterable[str]) -> tuple[Pair, ...]:
 
 
 def use_maps(pairs: Iterable[Pair]) -> None:
-    """Has this process, and those that it starts, use maps of this machine."""
+    """Makes this process and its child processes use path maps."""
     found = list(pairs)
     if found:
         os.environ[VARIABLE] = json.dumps(found)
 
 
 def own_maps() -> list[Pair]:
-    """The maps of this process."""
+    """Returns the path maps of this process."""
     text = os.environ.get(VARIABLE)
     return [(str(named), str(lies)) for named, lies in json.loads(text)] if text else []
 
 
 def here(pairs: Iterable[Pair]) -> list[Pair]:
-    """Maps that hold on this machine: its own, and those of a job whose FROM is not there."""
+    """Returns this process's maps, and those of a job whose FROM folder does not exist."""
     found = own_maps()
     return found + [p for p in pairs if p not in found and not os.path.exists(p[0])]
 
 
 def mapped(path: str, pairs: Iterable[Pair]) -> str:
-    """Where a file lies; the longest folder that fits decides. Relative names stay as they are.
+    """Returns the mapped path of a file; the longest matching folder applies.
+
+    Relative paths are unchanged.
 
     >>> mapped("/a/b/c.png", [("/a", "/x"), ("/a/b", "/y")]), mapped("/ab/c", [("/a", "/x")])
     ('/y/c.png', '/ab/c')
@@ -70,7 +72,7 @@ def mapped(path: str, pairs: Iterable[Pair]) -> str:
         return path
     named, lies = (folder.rstrip("/") for folder in best)
     rest = path[len(named) :]
-    # What was mapped already is not mapped again.
+    # Do not map a path twice.
     return path if named == "" and _is_in(path, lies) else (lies + rest) or "/"
 
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts Python processes: the only module that does.
+"""Starts Python processes; no other module does so.
 
 A Python that is started with ``-c`` or ``-m`` has the working folder on its ``sys.path``, so that a
-file ``json.py`` beside a shot would be executed. The processes started here are isolated
-(``python -I``): ``wavecomb.boot`` builds their ``sys.path`` of the standard library, site-packages,
-and the folders that ``folders`` names. They inherit no descriptors but those they are given, have
-their own process group, and end with the process that started them.
+file ``json.py`` next to a shot would be executed. The processes started here are isolated (``python
+-I``):
+``wavecomb.boot`` builds their ``sys.path`` from the standard library, site-packages, and the
+folders of ``folders``. They inherit only the given descriptors, have a separate process group, and
+end with the process that started them.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ _DEPENDENCIES = ("pxr", "numpy", "OpenImageIO", "MaterialX", "click", "rich", "t
 
 
 def interpreter() -> str:
-    """This Python's program, also where another program embeds Python.
+    """Returns the program of this Python, also if another program embeds Python.
 
     Raises:
-        WavecombError: It is not found.
+        WavecombError: It was not found.
     """
     version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
     for name in (sys.executable, str(Path(sys.base_exec_prefix, "bin", version))):
@@ -45,13 +46,13 @@ def interpreter() -> str:
 
 
 def folders() -> tuple[list[str], list[str]]:
-    """Folders that a process needs on its ``sys.path`` beside its own standard and site folders.
+    """Returns folders that a process needs on its ``sys.path`` besides standard and site folders.
 
     Returns:
-        Those of PYTHONPATH, which come before site-packages. Then the user's site folder, the
-        folder of this package, and folders of dependencies that are in none of these, as in a
-        program that set ``sys.path`` itself. All are absolute; the working folder and the folder of
-        the program's script are not among them.
+        First the folders of PYTHONPATH, which precede site-packages. Then the user's site folder,
+        the folder of this package, and folders of dependencies that are in none of these, which
+        occurs in programs that modify ``sys.path``. All are absolute; the working folder and the
+        folder of the program's script are excluded.
     """
     ignores = sys.flags.ignore_environment
     first = [] if ignores else os.environ.get("PYTHONPATH", "").split(os.pathsep)
@@ -74,7 +75,8 @@ def _is_fit(place: str) -> bool:
         return False
     try:
         return os.path.realpath(place) != os.path.realpath(os.getcwd())
-    except OSError:  # the working folder was removed
+    # The working folder was removed.
+    except OSError:
         return True
 
 
@@ -92,17 +94,17 @@ def command(
     python: str | None = None,
     flags: Sequence[str] = (),
 ) -> list[str]:
-    """The command that runs a module in an isolated Python.
+    """Returns the command that runs a module in an isolated Python.
 
     Args:
         target: Module, or "-c", whose first argument is code.
         arguments: Arguments of the module.
-        parent: Process that the new one ends with and whose group it leaves. 0: whichever process
-            starts it. None: it is independent, as on another machine.
-        keep: Descriptors that it inherits beside the standard streams.
-        path: Folders of Wavecomb's own that are added to its ``sys.path``; absolute.
-        python: Program to run; None: this Python's.
-        flags: More flags of Python.
+        parent: Process with which the new one ends, and whose process group it leaves. 0 means the
+            process that starts it; None makes it independent, for example on another machine.
+        keep: Descriptors that it inherits besides the standard streams.
+        path: Absolute folders of Wavecomb that are added to its ``sys.path``.
+        python: Program to run; None uses this Python.
+        flags: Additional flags of Python.
 
     Raises:
         WavecombError: No Python was found.
@@ -130,10 +132,10 @@ def start(
     """Starts a module in an isolated Python that ends with this process.
 
     Args:
-        target: As for ``command``.
-        arguments: As for ``command``.
-        keep: As for ``command``.
-        flags: As for ``command``.
+        target: Module, as for ``command``.
+        arguments: Arguments of the module.
+        keep: Descriptors that it inherits, as for ``command``.
+        flags: Additional flags of Python.
         **options: Arguments of ``subprocess.Popen``.
 
     Raises:
@@ -145,10 +147,10 @@ def start(
 
 
 def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
-    """Starts what ``command`` gave, in a session of its own, from a thread that does not end.
+    """Starts the result of ``command`` in a new session, from a permanent thread.
 
     The kernel kills a process when the thread that started it ends, not only when the whole parent
-    does. Therefore other threads than the main one leave the start to a thread that stays.
+    does. Therefore threads other than the main thread delegate the start to a permanent thread.
     """
     options = {"start_new_session": True, **options}
     if threading.current_thread() is threading.main_thread():
@@ -159,10 +161,10 @@ def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
 
 
 class _Starter:
-    """A thread that starts processes for others.
+    """A thread that starts processes for other threads.
 
     Attributes:
-        jobs: What is to be started: a command, options, and a future.
+        jobs: Queue of processes to start: a command, options, and a future.
     """
 
     _lock = threading.Lock()
@@ -176,7 +178,7 @@ class _Starter:
 
     @classmethod
     def current(cls) -> _Starter:
-        """The one of this process; a fork does not have its parent's threads."""
+        """Returns the thread of this process; a fork does not inherit the threads of its parent."""
         with cls._lock:
             if cls._current is None or cls._current._process != os.getpid():
                 cls._current = cls()
@@ -193,10 +195,10 @@ class _Starter:
 
 
 def isolate_multiprocessing() -> None:
-    """Makes ``multiprocessing`` start isolated processes, by "spawn" and by "forkserver".
+    """Makes ``multiprocessing`` start isolated processes, with "spawn" and "forkserver".
 
-    Its children are ``python -c``, and are sent this process's ``sys.path``. A command of Wavecomb
-    calls this before it uses ``multiprocessing``, also through a library.
+    Its children run ``python -c`` and receive this process's ``sys.path``. Commands of Wavecomb
+    call this before they or their libraries use ``multiprocessing``.
     """
     from multiprocessing import spawn, util
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The order of shading: policies written in Python."""
+"""Interface of scheduling policies that are written in Python."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLUMNS = ("throughput", "position_key", "texture_key")
-"""Columns of a queue that are worked out only for policies that name them."""
+"""Optional queue columns, which are computed only for policies that name them."""
 
 
 class SchedulingPolicy:
-    """Gives each queue of hits the order in which it is shaded. Subclass it and pass an object.
+    """Base of policies, which define the order in which the hits of a queue are shaded.
 
-    ``order`` sees ids, keys and estimated costs, and writes one 64-bit key per record. Records are
-    shaded in ascending order of key, equal keys in order of arrival. No policy can change the
-    picture; docs/writing-a-policy.md has an example.
+    Pass an object of a subclass to ``wavecomb.render``. ``order`` receives ids, keys and estimated
+    costs, and writes one 64-bit key per record. Records are shaded in ascending key order, with
+    equal keys in order of arrival. No policy can change the image; docs/writing-a-policy.md has an
+    example.
 
     Attributes:
-        name: Shown in statistics.
-        columns: Which of ``COLUMNS`` ``order`` reads.
+        name: Name in statistics.
+        columns: Members of ``COLUMNS`` that ``order`` reads.
 
     >>> class CheapestFirst(SchedulingPolicy):
     ...     name = "cheapest-first"
@@ -41,28 +42,29 @@ class SchedulingPolicy:
     def order(
         self, queue: Mapping[str, Any], costs: Mapping[str, Any], keys: NDArray[np.uint64]
     ) -> bool | None:
-        """Fills ``keys``, in place.
+        """Fills ``keys`` in place.
 
-        Called once a queue, from any of the render's threads (one at a time), so it must not
-        depend on what was called before. An exception ends the render and is raised there.
+        Called once per queue, from any thread of the render (one at a time), so it must not depend
+        on previous calls. An exception ends the render and is raised by the render function.
 
         Args:
-            queue: Arrays of one entry a record, in order of arrival: "program", "material" and
-                the ``columns`` asked for; "depth", an int; and arrays by material id:
+            queue: Arrays with one entry per record, in order of arrival: "program", "material" and
+                the requested ``columns``; "depth", an int; and arrays by material id:
                 "material_texture" (its largest texture, 0xffffffff for none),
-                "material_texture_bytes" and "material_graph" (its value graph, likewise).
+                "material_texture_bytes" and "material_graph" (its value graph, 0xffffffff for
+                none).
             costs: "material_ns" and "texture_ns", arrays by id, and "mean_ns": estimated cost of a
-                record in nanoseconds, frozen while a pass runs.
-            keys: (records,), zeros, to be filled.
+                record in nanoseconds, constant during a pass.
+            keys: (records,) zeros to be overwritten.
 
         Returns:
-            False to keep the order of arrival, and then nothing is sorted; None or True otherwise.
+            False to keep the order of arrival without sorting; None or True otherwise.
         """
         raise NotImplementedError
 
 
 def check_policy(policy: Any) -> None:
-    """Raises WavecombError, in one line, unless the object can serve as a policy."""
+    """Raises WavecombError with a one-line message unless the object is a valid policy."""
     kind = type(policy).__name__
     if isinstance(policy, type):
         raise WavecombError(f"policy is the class {policy.__name__}: give an object, with ()")

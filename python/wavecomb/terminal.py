@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard streams of commands: all text that reaches a terminal goes through ``Stream``.
+"""Standard streams of commands: all text for a terminal passes through ``Stream``.
 
-Names of prims, files and messages of libraries may hold control characters, which would move the
-cursor, hide text or change the window's title. ``Stream`` writes them as escapes. A stream that was
-closed, whose reader ended, or whose disk is full loses text, and never ends a render.
+Names of prims and files and messages of libraries may contain control characters, which would move
+the cursor, hide text or change the window's title. ``Stream`` writes them as escapes. A stream that
+is closed, whose reader has ended, or whose disk is full loses text but never ends a render.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 _CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # C0 without tab and newline, delete, C1
-    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # direction of text, separators
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # text direction and separators
     "\ud800-\udfff]"  # bytes of file names that are not UTF-8
 )
 
 
 def clean(text: str) -> str:
-    r"""Text with its control characters as escapes, but for tabs and newlines.
+    r"""Escapes the control characters of a text except tabs and newlines.
 
     >>> clean("a\x1b[31mb"), clean("a\udcffb"), clean("\u202egpj.exe")
     ('a\\x1b[31mb', 'a\\xffb', '\\u202egpj.exe')
@@ -38,13 +38,14 @@ def clean(text: str) -> str:
 
 def _escape(match: re.Match[str]) -> str:
     code = ord(match[0])
-    if 0xDC80 <= code <= 0xDCFF:  # a byte, as Python keeps those of file names
+    # This is how Python represents undecodable bytes of file names.
+    if 0xDC80 <= code <= 0xDCFF:
         code -= 0xDC00
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
 
 
 class _Raw(io.FileIO):
-    """A descriptor to which writing never fails.
+    """A descriptor whose writes never fail.
 
     Attributes:
         error: The first error of a write.
@@ -64,15 +65,15 @@ class Stream(io.TextIOWrapper):
     """Standard output or error.
 
     Attributes:
-        plain: The same stream for text whose control characters are meant.
+        plain: The same stream without escaping, for text with intended control characters.
     """
 
     def __init__(self, number: int, encoding: str, *, is_prompt: bool, owns: bool = False) -> None:
-        """Makes a stream of a descriptor.
+        """Creates a stream for a descriptor.
 
         Args:
             number: The descriptor.
-            encoding: Of the text; UTF-8 in place of ASCII.
+            encoding: Encoding of the text; ASCII is replaced by UTF-8.
             is_prompt: Whether each line is written at once.
             owns: Whether the descriptor is closed with the stream.
         """
@@ -87,22 +88,22 @@ class Stream(io.TextIOWrapper):
 
     @property
     def error(self) -> OSError | None:
-        """Why text was lost; None: it was not, or its reader wanted no more."""
+        """Reason why text was lost; None if none was, or if the reader closed the pipe."""
         error = self._raw.error
         return None if error is None or error.errno == errno.EPIPE else error
 
     def write(self, text: str) -> int:
-        """Writes text with escapes for its control characters."""
+        """Writes text with escaped control characters."""
         super().write(clean(text))
         return len(text)
 
     def write_plain(self, text: str) -> int:
-        """Writes text as it is."""
+        """Writes text unchanged."""
         return super().write(text)
 
 
 class _Plain:
-    """A stream without escapes, for Rich, whose control characters are meant."""
+    """A stream without escaping for Rich, whose control characters are intended."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
@@ -118,10 +119,10 @@ _NAMES = ("stdout", "stderr")
 
 
 def guard_streams() -> None:
-    """Puts a ``Stream`` in place of standard output and error, and opens what is closed.
+    """Replaces standard output and error by ``Stream`` objects, and opens closed descriptors.
 
-    A descriptor 0, 1 or 2 that is closed would be given to the next file that is opened, which then
-    gets messages. Streams that a program or a test put in place are left alone.
+    A closed descriptor 0, 1 or 2 would be reused for the next opened file, which then would receive
+    messages. Streams that a program or a test has replaced are kept.
     """
     for number in range(3):
         try:
@@ -147,11 +148,11 @@ def guard_streams() -> None:
 
 
 _replaced: list[Any] = []
-"""Streams that were in place before, kept since closing them may close their descriptors."""
+"""The replaced streams, kept alive since closing them may close their descriptors."""
 
 
 def flush_streams() -> OSError | None:
-    """Flushes standard output and error; gives why text for standard output was lost."""
+    """Flushes standard output and error; returns the reason why standard output lost text."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             with contextlib.suppress(OSError, ValueError):
@@ -160,13 +161,13 @@ def flush_streams() -> OSError | None:
 
 
 def write_error(text: str) -> None:
-    """Writes text to descriptor 2 where there may be no stream any more; it may be lost."""
+    """Writes text to descriptor 2 even without a stream object; ignores errors."""
     with contextlib.suppress(OSError):
         os.write(2, clean(text).encode(errors="backslashreplace"))
 
 
 def console(**options: Any) -> Console:
-    """A console of Rich whose text has escapes for its control characters.
+    """Returns a Rich console that escapes control characters in text.
 
     Args:
         **options: Arguments of Rich's Console.
@@ -186,7 +187,7 @@ def console(**options: Any) -> Console:
 
 @contextlib.contextmanager
 def lines_above(console: Console) -> Iterator[None]:
-    """While a bar is shown, prints lines of the standard streams above it."""
+    """Prints lines of the standard streams above a progress bar while it is shown."""
     from rich.file_proxy import FileProxy
 
     class Proxy(FileProxy):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door to OpenVDB and NanoVDB: the one module that imports the plug-in ``wavecomb._vdb``.
+"""Interface to OpenVDB and NanoVDB: the only module that imports the plug-in ``wavecomb._vdb``.
 
-The plug-in is built where OpenVDB is there (tools/setup_openvdb), and loaded only where something
-asks for a .vdb or .nvdb file.
+The plug-in is built if OpenVDB is installed (tools/setup_openvdb), and loaded only when a .vdb or
+.nvdb file is read.
 """
 
 from __future__ import annotations
@@ -26,27 +26,28 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 BRING = "tools/setup_openvdb && make build"
-"""The command that brings OpenVDB to a source tree."""
+"""Command that adds OpenVDB to a source tree."""
 
 ABSENT = f"OpenVDB, which this build is without ({BRING})"
-"""What is said where a .vdb file is asked for and cannot be read."""
+"""Message if a .vdb file cannot be read without the plug-in."""
 
 BRICK = vdb_writer.BRICK
-"""Edge of a brick, in voxels."""
+"""Edge length of a brick in voxels."""
 
 _NUMBERS = {"float", "double", "vec3s", "vec3d", "fp4", "fp8", "fp16", "fpn"}
 
 
 @dataclass(frozen=True)
 class GridHead:
-    """A grid as the table of a file has it.
+    """A grid in the table of a file.
 
     Attributes:
-        number: Place in the file.
-        name: Several may share one.
-        index: Among those of its name.
-        type_name: OpenVDB's, as "Tree_float_5_4_3"; of .nvdb files also "Tree_fp8_5_4_3".
-        is_half: Whether its floats are kept in 16 bits.
+        number: Position in the file.
+        name: Name, which several grids may share.
+        index: Index among grids with this name.
+        type_name: OpenVDB's type name such as "Tree_float_5_4_3"; in .nvdb files also
+            "Tree_fp8_5_4_3".
+        is_half: Whether floats are stored in 16 bits.
     """
 
     number: int
@@ -57,33 +58,33 @@ class GridHead:
 
     @property
     def is_vector(self) -> bool:
-        """Whether a value is several numbers."""
+        """Whether a value consists of several numbers."""
         return self.type_name.startswith("Tree_vec")
 
     @property
     def is_of_numbers(self) -> bool:
-        """Whether a value is a number, or three, as are read; not integers, say."""
+        """Whether the grid has supported values: a float or three floats, but not integers."""
         return self.type_name.removeprefix("Tree_").partition("_")[0] in _NUMBERS
 
     @property
     def value_name(self) -> str:
-        """OpenVDB's word for a value, and half for floats in 16 bits: "float", "vec3s" ..."""
+        """OpenVDB's name of the value type, with half variants: "float", "half", "vec3s" ..."""
         word = self.type_name.removeprefix("Tree_").partition("_")[0]
         return {"float": "half", "vec3s": "vec3h"}.get(word, word) if self.is_half else word
 
 
 @dataclass(frozen=True)
 class GridInfo(GridHead):
-    """A grid as it is without its values.
+    """A grid without its values.
 
     Attributes:
-        is_read: Whether there are bricks of it.
+        is_read: Whether the grid can be read as bricks.
         kind: "fog volume", "level set", "staggered" or "unknown".
-        voxels: That are active.
-        box: (2, 3) first and last index of these; None: there are none.
-        index_to_object: (4, 4), p' = p M; None where it is not affine.
-        background: Of 1 or 3 numbers.
-        metadata: As texts.
+        voxels: Number of active voxels.
+        box: (2, 3) first and last index of active voxels; None if there are none.
+        index_to_object: (4, 4), p' = p M; None if it is not affine.
+        background: Background value of 1 or 3 numbers.
+        metadata: Metadata as text.
     """
 
     is_read: bool = False
@@ -100,13 +101,13 @@ class Bricks:
     """A grid as bricks of 8^3 voxels.
 
     Attributes:
-        origins: int32 (n, 3), index of the first voxel of each.
-        values: float16 or float32 (n, 8, 8, 8) or (n, 8, 8, 8, 3), x slowest.
-        index_to_object: As of ``GridInfo``, and so are background, kind, voxels and box.
-        not_finite: How many numbers are infinite or none.
-        negative: How many are below 0.
-        least: Of all, and 0.
-        greatest: Likewise.
+        origins: (n, 3) int32, index of the first voxel of each brick.
+        values: (n, 8, 8, 8) or (n, 8, 8, 8, 3), float16 or float32, with x slowest.
+        index_to_object: As in ``GridInfo``, like background, kind, voxels and box.
+        not_finite: Number of infinite and NaN values.
+        negative: Number of negative values.
+        least: Smallest value, at most 0.
+        greatest: Largest value, at least 0.
     """
 
     origins: NDArray[np.int32]
@@ -124,7 +125,7 @@ class Bricks:
 
 @functools.cache
 def is_there() -> bool:
-    """Whether .vdb files can be read, and .nvdb files where ``nano_version`` is a number."""
+    """Returns whether .vdb files can be read; .nvdb files also need ``nano_version``."""
     try:
         _plugin()
     except ImportError:
@@ -133,17 +134,17 @@ def is_there() -> bool:
 
 
 def version() -> str | None:
-    """Of OpenVDB; None: it is not there."""
+    """Returns the version of OpenVDB; None if it is not available."""
     return str(_plugin().version) if is_there() else None
 
 
 def nano_version() -> int | None:
-    """The major version of .nvdb files that are read; None: none are."""
+    """Returns the major version of supported .nvdb files; None if they are not supported."""
     return int(_plugin().nano_version) or None if is_there() else None
 
 
 def _plugin() -> Any:
-    # First the core, which brings the one oneTBB of the process.
+    # Import the core first, since it loads the process's only oneTBB.
     importlib.import_module("wavecomb._core")
     return importlib.import_module("wavecomb._vdb")
 
@@ -155,10 +156,10 @@ def _needed(path: str | Path) -> Any:
 
 
 def grid_heads(path: str | Path) -> list[GridHead]:
-    """The grids of a file, by its table alone.
+    """Reads the table of a file and returns its grids.
 
     Raises:
-        WavecombError: It is none, is broken, or there is no OpenVDB.
+        WavecombError: The file is not a VDB file or is corrupt, or OpenVDB is missing.
     """
     plugin = _needed(path)
     with _errors(plugin, path):
@@ -167,10 +168,10 @@ def grid_heads(path: str | Path) -> list[GridHead]:
 
 
 def grids(path: str | Path) -> list[GridInfo]:
-    """The grids of a file, with what can be said of them without their values.
+    """Returns the grids of a file with their metadata but without values.
 
     Raises:
-        WavecombError: As ``grid_heads``.
+        WavecombError: The file is not a VDB file or is corrupt, or OpenVDB is missing.
     """
     plugin = _needed(path)
     with _errors(plugin, path):
@@ -181,20 +182,20 @@ def grids(path: str | Path) -> list[GridInfo]:
 def read(
     path: str | Path, head: GridHead, *, background_is_zero: bool = False, whole: bool = True
 ) -> Bricks:
-    """The values of a grid: its leaves, and its active tiles as bricks.
+    """Reads the values of a grid: its leaves, and its active tiles as bricks.
 
     Args:
         path: The file.
-        head: Of ``grid_heads``.
-        background_is_zero: Voxels that are not active and hold the background become 0.
-        whole: With bricks that hold nothing but zeros.
+        head: A result of ``grid_heads``.
+        background_is_zero: Whether inactive voxels with the background value become 0.
+        whole: Whether to include bricks that contain only zeros.
 
     Raises:
-        WavecombError: The file is broken, the grid too large, or of a type that is not read.
+        WavecombError: The file is corrupt, or the grid is too large or of an unsupported type.
     """
     plugin = _needed(path)
     with _errors(plugin, path, head.name):
-        # The tree and the bricks of it are there at once.
+        # The tree and its bricks are in memory at the same time.
         found = plugin.bricks(
             str(path), head.number, memory.room() // 2, background_is_zero, not whole
         )
@@ -208,17 +209,17 @@ def read(
 
 
 def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
-    """Writes a .vdb file of grids, also without OpenVDB; the same grids give the same bytes.
+    """Writes a .vdb file, also without OpenVDB; equal grids give equal bytes.
 
     Args:
-        path: File to write. The caller sees to it that it is whole or absent.
-        made: Of each grid ``name``, ``origins``, ``values`` (as of ``Bricks``; those of float16
-            are kept in 16 bits) and ``index_to_object``; with ``tiles`` bricks of one value become
-            tiles, which takes less room; ``boxes`` (first index, last index, value), which begin
-            and end at multiples of 8 voxels, are filled before bricks are added.
+        path: File to write. The caller must make the write atomic.
+        made: Grids with ``name``, ``origins``, ``values`` (as in ``Bricks``; float16 is stored in
+            16 bits) and ``index_to_object``. With ``tiles``, bricks with a single value are stored
+            as tiles, which takes less space. ``boxes`` (first index, last index, value), which
+            begin and end at multiples of 8 voxels, are filled before bricks are added.
 
     Raises:
-        WavecombError: It is another kind of file, arrays do not fit each other, or the file cannot
+        WavecombError: The file has another extension, arrays are inconsistent, or the file cannot
             be written.
     """
     if Path(path).suffix.lower() == ".nvdb":
@@ -228,7 +229,7 @@ def write(path: str | Path, made: Sequence[Mapping[str, Any]]) -> None:
 
 @contextmanager
 def _errors(plugin: Any, path: str | Path, grid: str = "") -> Iterator[None]:
-    """What the plug-in raises as a line that names file and grid."""
+    """Converts exceptions of the plug-in to messages that name file and grid."""
     named = f"{path}: grid {grid!r}" if grid else str(path)
     try:
         yield

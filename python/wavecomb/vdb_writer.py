@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes .vdb files (format 224) without OpenVDB: trees of 4096, 128 and 8 voxels a side.
+"""Writes .vdb files (format 224) without OpenVDB: trees with nodes of 4096, 128 and 8 voxels.
 
-A tree is kept as dictionaries by position: of nodes, and of tiles, which have one value. Voxels
-and tiles that are not +0 are active, and the background is +0, so that every bit comes back.
+A tree consists of dictionaries by position: nodes, and tiles, which have one value. Voxels and
+tiles other than +0 are active, and the background is +0, so that all bits are preserved.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from wavecomb.errors import WavecombError
 
 BRICK = 8
-"""Edge of a brick, in voxels."""
+"""Edge length of a brick in voxels."""
 
 Floats = NDArray[np.float32]
 Index = tuple[int, int, int]
@@ -31,15 +31,15 @@ Index = tuple[int, int, int]
 _MAGIC, _FORMAT, _LIBRARY = 0x56444220, 224, (10, 0)
 _ZIP, _ACTIVE_MASK = 1, 2
 _LOG2 = {4096: 5, 128: 4}
-"""Of the entries along an edge of an inner node, by its edge in voxels."""
+"""Base-2 logarithm of the entries along an edge of an inner node, by its edge length in voxels."""
 _CHILD = {4096: 128, 128: BRICK}
 
 
 def write(path: str | Path, grids: Sequence[Mapping[str, Any]]) -> None:
-    """Writes a file of grids as ``wavecomb.vdb.write`` takes them.
+    """Writes a file of grids in the form of ``wavecomb.vdb.write``.
 
     Raises:
-        WavecombError: Arrays do not fit each other, or the file cannot be written.
+        WavecombError: Arrays are inconsistent, or the file cannot be written.
     """
     try:
         data = file_bytes(grids)
@@ -52,10 +52,10 @@ def write(path: str | Path, grids: Sequence[Mapping[str, Any]]) -> None:
 
 
 def file_bytes(grids: Sequence[Mapping[str, Any]]) -> bytes:
-    """A file of grids; the same grids give the same bytes.
+    """Returns the bytes of a file; equal grids give equal bytes.
 
     Raises:
-        ValueError: Arrays do not fit each other.
+        ValueError: Arrays are inconsistent.
     """
     start = struct.pack("<qIII?", _MAGIC, _FORMAT, *_LIBRARY, True)
     rest = bytearray(struct.pack("<Ii", 0, len(grids)))
@@ -63,13 +63,13 @@ def file_bytes(grids: Sequence[Mapping[str, Any]]) -> bytes:
     names: set[str] = set()
     for grid in grids:
         rest += _grid_bytes(grid, names, len(start) + identifier_bytes + len(rest))
-    # OpenVDB draws the identifier at random.
+    # OpenVDB uses a random identifier; a hash makes files reproducible.
     digest = hashlib.sha256(start + rest).digest()
     return start + str(uuid.UUID(bytes=digest[:16], version=4)).encode() + rest
 
 
 def _grid_bytes(grid: Mapping[str, Any], names: set[str], offset: int) -> bytes:
-    """A grid with its row of the file's table, which begins at an offset of the file."""
+    """Returns a grid with its table row, for an offset of the row in the file."""
     values = np.asarray(grid["values"])
     is_half, channels = values.dtype == np.float16, 3 if values.ndim == 5 else 1
     tree = _Tree(channels)
@@ -83,7 +83,7 @@ def _grid_bytes(grid: Mapping[str, Any], names: set[str], offset: int) -> bytes:
     head = _text(_unique(grid["name"], names)) + _text(
         f"Tree_{kind}_HalfFloat" if is_half else f"Tree_{kind}"
     )
-    head += _text("")  # It shares the voxels of no other grid.
+    head += _text("")  # The grid shares no voxels with another grid.
     at_grid = offset + len(head) + 24
     before = struct.pack("<I", _ACTIVE_MASK | _ZIP) + _metadata(grid["name"], tree, is_half)
     before += _transform(np.asarray(grid["index_to_object"], np.float64))
@@ -101,7 +101,7 @@ def _text(text: str | bytes) -> bytes:
 
 
 def _unique(name: str, names: set[str]) -> str:
-    """A name that no grid before it has, by OpenVDB's rule: a separator and a number follow."""
+    """Returns a name that is unique by OpenVDB's rule: a separator and a number are appended."""
     numbered = (f"{name}\x1e{number}" for number in itertools.count(0 if not name else 1))
     found = next(
         one for one in itertools.chain([name] if name else [], numbered) if one not in names
@@ -130,13 +130,13 @@ def _transform(matrix: NDArray[np.float64]) -> bytes:
 
 
 class _Output:
-    """Values of nodes as a file holds them."""
+    """Encoder of node values in the form of a file."""
 
     def __init__(self, is_half: bool) -> None:
         self._dtype = "<f2" if is_half else "<f4"
 
     def values(self, active: Floats) -> bytes:
-        """Active values of a node, whose inactive ones are the background."""
+        """Encodes the active values of a node whose inactive values are the background."""
         without_inactive = b"\0"
         if not active.size and self._dtype == "<f2":
             return without_inactive
@@ -149,20 +149,20 @@ class _Output:
 
 @dataclass
 class _Node:
-    """An inner node: by the number of an entry, a node or a leaf, or a tile."""
+    """An inner node with children (nodes or leaves) and tiles by entry number."""
 
     edge: int
     children: dict[int, Any] = field(default_factory=dict)
     tiles: dict[int, Floats] = field(default_factory=dict)
 
     def number(self, at: Index) -> int:
-        """Of the entry that holds a voxel."""
+        """Returns the number of the entry that contains a voxel."""
         log2, child = _LOG2[self.edge], _CHILD[self.edge]
         x, y, z = ((c & (self.edge - 1)) // child for c in at)
         return (x << 2 * log2) | (y << log2) | z
 
     def corner(self, number: int, origin: Index) -> Index:
-        """First voxel of an entry of the node at an origin."""
+        """Returns the first voxel of an entry, for a node with the given origin."""
         log2, child = _LOG2[self.edge], _CHILD[self.edge]
         mask = (1 << log2) - 1
         shifts = (2 * log2, log2, 0)
@@ -174,7 +174,7 @@ class _Node:
         return 1 << 3 * _LOG2[self.edge]
 
     def child(self, number: int, channels: int) -> Any:
-        """A node or leaf that is made if it is not there; a tile is cut into parts."""
+        """Returns a child node or leaf; creates it if necessary, from a tile if there is one."""
         if number in self.children:
             return self.children[number]
         tile = self.tiles.pop(number, None)
@@ -191,7 +191,7 @@ class _Node:
         return made
 
     def prune(self) -> None:
-        """Makes tiles of children of one value, and drops those in which nothing is active."""
+        """Converts children with a single value to tiles, and removes empty children."""
         for number, child in list(self.children.items()):
             if isinstance(child, _Node):
                 child.prune()
@@ -206,7 +206,7 @@ class _Node:
                 del self.children[number]
 
     def constant(self) -> Floats | None:
-        """Value of a node that is full of equal tiles; None: it is not."""
+        """Returns the value of a node that is filled with equal tiles; None for other nodes."""
         if self.children or len(self.tiles) != self.entries:
             return None
         values = np.array([self.tiles[number] for number in range(self.entries)])
@@ -218,7 +218,7 @@ def _bits(values: Floats) -> NDArray[np.uint32]:
 
 
 def _active(values: Floats) -> NDArray[np.bool_]:
-    """Which of some values (n, channels) are not +0."""
+    """Returns a mask of the values (n, channels) that are not +0."""
     return np.asarray(_bits(values).any(axis=-1), np.bool_)
 
 
@@ -233,7 +233,7 @@ def _mask(numbers: Iterable[int], entries: int) -> bytes:
 
 
 class _Tree:
-    """A tree from its root, with tiles and nodes of 4096 voxels a side by their origins."""
+    """A tree with tiles and nodes of 4096 voxels per edge by their origins."""
 
     def __init__(self, channels: int) -> None:
         self.channels = channels
@@ -250,7 +250,7 @@ class _Tree:
         return self._nodes[key]
 
     def fill(self, first: Index, last: Index, value: float) -> None:
-        """Gives the voxels of a box a value, in tiles where these fit."""
+        """Fills a box of voxels with a value, using tiles where possible."""
         if any(c % BRICK for c in first) or any((c + 1) % BRICK for c in last):
             raise ValueError("boxes must begin and end at multiples of 8 voxels")
         filled = np.full(self.channels, value, np.float32)
@@ -274,7 +274,7 @@ class _Tree:
                 self._fill_node(node.child(number, self.channels), low, high, value)
 
     def add(self, origins: NDArray[np.int32], values: Floats) -> None:
-        """Adds bricks; voxels of +0 leave what is there."""
+        """Adds bricks; voxels of +0 do not overwrite existing values."""
         count = len(origins)
         if origins.shape != (count, 3) or values.size != count * BRICK**3 * self.channels:
             raise ValueError("bricks of another shape")
@@ -290,7 +290,7 @@ class _Tree:
             leaf[active] = brick[active]
 
     def prune(self) -> None:
-        """Makes tiles of what has one value, as large as they fit."""
+        """Converts nodes with a single value to the largest possible tiles."""
         for key, node in list(self._nodes.items()):
             node.prune()
             if (value := node.constant()) is not None:
@@ -299,7 +299,7 @@ class _Tree:
                 del self._nodes[key]
 
     def extent(self) -> tuple[int, tuple[Index, Index] | None]:
-        """Number of active voxels, and the box of them."""
+        """Returns the number of active voxels and their bounding box."""
         voxels, lows, highs = 0, [], []
         for first, edge in self._all_tiles():
             voxels += edge**3
@@ -317,7 +317,7 @@ class _Tree:
         return voxels, ((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
     def _lowers(self) -> Iterator[tuple[Index, _Node]]:
-        """Nodes of 128 voxels with their origins, in the order of a file."""
+        """Yields nodes of 128 voxels with their origins, in file order."""
         for key in sorted(self._nodes):
             upper = self._nodes[key]
             for number in sorted(upper.children):
@@ -339,7 +339,7 @@ class _Tree:
                 yield lower.corner(number, origin), BRICK
 
     def topology(self, out: _Output) -> bytes:
-        """The tree as a file holds it, without values of voxels."""
+        """Encodes the structure of the tree and the values of tiles."""
         made = bytearray(np.zeros(self.channels, "<f4").tobytes())
         made += struct.pack("<II", len(self._tiles), len(self._nodes))
         for key in sorted(self._tiles):
@@ -361,7 +361,7 @@ class _Tree:
                 made += _leaf_mask(child)
 
     def buffers(self, out: _Output) -> bytes:
-        """Values of the voxels of all leaves."""
+        """Encodes the voxel values of all leaves."""
         made = bytearray()
         for _, leaf in self._leaves():
             made += _leaf_mask(leaf) + out.values(leaf[_active(leaf)])
@@ -373,7 +373,7 @@ def _leaf_mask(leaf: Floats) -> bytes:
 
 
 def _cells(first: Index, last: Index, edge: int) -> Iterator[Index]:
-    """Origins of the cells of a grid of cells that a box meets."""
+    """Yields the origins of all cells that a box intersects."""
     ranges = (range(a // edge * edge, b + 1, edge) for a, b in zip(first, last, strict=True))
     yield from itertools.product(*ranges)
 
@@ -383,7 +383,7 @@ def _end(first: Index, edge: int) -> Index:
 
 
 def _clipped(first: Index, last: Index, cell: Index, edge: int) -> tuple[Index, Index]:
-    """The part of a box that lies in a cell."""
+    """Returns the part of a box inside a cell."""
     end = _end(cell, edge)
     lows = tuple(max(a, b) for a, b in zip(first, cell, strict=True))
     highs = tuple(min(a, b) for a, b in zip(last, end, strict=True))

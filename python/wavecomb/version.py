@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The version that is installed."""
+"""Version of the installed package."""
 
 from __future__ import annotations
 
 
 def version() -> str:
-    """The version of the installed package, or "unknown" in a bare source tree."""
+    """Returns the version of the installed package, or "unknown" in a source tree."""
     from importlib.metadata import PackageNotFoundError
     from importlib.metadata import version as installed
 

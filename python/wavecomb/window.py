@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The window from Python: in a process of its own, so that a notebook or a script goes on."""
+"""Opens the viewer window in a separate process, so that notebooks and scripts continue."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 LOADING = ("camera", "frame", "variants", "purposes")
 SETTINGS = ("max_depth", "seed", "threads", "policy", "ray_order", "roulette")
-"""What the window is opened with; all else is chosen in it."""
+"""Settings that the window accepts when it is opened; further ones are chosen in it."""
 
 
 class Window:
-    """A window that is open, or was.
+    """A viewer window, which may have been closed.
 
     Attributes:
-        pid: Of its process.
+        pid: Id of its process.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], said: IO[str]) -> None:
@@ -35,18 +35,18 @@ class Window:
 
     @property
     def is_open(self) -> bool:
-        """Whether it is."""
+        """Whether the window is open."""
         return self._process.poll() is None
 
     def wait(self, timeout: float | None = None) -> None:
-        """Waits until it is closed.
+        """Waits until the window is closed.
 
         Args:
-            timeout: Seconds; None: any.
+            timeout: Seconds; None waits without limit.
 
         Raises:
-            TimeoutError: It is still open.
-            WavecombError: It could not be opened.
+            TimeoutError: The window is still open.
+            WavecombError: The window could not be opened.
         """
         try:
             code = self._process.wait(timeout)
@@ -59,7 +59,7 @@ class Window:
             raise WavecombError(errors[-1].removeprefix("error: ") if errors else ended)
 
     def close(self) -> None:
-        """Closes it, as if its user did."""
+        """Closes the window as its user would."""
         if self.is_open:
             self._process.terminate()
         self._process.wait()
@@ -77,25 +77,26 @@ def view(
     wait: bool = False,
     **options: Any,
 ) -> Window:
-    """Opens a window on a stage, in a process of its own, and comes back at once.
+    """Opens a window on a stage in a separate process and returns at once.
 
-    The window reads the stage's file: what was changed in a ``LoadedStage`` is not in it.
+    The window reads the stage's file, so that changes of a ``LoadedStage`` are not visible.
 
     Args:
-        stage: .usd, .usda, .usdc or .usdz, or what ``load`` gave; None: an empty window.
-        size: Width and height of the picture, pixels.
+        stage: .usd, .usda, .usdc or .usdz, or a result of ``load``; None opens an empty window.
+        size: Width and height of the image in pixels.
         spp: Samples per pixel.
-        denoise: Whether the picture is shown without its noise.
-        wait: Come back when the window is closed.
-        **options: Of ``LoadOptions`` camera, frame, variants and purposes, of ``Settings``
-            max_depth, seed, threads, policy, ray_order and roulette.
+        denoise: Whether to show the denoised image.
+        wait: Whether to return only when the window is closed.
+        **options: The fields camera, frame, variants and purposes of ``LoadOptions``, and
+            max_depth, seed, threads, policy, ray_order and roulette of ``Settings``.
 
     >>> window = wavecomb.view("mixed.usdc", size=(960, 540), camera="/World/Cam")  # doctest: +SKIP
     >>> window.close()  # doctest: +SKIP
 
     Raises:
-        WavecombError: The extra ``gui`` is missing, there is no display, or no such file.
-        TypeError: There is no such option.
+        WavecombError: The extra ``gui`` is missing, there is no display, or the file does not
+            exist.
+        TypeError: An option does not exist.
     """
     from wavecomb.gui.needs import check_window
 
@@ -110,7 +111,7 @@ def view(
         words += ["--spp", str(spp)]
     words += ["--denoise"] * denoise + arguments(options)
     words += [] if path is None else ["--", os.fspath(path)]
-    # It outlives this program, and a Ctrl-C that is meant for this one.
+    # The process outlives this program, and a Ctrl-C for this program does not reach it.
     said = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115
     command = processes.command("wavecomb", "view", *words)
     process = processes.popen(command, stdin=subprocess.DEVNULL, stderr=said)
@@ -121,13 +122,13 @@ def view(
 
 
 def arguments(options: Mapping[str, Any]) -> list[str]:
-    """Keywords as options of ``wavecomb view``.
+    """Converts keywords to options of ``wavecomb view``.
 
     >>> arguments({"camera": "/Cam", "variants": {"lod": "high"}, "seed": 3})
     ['--camera', '/Cam', '--variant', 'lod=high', '--seed', '3']
 
     Raises:
-        TypeError: There is no such option.
+        TypeError: An option does not exist.
     """
     loading = {name: row.option for name, row in rows().items() if name in LOADING}
     out: list[str] = []

@@ -36,7 +36,7 @@ def grid(n, bad, kind="none", extra="", faces=4):
 )
 def test_faces_that_use_a_bad_point_are_left_out(tmp_path, faces, lost, whole):
     scene, loaded = load(tmp_path, grid(3, 5, faces=faces))
-    what = f"warning: mesh without {lost} of {whole} faces: points of theirs are not finite"
+    what = f"warning: mesh without {lost} of {whole} faces: they have points that are not finite"
     assert said(loaded).count(what) == 1 and said(loaded).count("/M") == 1
     mesh = scene.mesh("M")
     triangles_of_a_face = faces - 2
@@ -105,7 +105,7 @@ def test_curves_that_use_a_bad_point_are_left_out(tmp_path):
             uniform token type = "linear"
         }}""",
     )
-    assert "warning: 1 of 3 curves left out: points of theirs are not finite" in said(loaded)
+    assert "warning: 1 of 3 curves left out: they have points that are not finite" in said(loaded)
     (curves,) = scene.meshes
     assert len(curves["segments"]) == 6 and set(curves["positions"][:, 0]) == {0, 2}
 

@@ -464,5 +464,5 @@ def test_folder_that_is_torn_in_the_middle(tmp_path: Path) -> None:
     folder = ResultFolder(tmp_path / "out")
     folder.create(suite)
     folder.runs_jsonl.write_text('{"row": {"run_id": "a"}}\nnonsense\n')
-    with pytest.raises(WavecombError, match=r"runs\.jsonl: line 2 is no run"):
+    with pytest.raises(WavecombError, match=r"runs\.jsonl: line 2 is not a run"):
         ResultFolder(tmp_path / "out").resume(suite)

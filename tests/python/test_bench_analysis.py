@@ -147,7 +147,7 @@ def test_folders_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(WavecombError, match=r"holds no runs\.csv"):
         load(tmp_path)
     rows = runs_of({"policy": ["none"]}, lambda policy: 1.0, repetitions=1, status="failed")
-    with pytest.raises(WavecombError, match="no run came to an end"):
+    with pytest.raises(WavecombError, match="no run succeeded"):
         results(tmp_path, rows)
 
 

@@ -82,9 +82,9 @@ def test_page_needs_nothing_else(page: str) -> None:
 def test_page_says_what_it_must(tree: ElementTree.Element, page: str) -> None:
     headings = texts(tree, "h2")
     for wanted in (
-        *("Read the figures with care", "What the figures say", "Experiment policies"),
+        *("Read the figures with care", "Findings", "Experiment policies"),
         *("Roulette apart from order", "Effects of the factors", "Predicted cost", "Pictures"),
-        *("How to repeat it", "Machine"),
+        *("How to repeat the benchmark", "Machine"),
     ):
         assert wanted in headings
     captions = texts(tree, "caption")
@@ -154,7 +154,7 @@ def test_markdown_page(folder: Path) -> None:
     target = folder.parent / "docs" / "made-up.md"
     text = target.read_text(encoding="utf-8")
     assert text.startswith("# Wavecomb benchmark: made-up\n")
-    assert "## What the figures say" in text and "equal runs vary by 12% (made up)" in text
+    assert "## Findings" in text and "equal runs vary by 12% (made up)" in text
     shown = re.findall(r"!\[[^]]+\]\(made-up/([^)]+)\)", text)
     assert len(shown) > 10 and any("difference-mixed" in name for name in shown)
     files = {path.name for path in target.with_suffix("").iterdir()}

@@ -86,7 +86,7 @@ def test_exposure_is_that_of_usd(tmp_path, text, scale):
 def test_exposure_that_is_none_is_left_out(tmp_path, text):
     found, loaded = camera_of(tmp_path, text)
     assert "exposure" not in found
-    assert "camera exposure left out: a value of it is no good: /Cam" in said(loaded)
+    assert "camera exposure left out: one of its values is invalid: /Cam" in said(loaded)
 
 
 def test_clipping_planes(tmp_path):

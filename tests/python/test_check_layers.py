@@ -91,7 +91,7 @@ def test_downward_includes_pass(tmp_path):
         ("core/rng.h", '#include "../scene/scene.h"', "from the root"),
         ("core/rng.h", "#include <wavecomb/core/hash.h>", "write #include"),
         ("gpu/kernel.h", "#include <span>", "no known layer"),
-        ("geometry/point.h", "#include <span>", "no known layer"),
+        ("geometry/tessellation/point.h", "#include <span>", "no known layer"),
         ("core/rng.h", '#include "wavecomb/gpu/kernel.h"', "no known layer"),
     ],
 )
@@ -120,7 +120,7 @@ def python_tree(root: pathlib.Path, files: dict[str, str]) -> pathlib.Path:
         path = root / "python" / "wavecomb" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return tree(root, {"core/soa.h": ""})
+    return tree(root, {"core/rows/soa.h": ""})
 
 
 def test_imports_that_point_down_pass(tmp_path):

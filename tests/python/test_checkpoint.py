@@ -381,5 +381,5 @@ def test_a_file_that_is_no_checkpoint_is_kept(stage: Path, tmp_path: Path) -> No
     file.write_text("mine")
     refused = run(stage, "-o", tmp_path / "a.exr", "--checkpoint", file)
     assert refused.returncode == 2
-    assert "notes.txt: is there and is no checkpoint" in refused.stderr
+    assert "notes.txt: exists and is not a checkpoint" in refused.stderr
     assert file.read_text() == "mine"

@@ -8,7 +8,7 @@ from usd_recorder import load, said, write
 
 import wavecomb
 
-DIM = "no light but emissive materials that light too little: added a soft dome"
+DIM = "no light except emissive materials that are too dim: added a soft dome"
 ROOM = """
 def Mesh "Floor" {{ point3f[] points = [(-4,0,-4), (-4,0,4), (4,0,4), (4,0,-4)]
     int[] faceVertexCounts = [4]

@@ -350,7 +350,7 @@ def test_a_border_that_was_too_narrow(stage: Path, tmp_path: Path) -> None:
     folder = job(stage, tmp_path, **options)
     render_all(folder, looks=1)
     parts = (read_part(folder.part(task)) for task in folder.job.tasks_of(0))
-    with pytest.raises(NarrowBorder, match="is wide enough for 1 looks at errors"):
+    with pytest.raises(NarrowBorder, match="is wide enough for 1 error checks"):
         join(folder.job, 0, parts)
     found = finish_image(folder, 0, MACHINE)
     assert found["again"] == list(range(6)) and found["looks"] > 5

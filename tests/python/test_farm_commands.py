@@ -203,7 +203,7 @@ def test_what_the_command_refuses(stage: Path, tmp_path: Path) -> None:
         (("--map", "a=b"), "--map a=b: must be FROM=TO"),
         (("--isa", "z80"), "--isa z80: there are"),
         (("--on", "ssh:one"), "--on ssh:one: must be local"),
-        (("--on", "dask:10.0.0.1:8786"), "runs code"),
+        (("--on", "dask:10.0.0.1:8786"), "can run code"),
     ):
         done = run("farm", "submit", stage, "-o", tmp_path / "a.exr", *words)
         one_line(done, said)

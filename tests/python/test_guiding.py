@@ -256,7 +256,7 @@ def test_the_summary_says_what_was_learned(stage: Path, tmp_path: Path) -> None:
     assert "learned from" in result.output
     words = " ".join(result.output.split())
     assert "of bounced light is guided" in words
-    assert "of bounces go on" in words
+    assert "of paths continue after a bounce" in words
 
 
 @pytest.mark.slow

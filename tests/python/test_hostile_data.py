@@ -111,7 +111,7 @@ def test_archives_that_are_no_checkpoints(stage: Path, tmp_path: Path, kind: str
     ARCHIVES[kind](file)
     out = tmp_path / "o.exr"
     says("a.ckpt: is no checkpoint, or is damaged", "render", stage, "-o", out, "--resume", file)
-    says("is there and is no checkpoint", "render", stage, "-o", out, "--checkpoint", file)
+    says("exists and is not a checkpoint", "render", stage, "-o", out, "--checkpoint", file)
     assert os.listdir(tmp_path) == ["a.ckpt"]
 
 

@@ -88,7 +88,7 @@ def test_another_size_and_camera_have_the_same_mean(cornell: Any, taught: waveco
 def test_what_is_no_good_ends_in_a_line(
     stage: Path, cornell: Any, taught: wavecomb.Picture, tmp_path: Path
 ) -> None:
-    with pytest.raises(WavecombError, match="learn_from: nothing is learned here; give --guiding"):
+    with pytest.raises(WavecombError, match="learn_from: this render trains no guiding field"):
         render(cornell, guiding="off", learn_from=taught)
     with pytest.raises(WavecombError, match="nothing was learned"):
         render(cornell, guiding="off").save_learned(tmp_path / "none.learned")
@@ -101,7 +101,7 @@ def test_what_is_no_good_ends_in_a_line(
     whole = file.read_bytes()
     for broken in (b"", whole[: len(whole) // 2], whole[:-200] + b"x" * 200):
         file.write_bytes(broken)
-        with pytest.raises(WavecombError, match="holds nothing learned, or is damaged"):
+        with pytest.raises(WavecombError, match="holds no guiding field, or is damaged"):
             load_learned(file)
     out = tmp_path / "a.exr"
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", tmp_path / "gone")
@@ -109,7 +109,7 @@ def test_what_is_no_good_ends_in_a_line(
     done = run("render", stage, "-o", out, "--guiding", "on", "--learn-from", "before")
     assert done.exit_code == 2 and "give --frames, too" in done.output
     done = run("render", stage, "-o", out, "--learn-to", tmp_path / "b.learned")
-    assert done.exit_code == 2 and "nothing is learned here" in done.output
+    assert done.exit_code == 2 and "this render trains no guiding field" in done.output
 
 
 def test_a_command_keeps_it_and_another_starts_from_it(stage: Path, tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def test_what_is_no_good_is_named_and_left_out(tmp_path):
     assert choice == RenderChoice(settings="/Render/S", purposes=("default",))
     lines = "\n".join(report.lines())
     for name in ("resolution", "pixelAspectRatio", "dataWindowNDC", "aspectRatioConformPolicy"):
-        assert f"{name} of render settings is no good: left out: /Render/S" in lines
+        assert f"{name} of render settings is invalid: left out: /Render/S" in lines
     assert "render settings name /Ball, which is no camera: /Render/S" in lines
     assert "no purpose 'odd'" in lines
 

@@ -223,7 +223,7 @@ def test_pair_has_a_page_and_a_wipe(frames: Path, tmp_path: Path) -> None:
 
 
 def test_compare_refuses(frames: Path, others: Path, tmp_path: Path) -> None:
-    assert "--heatmap is of two pictures" in failed(
+    assert "--heatmap is only for two images" in failed(
         "compare", frames, others, "--heatmap", tmp_path / "h.png"
     )
     one = frames / "shot.0008.exr"

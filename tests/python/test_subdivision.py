@@ -576,7 +576,7 @@ def test_memory_bounds_automatic_levels(tmp_path, monkeypatch):
     text = CAMERA + mesh(QUAD, [[0, 1, 2, 3]]) + mesh(QUAD, [[0, 1, 2, 3]], name="N")
     recorder, loaded = load(tmp_path, text, subdivision="auto", size=(800, 800))
     assert 0 < sum(len(mesh["indices"]) for mesh in recorder.meshes) <= 1000
-    assert "less than the picture asks for" in said(loaded)
+    assert "less than the image needs" in said(loaded)
 
 
 def test_a_level_beyond_memory_is_refused(tmp_path, monkeypatch):

@@ -73,7 +73,7 @@ BAD = [
     ("", "no TILT line"),
     (GOOD.replace("TILT=NONE", "TILT=lamp.tlt"), "another file (LAMP.TLT)"),
     (GOOD.replace("10 4", "10"), "ends within its candela"),
-    (GOOD.replace("10 4", "10 four"), "'four' is no number"),
+    (GOOD.replace("10 4", "10 four"), "'four' is not a number"),
     (GOOD.replace("10 4", "10 nan"), "not finite"),
     (ies([0, 90, 60], [0], [1, 2, 3]), "vertical angles do not ascend"),
     (ies([0, 90], [0, 45], [1, 2, 3, 4]), "end at 45"),

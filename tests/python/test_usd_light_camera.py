@@ -153,7 +153,7 @@ def test_what_lights_ask_for_and_do_not_get(tmp_path):
     assert listed == [
         "shaping of DomeLights",
         "light filter PortalLight",
-        "curves as lights (they shine by their material alone)",
+        "curves as lights (only their materials emit)",
     ]
     assert len(scene.lights) == 2 and "/Glow is no PortalLight" in said(loaded)
     assert scene.lights[0]["portals"].shape == (1, 4, 4)

@@ -231,7 +231,7 @@ def test_tetrahedra_are_drawn_by_their_surface(tmp_path, more, faces, volume):
         (nurbs([(0, 0, 0)] * 4, [0] * 8, 4), "its range is empty"),
         (nurbs([(0, 0, 0)] * 4, range(9), 5), "order 5 with 4 control points"),
         (nurbs([(0, 0, 0)] * 4, [0, 0, 1, 2, 3, 3], 2, "double[] pointWeights = [0, 0, 0, 0]"),
-         "add up to nothing"),
+         "add up to 0"),
         ('def HermiteCurves "C" {\n int[] curveVertexCounts = [2]\n'
          "point3f[] points = [(0, 0, 0), (1, 0, 0)] }", "as many tangents"),
         (sphere(points=[(0, 0, 0)]), "9 x 5 control points, and there are 1"),
@@ -263,7 +263,7 @@ def two_nurbs(knots="0, 0, 0, 0, 1, 1, 1, 1", point="0, 1, 0", more=""):
     [
         (two_nurbs(knots="0, 0, 0, nan, 1, 1, 1, 1"), "knots are not in order"),
         (two_nurbs(point="nan, 1, 0"), "not finite"),
-        (two_nurbs(more="double[] pointWeights = [1, 1, 1, 1, nan, 1, 1, 1]"), "add up to nothing"),
+        (two_nurbs(more="double[] pointWeights = [1, 1, 1, 1, nan, 1, 1, 1]"), "add up to 0"),
         ('def HermiteCurves "C" {\n int[] curveVertexCounts = [2, 2]\n'
          "point3f[] points = [(0, 0, 0), (3, 0, 0), (0, 1, 0), (3, 1, 0)]\n"
          "vector3f[] tangents = [(1, 0, 0), (1, 0, 0), (nan, 0, 0), (1, 0, 0)] }", "not finite"),

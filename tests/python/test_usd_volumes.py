@@ -351,7 +351,7 @@ def test_black_bodies() -> None:
 @pytest.mark.parametrize(
     ("made", "line"),
     [
-        (grid(np.nan), "/V/density: .*a.vdb: grid 'density' has 512 numbers that are infinite"),
+        (grid(np.nan), "/V/density: .*a.vdb: grid 'density' has 512 values that are infinite"),
         (grid(np.inf), "infinite"),
         (grid(-1), "512 numbers below 0, down to -1: a density has none"),
     ],

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The benchmark suite: what is run, how it is run, and what is kept. docs/bench.md tells it."""
+"""Benchmark suites: reading, running, recording and analysing them (docs/bench.md)."""

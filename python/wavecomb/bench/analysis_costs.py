@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Predicted against measured cost of materials."""
+"""Comparison of predicted and measured shading costs of materials."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PREDICTIONS = {
     "predicted_ns": "moving average, after the last pass",
 }
 LEAST_RECORDS = 256
-"""Timed records that a material needs to enter the comparison."""
+"""Smallest number of timed records with which a material enters the comparison."""
 
 
 def material_costs(results: Results) -> pd.DataFrame:
@@ -30,7 +30,7 @@ def material_costs(results: Results) -> pd.DataFrame:
 
     Columns: ``run_id``, ``stage``, ``policy``, ``lanes``, ``repetition``, ``material``,
     ``program``, ``timed_records``, ``measured_ns``, ``calibrated_ns``, ``predicted_ns``; times in
-    ns per record. The oracles are left out: their costs are no predictions.
+    ns per record. Oracles are left out, because their costs are not predictions.
     """
     pandas = needed("pandas", "the analysis")
     found = pandas.DataFrame(
@@ -52,14 +52,14 @@ def material_costs(results: Results) -> pd.DataFrame:
 
 
 def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
-    """Computes the quality of predictions, materials weighted by their timed records.
+    """Computes the quality of predictions, with materials weighted by their timed records.
 
         r2 = 1 - sum w (measured - predicted)^2 / sum w (measured - mean)^2
         slope, intercept: of the weighted least squares line measured = intercept + slope predicted
 
     A perfect prediction has r2 = 1, slope 1, intercept 0. r2 is negative if the mean would have
     predicted better. Intervals resample materials, each with all its runs, since a new scene would
-    bring other materials.
+    have other materials.
 
     Returns:
         ``r2``, ``slope``, ``intercept`` (ns), ``mean_error`` (relative, weighted), each with
@@ -89,7 +89,7 @@ def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
 
 
 def _line(sums: NDArray[np.float64]) -> NDArray[np.float64]:
-    """r2, slope, intercept and mean error, (4, ...), from weighted sums, (7, ...)."""
+    """Computes r2, slope, intercept and mean error, (4, ...), from weighted sums, (7, ...)."""
     w, wx, wy, wxx, wxy, wyy, we = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         total = wyy - wy**2 / w

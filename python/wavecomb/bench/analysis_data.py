@@ -27,7 +27,7 @@ SETTINGS = (
     *("wave_size", "policy", "roulette", "ray_order", "shadow_order", "max_depth"),
     *("factor", "factor_value"),
 )
-"""What was chosen for a run; two runs that agree in all of it are repetitions."""
+"""Settings of a run. Runs that agree in all of them are repetitions."""
 
 BASELINES = {
     "policy": "none",
@@ -37,31 +37,32 @@ BASELINES = {
     "renderer": "wavecomb",
     "case": "off",
 }
-"""What a level is compared with; of numbers it is the least."""
+"""Level of each factor that all other levels are compared with. For numbers it is the smallest."""
 
 POLICIES = (
     *("none", "program", "material", "texture", "texture-locality", "cost-benefit"),
     *("random-runs", "adaptive", "oracle", "oracle-best", "oracle-worst"),
 )
-"""In the order in which tables and figures show them."""
+"""Policies, in the order of tables and figures."""
 
 PLACEBO = "random-runs"
 BEST_FIRST = (BEST, COSTS)
-"""The oracle that a share is told of: the first that was run."""
+"""Oracles that the share of the possible gain refers to. The first one that was run is used."""
 BOUNDS = (PLACEBO, *ORACLES)
-"""Orders that nobody would use: they bound what an order can win."""
+"""Policies that are only bounds: they show how much an order can gain, but are of no practical
+use."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """A result folder.
+    """Contents of a result folder.
 
     Attributes:
-        folder: Where it is.
-        runs: The runs that came to an end, one row each, with the columns of ``columns``.
-        failed: The others.
-        machine: machine.json; empty where there is none.
-        suite_text: suite.toml; "" where there is none.
+        folder: Path of the folder.
+        runs: Successful runs, one row each, with the columns of ``columns``.
+        failed: Failed runs, with the same columns.
+        machine: Contents of machine.json, or {} without that file.
+        suite_text: Contents of suite.toml, or "" without that file.
     """
 
     folder: Path
@@ -71,14 +72,14 @@ class Results:
     suite_text: str
 
     def experiments(self) -> list[tuple[str, pd.DataFrame]]:
-        """Names and runs, in the order of the suite."""
+        """Returns names and runs of the experiments, in the order of the suite."""
         found = [(str(name), runs) for name, runs in self.runs.groupby("experiment")]
         return sorted(found, key=lambda entry: self.suite_text.find(f'name = "{entry[0]}"'))
 
     def records(self) -> Iterator[dict[str, Any]]:
-        """The objects of runs.jsonl, one by one: {"row": ..., "stats": ...}.
+        """Iterates over the objects {"row": ..., "stats": ...} of runs.jsonl.
 
-        A torn last line is left out.
+        Skips an incomplete last line.
         """
         path = self.folder / "runs.jsonl"
         if not path.is_file():
@@ -91,7 +92,7 @@ class Results:
                     record = json.loads(line)
                     record["row"]["run_id"]
                 except (ValueError, KeyError, TypeError) as error:
-                    raise WavecombError(f"{path}: line {number} is no run") from error
+                    raise WavecombError(f"{path}: line {number} is not a run") from error
                 yield record
 
 
@@ -99,7 +100,8 @@ def load(folder: Path) -> Results:
     """Reads a result folder.
 
     Raises:
-        WavecombError: It is none, or holds no run; one line that names the file.
+        WavecombError: It is not a result folder, or holds no successful run. The message names the
+            file.
     """
     pandas = needed("pandas", "the analysis")
     path = folder / "runs.csv"
@@ -116,7 +118,7 @@ def load(folder: Path) -> Results:
             frame[column.name] = pandas.to_numeric(frame[column.name])
     ended = frame["status"] == "ok"
     if not ended.any():
-        raise WavecombError(f"{path}: no run came to an end")
+        raise WavecombError(f"{path}: no run succeeded")
     return Results(
         folder=folder,
         runs=frame[ended].reset_index(drop=True),
@@ -129,10 +131,10 @@ def load(folder: Path) -> Results:
 def cells(
     runs: pd.DataFrame, vary: str | Sequence[str], ignore: Sequence[str] = ()
 ) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
-    """Groups of runs that agree in every setting but ``vary`` (and ``ignore``).
+    """Yields groups of runs that agree in every setting except ``vary`` and ``ignore``.
 
-    Settings that are no columns (a case of a suite may change any) tell groups apart by the name
-    of the configuration, where otherwise two configurations would be one.
+    A case of a suite may change settings that have no column. Such groups are separated by the name
+    of the configuration.
     """
     varied = {vary} if isinstance(vary, str) else set(vary)
     keys = [name for name in SETTINGS if name not in varied and name not in ignore]
@@ -148,14 +150,14 @@ def cells(
 
 
 def rounds(group: pd.DataFrame, by: str, metric: str) -> tuple[list[Any], NDArray[np.float64]]:
-    """Returns levels and their values, (rounds, levels), NaN where a run is missing."""
+    """Returns levels and their values, (rounds, levels), with NaN for missing runs."""
     table = group.pivot_table(index="repetition", columns=by, values=metric, aggfunc="mean")
     levels = in_order(by, list(table.columns))
     return levels, table[levels].to_numpy(np.float64)
 
 
 def baseline_of(factor: str, levels: Sequence[Any]) -> Any:
-    """The level that others are compared with; None where it is missing."""
+    """Returns the level that others are compared with, or None if it was not run."""
     wanted = BASELINES.get(factor)
     if wanted is not None:
         return wanted if wanted in levels else None
@@ -163,7 +165,7 @@ def baseline_of(factor: str, levels: Sequence[Any]) -> Any:
 
 
 def in_order(factor: str, levels: Sequence[Any]) -> list[Any]:
-    """Levels in the order of tables: policies as documented, the baseline first, numbers rising."""
+    """Sorts levels for tables: policies as documented, the baseline first, numbers ascending."""
     if factor == "policy":
         place = {name: k for k, name in enumerate(POLICIES)}
         return sorted(levels, key=lambda name: (place.get(name, len(place)), str(name)))
@@ -198,10 +200,11 @@ def label(cell: dict[str, Any], names: Sequence[str]) -> str:
 def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
     """Returns the settings in which cells differ, except the experiment; else "stage".
 
-    The value of a factor is included if nothing else distinguishes cells: a renderer may have used
-    less than the suite asked for, as with waves that are larger than an image.
+    The value of a factor is included if nothing else distinguishes cells. A renderer may have used
+    less than the suite requested, for example if a wave is larger than the image.
     """
-    redundant = ("experiment", "height", "factor", "factor_value")  # in the heading, or implied
+    # shown in the heading, or implied by another setting
+    redundant = ("experiment", "height", "factor", "factor_value")
     names = [name for name in (*SETTINGS, "variant") if name not in redundant]
     differ = [n for n in names if len({str(cell.get(n, "")) for cell in cells}) > 1]
     names = differ if "stage" in differ else ["stage", *differ]
@@ -226,7 +229,7 @@ def labelled(
         only: Settings to use; empty means all.
         column: Column for the names.
         default: Name if no setting varies.
-        leave_out: Settings that are no part of a cell.
+        leave_out: Settings that are not part of a cell.
     """
     names = varying(rows) if rows else []
     names = [n for n in names if n not in leave_out and (not only or n in only)]
@@ -236,7 +239,7 @@ def labelled(
 
 
 def short_count(value: float) -> str:
-    """A count for people, in 1024s where it is made of them: 4096 -> 4 K, 50000 -> 50 k.
+    """Formats a count, with binary units for multiples of 1024: 4096 -> 4 K, 50000 -> 50 k.
 
     >>> short_count(65536), short_count(1 << 20), short_count(100), short_count(1e6)
     ('64 K', '1 M', '100', '1 million')
@@ -249,9 +252,9 @@ def short_count(value: float) -> str:
 
 
 def _without(config: str, varied: set[str], across: bool) -> str:
-    """The name of a configuration without the parts that name what is varied.
+    """Returns the name of a configuration without the parts that name varied settings.
 
-    The first part is the experiment; it is left out, too, where cells go across experiments.
+    Also drops the first part, the experiment, if ``across`` groups runs of all experiments.
     """
     parts = config.split(".")[1 if across else 0 :]
     return ".".join(part for part in parts if not any(part.startswith(f"{v}-") for v in varied))
@@ -262,7 +265,7 @@ def _json(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(text) if text else {}
     except ValueError as error:
-        raise WavecombError(f"{path}: is no JSON: {error}") from error
+        raise WavecombError(f"{path}: is not JSON: {error}") from error
     return document if isinstance(document, dict) else {}
 
 

@@ -26,7 +26,7 @@ def factors_of(runs: pd.DataFrame) -> list[str]:
 
 
 def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
-    """Computes the effect of each level of each factor, over all combinations of the others.
+    """Computes the effect of each level of each factor, over all combinations of the other factors.
 
     The main effect of level l of factor F against its baseline b, over the combinations c of all
     other factors (and stages) in which both were run, is
@@ -37,16 +37,16 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
 
         effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
 
-    over those combinations of the rest in which all four were run: where the suite is no full
+    over those combinations of the rest in which all four were run. If the suite is not a full
     factorial, other differences must not count as interaction.
 
     T is the mean over rounds. Intervals resample rounds; p-values test the effects of single
-    rounds and are corrected after Holm over all effects of the table.
+    rounds, with Holm's correction over all effects of the table.
 
     Returns:
-        One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``,
-        ``baseline``, ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of
-        pairs), ``n``, ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
+        One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``, ``baseline``,
+        ``other``, ``other_level`` (interactions), ``name``, ``cells`` (number of pairs), ``n``,
+        ``ratio``, ``low``, ``high``, ``p``, ``verdict``.
     """
     pandas = needed("pandas", "the analysis")
     runs = runs.dropna(subset=[metric])
@@ -60,7 +60,7 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
         for level in known if level != base[f]
     ]  # fmt: skip
     pairs = [pair for pair in itertools.combinations(others, 2) if pair[0][0] != pair[1][0]]
-    # An effect is linear in the logarithms: applied to unit vectors it gives its weights.
+    # An effect is linear in the logarithms, so applying it to unit vectors yields its weights.
     unit = pandas.DataFrame(np.eye(table.shape[1]), columns=table.columns)
     terms, weights = [], []
     for term in ((one,) for one in others), pairs:
@@ -75,7 +75,7 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
 
 
 def _difference(table: pd.DataFrame, factor: str, level: Any, base: Any) -> pd.DataFrame:
-    """Differences between two levels of a factor, over the combinations that have both."""
+    """Returns the differences between two levels of a factor, over combinations that have both."""
     columns = table.columns.names
     if level not in table.columns.unique(factor) or base not in table.columns.unique(factor):
         return table.iloc[:, :0].droplevel(columns.index(factor), axis=1)

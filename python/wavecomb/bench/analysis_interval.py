@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intervals and verdicts for statistics of mean times, computed by SciPy.
 
-Repetition k of every configuration ran in one round, and a disturbance of the machine affects all
-runs of a round. Rounds are therefore resampled as a whole, so that a ratio keeps what its two sides
-have in common.
+Repetition k of every configuration ran in the same round, and a disturbance of the machine affects
+all runs of a round. The analysis therefore resamples whole rounds, so that a disturbance cancels in
+ratios.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ RESAMPLES = 4000
 SEED = 20260117
 SAME_WITHIN = 0.01
 LEAST_FOR_BOOTSTRAP = 8
-"""Rounds. Resamples of n values stay within their range, which covers 1 - 2^(1 - n) at most."""
+"""Smallest number of rounds for a bootstrap. Resamples of n values stay within their range, which
+covers the mean with a probability of at most 1 - 2^(1 - n)."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array,
     options = {"vectorized": True, "axis": -1, "confidence_level": level}
     rows = (np.arange(n),)
     with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
-        warnings.simplefilter("ignore")  # statistics that do not vary
+        warnings.simplefilter("ignore")  # some statistics do not vary
         rng = np.random.default_rng(SEED)
         found = stats.bootstrap(rows, of_rows, n_resamples=RESAMPLES, rng=rng, **options)
         plain = stats.bootstrap(
@@ -124,7 +125,7 @@ def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array,
 
 
 def _nanmean(values: Array) -> Array:
-    """Means over the last axis but one; NaN where no value is known."""
+    """Returns the means over the second-last axis, ignoring NaN; NaN if all values are NaN."""
     known = ~np.isnan(values)
     means: Array = np.where(known, values, 0.0).sum(axis=-2) / known.sum(axis=-2)
     return means
@@ -155,7 +156,7 @@ def paired_p(a: Array, b: Array) -> float:
     """
     stats = needed("scipy.stats", "the analysis")
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # differences without spread
+        warnings.simplefilter("ignore")  # the differences may all be equal
         difference = np.round(np.log(a) - np.log(b), 12)
         found = stats.ttest_1samp(difference[np.isfinite(difference)], 0.0)
     return float(np.nan_to_num(found.pvalue, nan=1.0))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 GAINS = ("efficiency", "samples_per_s", "rays_per_s")
-"""Metrics of which more is better."""
+"""Metrics for which a larger value is better."""
 
 
 def ratios(
@@ -92,23 +92,23 @@ def means(
     return labelled(pandas.concat(found).to_dict("records") if found else [])
 
 
-# ---- The verdict on order: the gain of each policy with all else equal, and its share of the possi
+# ---- The verdict on order: the gain of each policy, and its share of the possible gain -----------
 
 
 STRATA = ("experiment", "renderer", "lanes", "roulette")
-"""Settings in which pooled cells agree: the effect of an order depends on them."""
+"""Settings that pooled cells have in common, because the effect of an order depends on them."""
 
 
 def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.DataFrame:
-    """Compares each policy with arrival order and the placebo; gives its share of the possible.
+    """Compares each policy with arrival order and the placebo, and computes its share of the gain.
 
-    Cells (stages, sizes, waves, orders of rays) of one stratum are pooled as geometric means:
+    Cells (stages, sizes, waves, ray orders) of one stratum are pooled as geometric means:
 
         ratio(p) = exp(mean over cells of log(T_p / T_none))
         share(p) = log(T_placebo / T_p) / log(T_placebo / T_oracle), of the same means
 
-    The share is 0 for the placebo and 1 for the oracle. It is given if the interval of the gap
-    T_placebo / T_oracle excludes 1; otherwise there is nothing to have a share of.
+    The share is 0 for the placebo and 1 for the oracle. It is given only if the interval of the gap
+    T_placebo / T_oracle excludes 1, because otherwise there is no gain to share.
 
     Returns:
         One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
@@ -130,7 +130,7 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
 
 
 def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> list[dict[str, Any]]:
-    """Rows of one stratum, the bounds last."""
+    """Returns the rows of one stratum, with the bounds last."""
     shared = set.intersection(*(set(group["policy"]) for group in groups))
     policies = in_order("policy", sorted(shared))
     wide = needed("pandas", "the analysis").concat(
@@ -146,7 +146,7 @@ def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> li
     best = next((policies.index(name) for name in BEST_FIRST if name in policies), None)
 
     def pooled(means: Array) -> Array:
-        """Mean logarithm over cells, (..., policies)."""
+        """Returns the mean logarithm over cells, (..., policies)."""
         shape = (*means.shape[:-1], len(groups), len(policies))
         return np.log(means.reshape(shape)).mean(axis=-2)
 
@@ -192,11 +192,11 @@ def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> li
 
 
 def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
-    """Computes the regret of each policy: mean time / least mean time of its cell - 1.
+    """Computes the regret of each policy: mean time / smallest mean time of its cell - 1.
 
-    The least is that of the fixed policies, without the bounds and "adaptive". It is found anew in
-    every resample, so the interval includes that the best policy is unknown. The least of noisy
-    means is a little too small; regret is then overstated, never hidden.
+    The smallest mean is taken over the fixed policies, without the bounds and "adaptive". Every
+    resample finds it again, so the interval accounts for the uncertainty about the best policy. The
+    smallest of noisy means is biased low, so regret is overstated rather than understated.
 
     Returns:
         One row per cell and policy: ``cell``, ``policy``, ``n``, ``regret``, ``low``, ``high``,
@@ -220,7 +220,7 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
                 "policy": policy,
                 "n": estimate.n,
                 "regret": estimate.value - 1.0,
-                # A fixed policy cannot be better than the best of them; adaptive can.
+                # Fixed policies cannot be better than the best of them, but "adaptive" can.
                 "low": np.maximum(estimate.low, 0.0 if policy == "adaptive" else 1.0) - 1.0,
                 "high": estimate.high - 1.0,
                 "best": best,

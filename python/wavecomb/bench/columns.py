@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The columns of ``runs.csv``: one row for each run that came to an end.
+"""Columns of ``runs.csv``, which has one row for each run.
 
-A result folder has, besides, ``runs.jsonl`` with one JSON object for each row, by ``run_id``, which
-holds everything that a row leaves out; docs/bench.md says what.
+A result folder also has ``runs.jsonl`` with one JSON object for each row, by ``run_id``. It holds
+all data that the row leaves out (docs/bench.md).
 
 An empty cell means "not measured" or "does not apply", never 0.
 """
@@ -28,13 +28,13 @@ Kind = Literal["text", "integer", "number", "flag", "json"]
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
+    """A column of ``runs.csv``.
 
     Attributes:
-        name: In the header.
+        name: Name in the header.
         kind: "text", "integer", "number", "flag" (0 or 1) or "json" (an object in one cell).
-        unit: "" where there is none.
-        meaning: One sentence.
+        unit: Unit, or "".
+        meaning: Description in one sentence.
     """
 
     name: str
@@ -47,31 +47,32 @@ PHASE_COLUMNS = (
     *("generate_s", "order_rays_s", "trace_s", "collect_s", "keys_s", "sort_s", "materialize_s"),
     *("shade_s", "shadow_s", "resolve_s", "metrics_s", "other_s"),
 )
-"""Phases, exclusive; with the rest in ``other_s`` they add up to threads x render_s."""
+"""Columns of mutually exclusive phases. Together with ``other_s`` they add up to threads x
+render_s."""
 
 COUNTER_COLUMNS = (
     *("cycles", "instructions", "l1d_misses", "l2_misses", "llc_misses", "branch_misses"),
 )
-"""Hardware counters; empty, with the reason in machine.json, where the kernel gives none."""
+"""Hardware counters. Empty if the kernel does not provide them; machine.json states the reason."""
 
 with (Path(__file__).parent / "columns.csv").open(encoding="utf-8", newline="") as _file:
     COLUMNS = tuple(Column(**row) for row in csv.DictReader(_file))  # type: ignore[arg-type]
-"""All columns, in the order of the file; ``columns.csv`` describes them."""
+"""All columns, in the order of the file. ``columns.csv`` describes them."""
 
 NAMES = tuple(column.name for column in COLUMNS)
 _BY_NAME = {column.name: column for column in COLUMNS}
 
 
 def header_line() -> str:
-    """The first line of the file, with its end."""
+    """Returns the header line of the file, with its line end."""
     return _line(NAMES)
 
 
 def row_line(row: Mapping[str, Any]) -> str:
-    """A row as one line, with its end.
+    """Formats a row as one line, with its line end.
 
     Raises:
-        KeyError: A name is no column.
+        KeyError: A name is not a column.
     """
     unknown = set(row) - set(NAMES)
     if unknown:
@@ -80,15 +81,15 @@ def row_line(row: Mapping[str, Any]) -> str:
 
 
 def parse_row(cells: Mapping[str, str]) -> dict[str, Any]:
-    """A row of ``csv.DictReader`` with types; empty cells are None."""
+    """Converts a row of ``csv.DictReader`` to typed values; empty cells become None."""
     return {name: _value(_BY_NAME[name], cells.get(name) or "") for name in NAMES}
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """All rows of a file, typed.
+    """Reads all rows of a file, with typed values.
 
-    A torn last line is left out, and of rows with one ``run_id``, which a run that failed and was
-    tried again has, all but the last.
+    Skips an incomplete last line. A run that failed and was repeated has several rows with one
+    ``run_id``, of which only the last is kept.
     """
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
@@ -126,7 +127,7 @@ def _value(column: Column, cell: str) -> Any:
     return json.loads(cell) if column.kind == "json" else cell
 
 
-# ---- From what a worker answered to a row of runs.csv --------------------------------------------
+# ---- From a worker's answer to a row of runs.csv -------------------------------------------------
 
 
 _PHASES = (
@@ -136,7 +137,10 @@ _PHASES = (
 
 
 def run_row(suite: Suite, run: Run, order: int, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """What the plan and the answer give; the runner adds the state of the machine."""
+    """Returns the columns known from the plan and the worker's answer.
+
+    The runner adds the state of the machine.
+    """
     config = run.config
     settings = config.settings
     width, height = settings["size"]
@@ -186,7 +190,7 @@ def run_row(suite: Suite, run: Run, order: int, answer: Mapping[str, Any]) -> di
 def _wavefront(
     settings: Mapping[str, Any], stats: Mapping[str, Any], answer: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What only Wavecomb tells."""
+    """Returns the columns that only Wavecomb reports."""
     used, phases, counts = stats["settings"], stats["phases_s"], stats["counts"]
     order = sum(phases[name] for name in SORTING)
     coherence, prediction = stats["coherence"], stats["cost_prediction"]

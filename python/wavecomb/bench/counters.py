@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hardware counters of a worker's timed render, by ``perf stat``, where the kernel gives them."""
+"""Hardware counters of a worker's timed render, by ``perf stat`` if the kernel allows it."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ EVENTS = {
     "llc_misses": ("LLC-load-misses", "cache-misses"),
     "branch_misses": ("branch-misses",),
 }
-"""Column -> perf's names for it, in order of preference: kinds of CPU differ."""
+"""Names of perf events for each column, in order of preference, because CPUs differ."""
 
 
 @dataclass(frozen=True)
 class Counters:
-    """What can be counted here.
+    """Hardware counters of this machine.
 
     Attributes:
-        events: Column -> perf's event.
-        missing: Column -> why it is not counted.
+        events: Name of the perf event for each available column.
+        missing: Reason for each column that cannot be counted.
     """
 
     events: dict[str, str] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class Counters:
 
 
 def available(events: dict[str, tuple[str, ...]] = EVENTS) -> Counters:
-    """Tries each event once, on ``true``."""
+    """Determines which events perf can count, by trying each on the command ``true``."""
     if shutil.which("perf") is None:
         return Counters(missing=dict.fromkeys(events, "perf is not installed"))
     found = Counters()
@@ -50,7 +50,7 @@ def available(events: dict[str, tuple[str, ...]] = EVENTS) -> Counters:
 
 
 def _trial(event: str) -> str | None:
-    """None if perf counts the event of a user's process, else why not."""
+    """Returns None if perf can count the event for a user's process, else the reason why not."""
     done = subprocess.run(
         ["perf", "stat", "-x", ",", "-e", f"{event}:u", "--", "true"],
         capture_output=True,
@@ -70,10 +70,10 @@ def _trial(event: str) -> str | None:
 
 
 class Session:
-    """One worker under perf, which counts between ``start`` and ``stop`` of the worker.
+    """Runs one worker under perf, which counts only while the worker has enabled it.
 
-    ``command`` goes before the worker's command; ``fds`` are handed on to it, and the worker gets
-    them in its job as ``perf``.
+    ``command`` is the prefix of the worker's command, and ``fds`` are file descriptors to pass to
+    it. The worker gets ``job`` as the entry ``perf`` of its job.
     """
 
     def __init__(self, events: dict[str, str], report: Path) -> None:
@@ -95,7 +95,7 @@ class Session:
         self.job = {"write": self._worker_writes, "read": self._worker_reads}
 
     def close(self) -> dict[str, float]:
-        """Counts by column, to be called when the worker is gone."""
+        """Returns the counts by column, after the worker has ended."""
         for fd in self.fds:
             os.close(fd)
         counts: dict[str, float] = {}
@@ -116,17 +116,17 @@ class Session:
 
 
 class Switch:
-    """The worker's side: turns counting on and off; does nothing without perf."""
+    """Switch in the worker that turns counting on and off. Does nothing without perf."""
 
     def __init__(self, job: dict[str, int] | None) -> None:
         self._job = job
 
     def start(self) -> None:
-        """Counts from here."""
+        """Starts counting."""
         self._say(b"enable\n")
 
     def stop(self) -> None:
-        """Counts no more."""
+        """Stops counting."""
         self._say(b"disable\n")
 
     def _say(self, word: bytes) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forest plots: a row for each thing that is compared, a point with its interval."""
+"""Forest plots: one row for each compared item, showing a point with its interval."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ if TYPE_CHECKING:
 ROW = 0.21
 """Height of a row in inches."""
 LONGEST = 56
-"""Letters of a panel's title that have room."""
+"""Largest number of characters in the title of a panel."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One point.
+    """A row of a forest plot.
 
     Attributes:
-        name: At the left.
-        value: Where the point is.
-        low: Of the interval; NaN: none.
-        high: Likewise.
-        colour: Of point and whiskers.
-        hollow: It is a bound or a baseline, not a contestant.
+        name: Label at the left.
+        value: Position of the point.
+        low: Lower end of the interval; NaN if there is none.
+        high: Upper end of the interval; NaN if there is none.
+        colour: Colour of the point and its whiskers.
+        hollow: Whether the row is a bound or a baseline, drawn with a hollow point.
     """
 
     name: str
@@ -82,13 +82,13 @@ def panels_of(
     """Makes a panel for each value of the column ``by``, with a row for each row of the table.
 
     Args:
-        table: Columns ``name``, ``value`` and the ends of intervals, ``low`` and ``high``.
+        table: Table with the columns ``name``, ``value``, ``low`` and ``high``.
         by: Column with the titles of panels.
         name: Column with the names of rows.
-        value: Column with the points.
-        prefix: Of the columns ``low`` and ``high``.
-        colour: Colour of a row.
-        hollow: Whether a row is a bound or a baseline.
+        value: Column with the positions of points.
+        prefix: Prefix of the columns ``low`` and ``high``.
+        colour: Returns the colour of a row.
+        hollow: Returns whether a row is a bound or a baseline.
     """
 
     def row_of(row: Any) -> Row:
@@ -113,7 +113,7 @@ def forest(
     percent: bool = False,
     columns: int = 2,
 ) -> Drawn:
-    """Panels of rows on one scale, with a line at what means "no difference"."""
+    """Draws panels of rows on one scale, with a line at the value that means "no difference"."""
     columns = 1 if len(panels) == 1 else columns
     sizes = [len(panel.rows) for panel in panels]
     heights = [max(sizes[k : k + columns]) for k in range(0, len(panels), columns)]
@@ -133,7 +133,7 @@ def forest(
         low, high = clipped(
             *axes[0].get_xlim(), [centre, *(row.value for panel in panels for row in panel.rows)]
         )
-        for ax in axes:  # room at both sides of what is compared with
+        for ax in axes:  # keep some space on both sides of the centre line
             ax.set_xlim(min(low, centre * 0.95), max(high, centre * 1.05))
             plain_logarithm(ax.xaxis)
     for ax in axes[max(0, len(panels) - columns) : len(panels)]:
@@ -191,7 +191,8 @@ def _panel(
         ax.xaxis.set_major_formatter(FuncFormatter(form))
 
 
-# ---- Figures of the verdicts: order, regret, the factorial, predicted costs, pictures ------------
+# ---- Figures of the verdicts: order, regret, the factorial, predicted costs, images
+# ---------------
 
 
 MOST_INTERACTIONS = 14
@@ -202,7 +203,7 @@ _FACTORS = {
 
 
 def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | None:
-    """Ratio of each policy to the placebo, with the oracle, a panel for each stratum."""
+    """Draws the ratio of each policy to the placebo, with the oracle, in a panel per stratum."""
     if table.empty or table["placebo_ratio"].isna().all():
         return None
     panels = panels_of(
@@ -216,26 +217,26 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | N
         f"an order that means nothing. Geometric mean over stages and settings. {INTERVALS}, "
         f"n = {count_words(table['n'])} rounds. Hollow: the bounds."
     )
-    return forest(name, "What an order is worth beyond grouping", caption, "to placebo", panels)
+    return forest(name, "Gain of an order beyond grouping", caption, "to placebo", panels)
 
 
 def regret_figure(table: pd.DataFrame, name: str) -> Drawn | None:
-    """Regret of each policy, a panel for each cell."""
+    """Draws the regret of each policy, in a panel per cell."""
     if table.empty or table["cell"].nunique() > MOST_PANELS:
         return None
     panels = panels_of(
         table, "cell", "policy", "regret", colour=lambda row: policy_colour(row.policy)
     )
     caption = (
-        "Render time above that of the best fixed policy of the cell. "
+        "Render time relative to the best fixed policy of the cell. "
         f"{INTERVALS}, n = {count_words(table['n'])} rounds."
     )
-    title = "Regret: what a choice costs"
+    title = "Regret: cost of a choice"
     return forest(name, title, caption, "regret", panels, centre=0.0, log=False, percent=True)
 
 
 def effects_figure(table: pd.DataFrame, name: str, metric_words: str) -> Drawn | None:
-    """Main effects by factor, and the interactions that are furthest from 1."""
+    """Draws the main effects by factor, and the interactions that are furthest from 1."""
     if table.empty:
         return None
     panels = []
@@ -272,7 +273,7 @@ def _effect_row(row: Any, name: str) -> Row:
 def cost_figure(
     costs: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], name: str
 ) -> Drawn | None:
-    """Measured over predicted cost of each material, a panel for each prediction."""
+    """Draws measured over predicted cost of each material, in a panel per prediction."""
     kept = [(column, line) for column, line in lines.items() if line]
     if costs.empty or not kept:
         return None
@@ -305,12 +306,14 @@ def cost_figure(
             f"r² = {fixed(line['r2'], 2)}, slope {line['slope']:.2f} "
             f"[{line['slope_low']:.2f}, {line['slope_high']:.2f}]"
         )
-        ax.set_xlabel(f"predicted, ns a record: {'calibrated' if 'calib' in column else 'average'}")
+        ax.set_xlabel(
+            f"predicted, ns per record: {'calibrated' if 'calib' in column else 'average'}"
+        )
         ax.grid()
         ax.set_aspect("equal", adjustable="datalim")
         for axis in (ax.xaxis, ax.yaxis):
             plain_logarithm(axis, (1.0, 3.0))
-    axes[0].set_ylabel("measured, ns a record")
+    axes[0].set_ylabel("measured, ns per record")
     handles, texts = axes[0].get_legend_handles_labels()
     made.legend(handles, texts, loc="outside upper left", ncols=6, handletextpad=0.1)
     caption = (
@@ -323,7 +326,7 @@ def cost_figure(
 def difference_figure(
     pictures: Sequence[tuple[str, NDArray[Any]]], golden: NDArray[Any], name: str, title: str
 ) -> Drawn:
-    """Relative luminance differences to a golden picture, on one scale."""
+    """Draws relative luminance differences to a golden image, on one scale."""
     from wavecomb.picture.compare import luminance
 
     reference = luminance(golden)
@@ -332,7 +335,7 @@ def difference_figure(
         for text, pixels in pictures
     ]
     limit = float(np.quantile(np.abs([values for _, values in maps]), 0.99)) or 1e-6
-    columns = min(3, max(2, len(maps)))  # one map alone would fill a page
+    columns = min(3, max(2, len(maps)))  # a single map would fill the page
     lines = -(-len(maps) // columns)
     height, width = reference.shape
     made, axes = figure(
@@ -348,7 +351,7 @@ def difference_figure(
     bar.set_label("(picture − golden) / (golden + 0.01), luminance; orange is brighter")
     bar.outline.set_visible(False)
     caption = (
-        f"Scale to ±{limit:.2g}, the 99th percentile of all maps shown. What is the same in all of "
-        "them is noise of the same random numbers."
+        f"Scale to ±{limit:.2g}, the 99th percentile of all maps shown. Equal patterns in all "
+        "maps are noise of the same random numbers."
     )
     return Drawn(name, title, caption, made)

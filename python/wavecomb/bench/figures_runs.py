@@ -57,7 +57,7 @@ STACK = (
 COHERENCE = (
     ("run_length_coherence", "run length, records", True),
     ("cache_line_homogeneity", "same material", False),
-    ("texture_homogeneity", "same texture place", False),
+    ("texture_homogeneity", "same texture position", False),
     ("lane_utilisation", "lanes full", False),
 )
 
@@ -65,7 +65,7 @@ COHERENCE = (
 def ratio_figure(
     table: pd.DataFrame, name: str, title: str, x_label: str, factor: str
 ) -> Drawn | None:
-    """A table of ``ratios`` as forest plots, a panel for each cell; None where it is too large."""
+    """Draws ``ratios`` as forest plots, one panel per cell; None if there are too many cells."""
     if table.empty or table["cell"].nunique() > MOST_PANELS:
         return None
     panels = panels_of(
@@ -82,7 +82,7 @@ def ratio_figure(
 
 
 def pipeline(runs: pd.DataFrame, name: str) -> Drawn | None:
-    """Stacked phases of each policy, a panel for each cell."""
+    """Draws stacked phases of each policy, in a panel per cell."""
     groups = list(cells(runs.dropna(subset=["shade_s"]), "policy"))
     if not groups or len(groups) > MOST_PANELS:
         return None
@@ -121,7 +121,7 @@ def pipeline(runs: pd.DataFrame, name: str) -> Drawn | None:
 
 
 def coherence(runs: pd.DataFrame, name: str) -> Drawn | None:
-    """Four measures of order by policy, a series for each cell."""
+    """Draws four measures of coherence by policy, with a series for each cell."""
     groups = list(cells(runs.dropna(subset=["run_length_coherence"]), "policy"))
     if not groups or len(groups) > 6:
         return None
@@ -153,8 +153,10 @@ def coherence(runs: pd.DataFrame, name: str) -> Drawn | None:
     axes[0].set_ylim(len(policies) - 0.4, -0.6)
     handles, texts = axes[0].get_legend_handles_labels()
     made.legend(handles, texts, loc="outside upper left", ncols=3, handletextpad=0.1)
-    caption = "Means over runs. Run length is logarithmic; the others are shares of neighbours."
-    return Drawn(name, "What an order does to coherence", caption, made)
+    caption = (
+        "Means over runs. Run length is logarithmic; all other values are fractions of neighbours."
+    )
+    return Drawn(name, "Effect of an order on coherence", caption, made)
 
 
 def curve(
@@ -166,16 +168,16 @@ def curve(
     x_label: str,
     series: str = "policy",
 ) -> Drawn | None:
-    """Metrics over a number, a line for each series; both axes logarithmic.
+    """Draws metrics over a numeric column, with a line for each series and logarithmic axes.
 
     Args:
-        runs: Of one cell but for x and series.
+        runs: Runs that differ only in x and the series.
         x: Column with numbers.
         metrics: Column and axis label, one panel each.
-        name: Of the figure.
-        title: Of the figure.
-        x_label: With its unit.
-        series: Column.
+        name: Name of the figure.
+        title: Title of the figure.
+        x_label: Label of the x axis, with its unit.
+        series: Column that distinguishes the lines.
     """
     kept = [(metric, text) for metric, text in metrics if runs[metric].notna().any()]
     if runs[x].nunique() < 2 or not kept:
@@ -208,7 +210,10 @@ def curve(
 
 
 def error_over_time(runs: pd.DataFrame, name: str) -> Drawn | None:
-    """RelMSE over render time, a line for each policy or renderer through its sample counts."""
+    """Draws relMSE over render time.
+
+    A line for each policy or renderer connects its sample counts.
+    """
     runs = runs[runs["rel_mse"].fillna(0.0) > 0.0]
     if runs.empty or runs["spp"].nunique() < 2:
         return None
@@ -264,7 +269,7 @@ def error_over_time(runs: pd.DataFrame, name: str) -> Drawn | None:
 
 
 def intervals(runs: pd.DataFrame, x: str, metric: str) -> list[tuple[float, float, float, float]]:
-    """x, mean and the ends of its interval, for each x."""
+    """Returns x, the mean and the ends of its interval, for each x."""
     levels, values = rounds(runs.dropna(subset=[metric]), x, metric)
     order = np.argsort(levels)
     found = bootstrap(values, lambda means: means, positive=True)
@@ -280,7 +285,7 @@ def _line(
 
 
 def _measured_ticks(ax: Axes, values: Sequence[float]) -> None:
-    """Ticks at the values that were measured, at most eight, as people write them."""
+    """Puts ticks at the measured values, at most eight, with short labels."""
     from matplotlib.ticker import NullLocator
 
     step = math.ceil(len(values) / 8)

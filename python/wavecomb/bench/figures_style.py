@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How figures look: colours that all can tell apart, ink that follows the page, direct labels."""
+"""Style of figures.
+
+Colours are distinguishable for colour-blind readers, the text colour follows the page, and labels
+stand at the lines.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +25,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK = "#1a1b1e"
-"""The colour of text, axes and what is compared with; in the report the page's own."""
+"""Colour of text, axes and baselines. In the HTML report it becomes the text colour of the page."""
 FAINT = "#8a8d93"
 WHISKERS = 4.0
-"""How far a logarithmic axis goes beyond the points, as a factor."""
+"""Largest extent of a logarithmic axis beyond the points, as a factor."""
 INTERVALS = "Whiskers: 95 % intervals"
 MOST_PANELS = 12
-"""Figures with more panels are left out."""
+"""Largest number of panels. Figures with more are left out."""
 WIDTH = 7.4
-"""Width of a figure in inches: a column of text in print."""
+"""Width of a figure in inches, equal to a column of text in print."""
 
-# Okabe and Ito 2008, "Color universal design"; without yellow, which paper does not show.
+# Okabe and Ito 2008, "Color universal design", without yellow, which is hardly visible on white.
 BLUE, SKY, ORANGE, RED = "#0072b2", "#56b4e9", "#e69f00", "#d55e00"
 GREEN, PURPLE, BROWN = "#009e73", "#cc79a7", "#8c6d1f"
 CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, BROWN)
@@ -46,13 +50,13 @@ _STYLE = Path(__file__).parent / "report.mplstyle"
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure with its words.
+    """A figure with its title and caption.
 
     Attributes:
-        name: Of its files; unique in a report.
-        title: Short.
-        caption: What is shown, in which unit, what whiskers are, how many runs.
-        figure: Matplotlib's.
+        name: Name of the files; unique in a report.
+        title: Short title.
+        caption: Content and unit of the figure, kind of whiskers, number of runs.
+        figure: Matplotlib figure.
     """
 
     name: str
@@ -63,7 +67,7 @@ class Drawn:
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Applies the style of figures while they are made and saved."""
+    """Applies the style while figures are made and saved."""
     with needed("matplotlib.style", "a figure").context(_STYLE):
         yield
 
@@ -77,7 +81,10 @@ def figure(
     share_x: bool = False,
     share_y: bool = False,
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of the column's width and its axes, row by row; ``heights`` is of rows."""
+    """Creates a figure of the column's width.
+
+    ``heights`` are the relative heights of the rows. Returns the figure and its axes, row by row.
+    """
     made = needed("matplotlib.figure", "a figure").Figure(
         figsize=(WIDTH, height), layout="constrained"
     )
@@ -88,22 +95,22 @@ def figure(
 
 
 def policy_colour(policy: str) -> str:
-    """The colour of a policy, the same in all figures; the bounds are grey."""
+    """Returns the colour of a policy, the same in all figures; bounds are grey."""
     return _POLICY.get(policy, BROWN)
 
 
 def marker(index: int) -> str:
-    """Shapes tell series apart where colours do not."""
+    """Returns a marker shape, which distinguishes series if colours do not."""
     return MARKERS[index % len(MARKERS)]
 
 
 def colour(index: int) -> str:
-    """The colour of a series without one of its own."""
+    """Returns the colour of a series that has no fixed colour."""
     return CYCLE[index % len(CYCLE)]
 
 
 def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Names series at their last points, (x, y, text, colour), apart from one another."""
+    """Labels series at their last points (x, y, text, colour) without overlaps."""
     figure_ = axes.get_figure()
     assert figure_ is not None
     point = figure_.dpi / 72.0
@@ -139,21 +146,21 @@ def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> Non
 
 
 def count_words(sizes: Any) -> str:
-    """How many: "8", or "3 to 8"."""
+    """Formats a range of counts, such as "8" or "3 to 8"."""
     low, high = int(min(sizes)), int(max(sizes))
     return str(low) if low == high else f"{low} to {high}"
 
 
 def fixed(value: float, digits: int) -> str:
-    """A figure with so many decimals; no minus before 0."""
+    """Formats a number with a fixed number of decimals, without a minus sign for 0."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, float]:
-    """Limits of a logarithmic axis on which no whisker is much longer than what is compared.
+    """Returns limits of a logarithmic axis that cut off very long whiskers.
 
-    Intervals of two or three disturbed runs can span decades; they run out of the axes then, and
-    points can still be told apart.
+    Intervals of two or three disturbed runs can span decades. They then extend beyond the axes, and
+    the points remain distinguishable.
 
     >>> clipped(1e-9, 1e6, [0.5, 2.0])
     (0.125, 8.0)
@@ -162,7 +169,7 @@ def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, fl
 
 
 def plain_logarithm(axis: Axis, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
-    """Numbers as people write them on a logarithmic axis, few enough to be read."""
+    """Labels a logarithmic axis with plain numbers, few enough to be readable."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
     low, high = axis.get_view_interval()
@@ -176,13 +183,13 @@ def plain_logarithm(axis: Axis, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None
 
 
 def lay_out(drawn: Drawn) -> None:
-    """Finds places for everything once, so that saving in two formats does not find them again."""
+    """Computes the layout once, so that saving in two formats does not repeat it."""
     drawn.figure.draw_without_rendering()
     drawn.figure.set_layout_engine("none")
 
 
 def svg(drawn: Drawn) -> str:
-    """The figure as an <svg> element for a page: ink in the page's colour, ids of its own."""
+    """Returns the figure as an <svg> element, with the text colour of the page and unique ids."""
     buffer = io.StringIO()
     blank = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     drawn.figure.savefig(buffer, format="svg", metadata=blank)
@@ -190,15 +197,18 @@ def svg(drawn: Drawn) -> str:
     text = text[text.index("<svg") :].strip()
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
     text = text.replace(INK, "currentColor")
-    # Verdana has the widths of DejaVu Sans, and is there where the other is not.
+    # Verdana has the same widths as DejaVu Sans, and is available where DejaVu Sans is not.
     text = text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")
     text = re.sub(r'\b(id="|url\(#|href="#)', rf"\g<1>{drawn.name}-", text)
-    # The page sets the width; the view box keeps the shape.
+    # The page determines the width, and the view box keeps the aspect ratio.
     return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
 
 
 def save(drawn: Drawn, drawing: str, folder: Path) -> None:
-    """Writes NAME.svg, given as ``svg`` made it, and NAME.png, on white, whole or not at all."""
+    """Writes NAME.svg and NAME.png on white, never partially.
+
+    ``drawing`` is the result of ``svg``.
+    """
     with replacing(folder / f"{drawn.name}.svg") as part:
         on_white = drawing.replace("<svg", f'<svg style="background: #fff; color: {INK}"', 1)
         part.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{on_white}\n', encoding="utf-8")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What changed from one result folder to another: ratios of equal configurations."""
+"""Changes between two result folders, as ratios of equal configurations."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ METRICS = (
     *("render_s", "shade_and_order_s", "shade_s", "load_s", "build_s"),
     *("samples_per_s", "peak_rss_mb", "rel_mse", "efficiency"),
 )
-"""Columns that are worth a comparison."""
+"""Columns that ``wavecomb bench compare`` offers."""
 _LESS = ("rel_mse", "peak_rss_mb")
 _MACHINE = {"cpu": "CPU", "isa": "instruction set", "cores": "number of cores", "kernel": "kernel"}
 
 
 @dataclass(frozen=True)
 class Change:
-    """One configuration in both folders.
+    """Change of one configuration that is in both folders.
 
     Attributes:
-        config: Its name.
-        before: Mean of the metric.
-        after: Likewise.
-        ratio: Geometric mean of AFTER over that of BEFORE.
-        low: Of its 95 % interval; None where there are too few runs.
-        high: Likewise.
-        runs: In BEFORE and AFTER.
-        p: Of no change, corrected for all configurations.
-        verdict: In a word.
+        config: Name of the configuration.
+        before: Mean of the metric in BEFORE.
+        after: Mean of the metric in AFTER.
+        ratio: Ratio of geometric means, AFTER / BEFORE.
+        low: Lower end of the 95 % interval of the ratio; None with too few runs.
+        high: Upper end of the 95 % interval of the ratio; None with too few runs.
+        runs: Number of runs in BEFORE and AFTER.
+        p: p-value of no change, corrected for all configurations.
+        verdict: Verdict in a word.
     """
 
     config: str
@@ -60,17 +60,18 @@ class Change:
 
 @dataclass(frozen=True)
 class FolderComparison:
-    """Two folders.
+    """Comparison of two folders.
 
     Attributes:
-        metric: A column of runs.csv.
-        changes: By configuration, in the order of BEFORE.
+        metric: Column of runs.csv.
+        changes: Change of each configuration, in the order of BEFORE.
         mean_ratio: Geometric mean of all ratios.
-        only_before: Configurations that AFTER has not.
-        only_after: Likewise.
-        pictures: Runs of one configuration, seed and size that have a picture in both.
-        pictures_different: Of these, those whose pictures differ by a bit.
-        warnings: Why the ratios deserve care.
+        only_before: Configurations that are missing in AFTER.
+        only_after: Configurations that are missing in BEFORE.
+        pictures: Number of pairs of runs with equal configuration, seed and size that have an image
+            in both folders.
+        pictures_different: Number of these whose images are not bit-identical.
+        warnings: Reasons to read the ratios with care.
     """
 
     metric: str
@@ -83,18 +84,19 @@ class FolderComparison:
     warnings: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields, for JSON."""
+        """Returns the fields as a dictionary for JSON."""
         return dataclasses.asdict(self)
 
 
 def compare_folders(before: Path, after: Path, metric: str = "render_s") -> FolderComparison:
     """Compares two result folders.
 
-    A ratio is that of geometric means; its interval and p-value are Welch's (unequal variances) of
-    the logarithms. Runs are not paired: repetition k here and there had nothing in common.
+    Ratios are ratios of geometric means; intervals and p-values come from Welch's test (unequal
+    variances) of the logarithms. Runs are not paired, because equal repetitions of two folders
+    share nothing.
 
     Raises:
-        WavecombError: A folder holds no results, or they share no configuration or no such figure.
+        WavecombError: A folder holds no results, or no configuration has this metric in both.
     """
     a, b = load(before), load(after)
     groups_a, groups_b = (_values(results, metric) for results in (a, b))
@@ -135,7 +137,7 @@ def compare_folders(before: Path, after: Path, metric: str = "render_s") -> Fold
 
 
 def lines_of(found: FolderComparison) -> list[str]:
-    """The comparison as text."""
+    """Formats the comparison as lines of text."""
     lines = [f"warning: {line}" for line in found.warnings]
     width = max(len(change.config) for change in found.changes)
     lines.append(f"{found.metric}: AFTER / BEFORE")
@@ -155,7 +157,7 @@ def lines_of(found: FolderComparison) -> list[str]:
 
 
 def pictures_line(found: FolderComparison) -> str:
-    """Whether the two made the same pictures."""
+    """Returns a line that states whether both folders hold the same images."""
     if not found.pictures:
         return "pictures: none to compare"
     if not found.pictures_different:
@@ -164,7 +166,7 @@ def pictures_line(found: FolderComparison) -> str:
 
 
 def _values(results: Results, metric: str) -> dict[str, NDArray[np.float64]]:
-    """Positive figures of each configuration, in the order of the file."""
+    """Returns the positive values of each configuration, in the order of the file."""
     runs = results.runs[results.runs[metric] > 0]
     return {
         str(config): group[metric].to_numpy(np.float64)
@@ -173,14 +175,14 @@ def _values(results: Results, metric: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _welch(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[Estimate, float]:
-    """Ratio of geometric means, b over a, and the p-value of none."""
+    """Returns the ratio of geometric means, b over a, and the p-value of no difference."""
     stats = needed("scipy.stats", "comparing result folders")
     log_a, log_b = np.log(a), np.log(b)
     value = math.exp(float(log_b.mean() - log_a.mean()))
     n = min(len(a), len(b))
     if n < 2:
         return Estimate(value, math.nan, math.nan, n), 1.0
-    if max(np.ptp(log_a), np.ptp(log_b)) == 0.0:  # no spread: the ratio is exact
+    if max(np.ptp(log_a), np.ptp(log_b)) == 0.0:  # without spread the ratio is exact
         return Estimate(value, value, value, n), 1.0 if value == 1.0 else 0.0
     test = stats.ttest_ind(log_b, log_a, equal_var=False)
     interval = test.confidence_interval(LEVEL)
@@ -208,8 +210,7 @@ def _warnings(a: Results, b: Results) -> list[str]:
     spins = [spin_reference(results.machine.get("spins_s", ())) for results in (a, b)]
     if min(spins) > 0.0 and max(spins) > MAX_SPIN * min(spins):
         lines.append(
-            f"the machine itself took {spins[1] / spins[0]:.2f} times as long for a fixed "
-            "piece of work"
+            f"a fixed piece of work took {spins[1] / spins[0]:.2f} times as long on the machine"
         )
     for name, results in (("BEFORE", a), ("AFTER", b)):
         noise = results.machine.get("noise")
@@ -218,5 +219,7 @@ def _warnings(a: Results, b: Results) -> list[str]:
         if len(results.failed):
             lines.append(f"{len(results.failed)} runs failed in {name}")
     if a.suite_text != b.suite_text:
-        lines.append("the suites differ: configurations of one name may have other settings")
+        lines.append(
+            "the suites differ: configurations with equal names may have different settings"
+        )
     return lines

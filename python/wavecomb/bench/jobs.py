@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a worker is told, for each kind of run: timed, converged, recording of costs."""
+"""Jobs for workers, for each kind of run: timed, converged, and recording of costs."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from wavecomb.run.costs import save_costs
 
 
 def stage_file(source: StageSource, name: str, folder: Path) -> Path:
-    """Where the stage is, or will be once it is generated."""
+    """Returns the file of the stage, which may not be generated yet."""
     if source.file is not None:
         return source.file
     return folder / f"{name}-{digest([source.scene, source.options])}.usdc"
 
 
 def check_files(configs: Iterable[Config]) -> None:
-    """Raises WavecombError unless every stage that is a file is there."""
+    """Raises WavecombError unless every stage that is a file exists."""
     for config in configs:
         file = config.source.file
         if file is not None and not file.is_file():
@@ -43,7 +43,7 @@ def check_files(configs: Iterable[Config]) -> None:
 
 
 def generate(source: StageSource, path: Path) -> None:
-    """Writes a generated stage, unless it is there."""
+    """Writes a generated stage, unless the file exists."""
     if source.file is not None or path.exists():
         return
     from wavecomb.scenes import write_scene
@@ -55,15 +55,15 @@ def generate(source: StageSource, path: Path) -> None:
 
 
 RECORDINGS = 3
-"""Renders, with different seeds, that the oracle's costs are pooled from."""
+"""Number of renders, with different seeds, from which the oracle's costs are pooled."""
 ORDERINGS = 12
-"""Renders under different orders of materials that an oracle's order is found from."""
+"""Number of renders, with different orders of materials, from which the best order is derived."""
 
 Job = dict[str, Any]
 
 
 class Jobs:
-    """Makes the jobs of a sitting."""
+    """Builder of a sitting's jobs."""
 
     def __init__(self, suite: Suite, folder: ResultFolder, cpus: list[int]) -> None:
         self._suite = suite
@@ -71,30 +71,33 @@ class Jobs:
         self._cpus = cpus
 
     def stage(self, config: Config) -> Path:
-        """The stage's file."""
+        """Returns the file of the stage."""
         return stage_file(config.source, config.stage, self._folder.path / "stages")
 
     def golden(self, config: Config) -> Path:
-        """The converged picture's file."""
+        """Returns the file of the converged image."""
         return self._folder.path / "golden" / f"{config.golden_key()}.npy"
 
     def profile(self, config: Config) -> Path:
-        """What an oracle starts from: true costs, or ranks."""
+        """Returns the file with the true costs or ranks that an oracle uses."""
         policy = config.settings.get("policy")
         which = "" if policy == COSTS else f"-{policy}"
         return self._folder.path / "trace" / f"{config.recording_key()}{which}.json"
 
     def trace(self, config: Config) -> Path:
-        """The recordings that the best and the worst order are found from."""
+        """Returns the file of recordings for the best and the worst order."""
         return self._folder.path / "trace" / f"{config.recording_key()}-orders.json"
 
     def image(self, run: Run) -> Path | None:
-        """Where the run's picture is kept; None if it is not."""
+        """Returns the file that keeps the run's image, or None if it is not kept."""
         keep = {"none": False, "first": run.repetition == 0, "all": True}[run.config.images]
         return self._folder.path / "images" / f"{run.run_id}.npy" if keep else None
 
     def timed(self, run: Run) -> Job:
-        """A run of the plan. Its seed is its repetition, so a round has one picture."""
+        """Returns the job of a run in the plan.
+
+        The seed is the number of the repetition, so that all runs of a round have equal images.
+        """
         config = run.config
         settings = {**config.settings, "seed": run.repetition}
         oracle = settings.get("policy") in ORACLES
@@ -111,12 +114,12 @@ class Jobs:
         )
 
     def warm_up(self, config: Config) -> Job:
-        """A run that fills the file cache and is thrown away."""
+        """Returns a job that fills the file cache. Its result is discarded."""
         settings = {**config.settings, "policy": "program", "spp": 1}
         return self._job(config, settings)
 
     def converged(self, config: Config) -> Job:
-        """The golden picture of a configuration."""
+        """Returns the job that renders the converged image of a configuration."""
         golden: Golden = self._suite.golden
         ways = ("policy", "threads", "wave_size", "lanes", "ray_order", "shadow_order", "roulette")
         settings = {key: value for key, value in config.settings.items() if key not in ways}
@@ -124,9 +127,10 @@ class Jobs:
         return self._job(config, settings, image=str(self.golden(config)))
 
     def recording(self, config: Config, number: int, ranks: Path | None = None) -> Job:
-        """A render that costs are read from: sorted by material, so that batches hold one.
+        """Returns a render from which shading costs are measured.
 
-        With ``ranks``, a cost file, materials are shaded in the order of these.
+        Its records are sorted by material, so that each batch holds one material. ``ranks`` is an
+        optional cost file that determines the order of materials.
         """
         settings = {**config.settings, "policy": "material", "roulette": "throughput"}
         settings |= {"seed": self._suite.golden.seed + 1 + number}
@@ -146,14 +150,15 @@ class Jobs:
         }
 
 
-# ---- Renders before the sitting that the oracles learn from, and the files that keep them --------
+# ---- Renders before the sitting that record costs for the oracles, and their files
+# ----------------
 
 
 TRACE_SCHEMA = "wavecomb-trace/1"
 
 
 def make_profile(jobs: Jobs, config: Config, scratch: Path) -> None:
-    """Writes the file that the configuration's oracle starts from.
+    """Writes the file of costs or ranks that the configuration's oracle uses.
 
     Raises:
         WavecombError: A recording failed.
@@ -170,7 +175,7 @@ def make_profile(jobs: Jobs, config: Config, scratch: Path) -> None:
 
 
 def _orderings(jobs: Jobs, config: Config, scratch: Path) -> dict[str, Any]:
-    """Recordings under random orders of the materials, and the best and worst that follow."""
+    """Records random orders of materials, and derives the best and worst order from them."""
     first = _run(jobs.recording(config, 0), config, scratch)
     names = [entry["name"] for entry in first["stats"]["materials"]]
     path = scratch / "trace" / ".ranks.json"

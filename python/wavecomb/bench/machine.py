@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine that a sitting runs on: what it is, and how busy it is."""
+"""The machine of a sitting: its hardware, software and load."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _SYS_CPU = Path("/sys/devices/system/cpu")
 
 @dataclass(frozen=True)
 class Limits:
-    """What a machine has, for values of a suite that depend on it.
+    """Limits of a machine, for values of a suite that depend on them.
 
     Attributes:
-        threads: Usable cores.
-        lanes: Widest SIMD built.
-        cache_bytes: {"L2": ..., "L3": ...}; L3 of all cores together.
+        threads: Number of usable cores.
+        lanes: Largest SIMD width of this build.
+        cache_bytes: Cache sizes {"L2": ..., "L3": ...} in bytes; L3 is the sum over all cores.
     """
 
     threads: int
@@ -41,12 +41,12 @@ class Limits:
 
 
 def now() -> str:
-    """UTC, ISO 8601, to the second."""
+    """Returns the UTC time in ISO 8601, to the second."""
     return datetime.now(timezone.utc).replace(microsecond=0).isoformat()
 
 
 def cores() -> list[int]:
-    """The cores that this process may use."""
+    """Returns the cores that this process may use."""
     try:
         return sorted(os.sched_getaffinity(0))
     except AttributeError:
@@ -54,14 +54,17 @@ def cores() -> list[int]:
 
 
 def limits() -> Limits:
-    """What values of a suite are measured by."""
+    """Returns the limits of this machine."""
     from wavecomb import _core
 
     return Limits(len(cores()), max(_core.lane_widths()), cache_bytes())
 
 
 def cache_bytes() -> dict[str, int]:
-    """Sizes of the data caches: L1D and L2 of one core, L3 of all; empty where unknown."""
+    """Returns the sizes of the data caches in bytes.
+
+    L1D and L2 are those of one core, L3 is the sum over all. Unknown caches are missing.
+    """
     sizes: dict[str, int] = {}
     for index in sorted(_SYS_CPU.glob("cpu0/cache/index*")):
         kind, level = _read(index / "type"), _read(index / "level")
@@ -73,7 +76,7 @@ def cache_bytes() -> dict[str, int]:
 
 
 def machine_state() -> dict[str, Any]:
-    """What the figures were made on and with; nothing that names the machine or its user."""
+    """Describes hardware and software of the machine, without names of the machine or its user."""
     from wavecomb.run import stats
 
     return {
@@ -93,7 +96,10 @@ def machine_state() -> dict[str, Any]:
 
 
 def source_state() -> dict[str, Any]:
-    """Commit of the checkout, and whether files in it were changed; None outside one."""
+    """Returns the commit of the checkout and whether its files were changed.
+
+    Both are None outside a checkout.
+    """
     here = Path(__file__).resolve().parent
 
     def git(*arguments: str) -> str | None:
@@ -110,14 +116,14 @@ def source_state() -> dict[str, Any]:
 
 
 def native_digest() -> str:
-    """SHA-256 of the native module: results of two builds are never mixed."""
+    """Returns the SHA-256 of the native module, which keeps results of two builds apart."""
     from wavecomb import _core
 
     return hashlib.sha256(Path(str(_core.__file__)).read_bytes()).hexdigest()
 
 
 def frequency_mhz() -> float | None:
-    """Mean frequency of the cores, as the kernel says it at this moment."""
+    """Returns the mean frequency of the cores that the kernel reports now, in MHz, or None."""
     values = [
         float(line.partition(":")[2])
         for line in _read(Path("/proc/cpuinfo")).splitlines()
@@ -127,7 +133,7 @@ def frequency_mhz() -> float | None:
 
 
 def load_average() -> tuple[float, float, float]:
-    """Load averages of 1, 5 and 15 minutes."""
+    """Returns the load averages of 1, 5 and 15 minutes."""
     try:
         return os.getloadavg()
     except OSError:
@@ -135,7 +141,7 @@ def load_average() -> tuple[float, float, float]:
 
 
 def busy_seconds() -> float | None:
-    """CPU seconds that all processes have used since the machine began; None where unknown."""
+    """Returns the CPU seconds that all processes have used since boot, or None if unknown."""
     fields = _read(Path("/proc/stat")).partition("\n")[0].split()
     if len(fields) < 9 or fields[0] != "cpu":
         return None
@@ -144,11 +150,14 @@ def busy_seconds() -> float | None:
 
 
 def spin(threads: int) -> float:
-    """Seconds of a fixed piece of work on each of so many threads at once, the lesser of two."""
+    """Measures the seconds of a fixed piece of work on ``threads`` threads at once.
+
+    Returns the lesser of two times.
+    """
     block = bytes(SPIN_BYTES)
 
     def work() -> None:
-        hashlib.sha256(block).digest()  # lets other threads of Python run
+        hashlib.sha256(block).digest()  # releases Python's lock, so that threads run in parallel
 
     def once() -> float:
         crowd = [threading.Thread(target=work) for _ in range(threads)]
@@ -184,25 +193,29 @@ def _read(path: Path) -> str:
         return ""
 
 
-# ---- Whether a machine was quiet enough for its times to be believed -----------------------------
+# ---- Whether a machine was quiet enough for reliable timings
+# ---------------------------------------
 
 
 MAX_OTHERS = 0.05
-"""Share of all cores' time that other processes may take during a run."""
+"""Largest fraction of all cores' time that other processes may take during a run."""
 MAX_SPIN = 1.10
-"""How much longer than at its best the spin may take."""
+"""Largest time of the spin relative to its reference."""
 MAX_NOISY_RUNS = 0.2
 MAX_VARIATION = 0.10
 
 
 def spin_reference(spins: Sequence[float]) -> float:
-    """What the spin takes on the quiet machine: the lower quartile, since noise only adds."""
+    """Returns the spin time of the quiet machine.
+
+    This is the lower quartile, since noise only adds time.
+    """
     ordered = sorted(spins)
     return ordered[len(ordered) // 4] if ordered else 0.0
 
 
 def is_noisy(others_share: float | None, spin_s: float, reference_s: float) -> bool:
-    """Whether a run was disturbed.
+    """Returns whether a run was disturbed.
 
     >>> is_noisy(0.01, 0.0102, 0.0100), is_noisy(0.20, 0.0100, 0.0100), is_noisy(0.0, 0.02, 0.01)
     (False, True, True)
@@ -214,15 +227,15 @@ def is_noisy(others_share: float | None, spin_s: float, reference_s: float) -> b
 
 @dataclass(frozen=True)
 class Noise:
-    """The verdict on a sitting.
+    """Noise of the machine during a sitting.
 
     Attributes:
-        runs: How many there are.
-        noisy_runs: How many were disturbed.
+        runs: Number of runs.
+        noisy_runs: Number of disturbed runs.
         variation: Median over configurations of the coefficient of variation of render_s, over
-            those with at least three runs; None without any.
-        noisy: The figures deserve a warning.
-        lines: Why, for a reader.
+            those with at least three runs; None if there are none.
+        noisy: Whether the timings need a warning.
+        lines: Reasons for the warning.
     """
 
     runs: int
@@ -232,7 +245,7 @@ class Noise:
     lines: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """For machine.json."""
+        """Returns the fields as a dictionary for machine.json."""
         return {
             "noisy": self.noisy,
             "runs": self.runs,
@@ -243,7 +256,7 @@ class Noise:
 
 
 def judge(rows: Iterable[Mapping[str, Any]]) -> Noise:
-    """Judges the runs that went well: rows with "config", "status", "render_s" and "noisy"."""
+    """Judges successful runs from rows with "config", "status", "render_s" and "noisy"."""
     good = [row for row in rows if row["status"] == "ok"]
     disturbed = sum(bool(row["noisy"]) for row in good)
     times: dict[str, list[float]] = defaultdict(list)
@@ -259,7 +272,7 @@ def judge(rows: Iterable[Mapping[str, Any]]) -> Noise:
     lines = []
     if good and disturbed > MAX_NOISY_RUNS * len(good):
         lines.append(
-            f"{disturbed} of {len(good)} runs were disturbed: others took over "
+            f"{disturbed} of {len(good)} runs were disturbed: other processes took over "
             f"{MAX_OTHERS:.0%} of the cores, or the calibration spin was over "
             f"{MAX_SPIN - 1:.0%} slower than at its best"
         )

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounds on order that only a suite can run, since they know the future: true costs, recorded.
+"""Oracle policies of suites, which bound the gain of any order by using recorded true costs.
 
 ``oracle``        ``cost-benefit`` with true costs in place of learned ones.
-``oracle-best``   the order of material runs that a trace with true costs says is quickest.
-``oracle-worst``  likewise the slowest.
+``oracle-best``   the order of material runs that is fastest according to the recordings.
+``oracle-worst``  the order of material runs that is slowest according to the recordings.
 
-The last two are ``material`` with ranks for costs: it shades the materials of a program in
-ascending cost, so a cost file with ranks makes it shade in any order that is wanted. What a record
-costs depends on what was shaded just before, which is all that the order of runs can change: the
-trace holds recordings of the same render under different orders of materials, and the best order
-is the path through the materials of a program with the least expected cost.
+The last two are the policy ``material`` with ranks for costs. It shades the materials of a program
+in ascending cost, so a cost file with ranks produces any order. The cost of a record depends on the
+material shaded just before, which is all that the order of runs can change. The trace therefore
+holds recordings of the same render under different orders of materials, and the best order is the
+path through the materials of a program with the smallest expected cost.
 """
 
 from __future__ import annotations
@@ -21,17 +21,18 @@ from typing import Any
 COSTS, BEST, WORST = "oracle", "oracle-best", "oracle-worst"
 ORDERS = (BEST, WORST)
 ORACLES = (COSTS, *ORDERS)
-"""Policies of suites only."""
+"""Policies that exist only in suites."""
 
 EXACT = 10
-"""Materials of one program up to which the best path is found exactly; above, greedily."""
+"""Largest number of materials of one program for which the best path is found exactly. Larger
+programs use a greedy search."""
 
 Costs = dict[str, dict[str, float]]
 Recording = dict[str, Any]
 
 
 def policy_of(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What a render is told in place of an oracle's name: a real policy, costs that stay."""
+    """Returns the settings that replace an oracle's name: a real policy with fixed costs."""
     policy = settings.get("policy")
     if policy not in ORACLES:
         return {}
@@ -39,9 +40,10 @@ def policy_of(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def pooled_costs(answers: list[dict[str, Any]]) -> Costs:
-    """True costs from recordings: measured ns over all timed records of a material.
+    """Returns true costs from recordings: measured ns over all timed records of a material.
 
-    A material that was never timed has its calibrated cost. Textures: mean over the recordings.
+    A material that was never timed has its calibrated cost. Costs of textures are means over the
+    recordings.
 
     >>> material = {"name": "M", "timed_records": 10, "ns_per_record": 50.0, "calibrated_ns": 9.0}
     >>> other = {**material, "timed_records": 30, "ns_per_record": 90.0}
@@ -71,7 +73,7 @@ def pooled_costs(answers: list[dict[str, Any]]) -> Costs:
 
 
 def ranks(order: Sequence[str]) -> Costs:
-    """Costs that make ``material`` shade in this order, program by program.
+    """Returns costs that make the policy ``material`` shade in this order, within each program.
 
     >>> ranks(["b", "a"])
     {'materials': {'b': 1.0, 'a': 2.0}, 'textures': {}}
@@ -80,14 +82,14 @@ def ranks(order: Sequence[str]) -> Costs:
 
 
 def shuffled(names: Sequence[str], number: int) -> list[str]:
-    """The order of recording ``number``."""
+    """Returns the random order of materials for recording ``number``."""
     order = sorted(names)
     random.Random(number).shuffle(order)
     return order
 
 
 def recorded(order: Sequence[str], answer: Mapping[str, Any]) -> Recording:
-    """A recording of the trace: the order of materials, and of each what was measured."""
+    """Returns a recording of the trace: the order of materials and their measured costs."""
     stats = answer["stats"]
     materials = {
         entry["name"]: {
@@ -107,18 +109,19 @@ def recorded(order: Sequence[str], answer: Mapping[str, Any]) -> Recording:
 
 
 def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
-    """The orders of material runs that the trace says are quickest and slowest.
+    """Computes the orders of material runs that are fastest and slowest according to the trace.
 
-    For materials a, b of one program, cost(b after a) is the mean of b's measured ns a record over
-    the recordings in which b's run came next after a's (each recording scaled by its time of
-    traversal a ray, since machines drift), and one more measurement at b's mean over all
-    recordings: a pair that was seen once is not believed at its word. The time of an order is
+    For materials a, b of one program, cost(b after a) is the mean of b's measured ns per record
+    over the recordings in which b's run came directly after a's, and of one more value: b's mean
+    over all recordings. The additional value damps pairs that were measured only once. Each
+    recording is scaled by its traversal time per ray, which removes drift of the machine. The time
+    of an order is
 
         sum over b of records(b) * cost(b after its predecessor)
 
     Returns:
-        ``best``, ``worst``: all names in order; ``best_ns``, ``worst_ns``, ``mean_ns``: expected
-        ns of all records, the mean over the orders of the trace last.
+        ``best``, ``worst``: all names in order; ``best_ns``, ``worst_ns``, ``mean_ns``: expected ns
+        of all records, where ``mean_ns`` is the mean over the orders of the trace.
     """
     scale = _scales(trace)
     names = sorted({name for recording in trace for name in recording["materials"]})
@@ -146,7 +149,10 @@ def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
 
 
 def _scales(trace: Sequence[Recording]) -> list[float]:
-    """Factors that take out the machine's drift, by traversal, which no order changes."""
+    """Returns factors that remove drift of the machine.
+
+    They come from traversal times, which do not depend on the order of materials.
+    """
     times = [float(recording["trace_ns_per_ray"]) for recording in trace]
     overall = sum(times) / len(times)
     return [overall / time if time > 0.0 else 1.0 for time in times]
@@ -155,7 +161,10 @@ def _scales(trace: Sequence[Recording]) -> list[float]:
 def _costs(
     trace: Sequence[Recording], scale: Sequence[float]
 ) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
-    """Mean ns a record of each material, and after each predecessor; "" is the program's start."""
+    """Returns the mean ns per record of each material, and after each predecessor.
+
+    The predecessor "" stands for the start of a program.
+    """
     every: dict[str, list[float]] = {}
     pairs: dict[tuple[str, str], list[float]] = {}
     for recording, factor in zip(trace, scale, strict=True):
@@ -175,7 +184,7 @@ def _costs(
 
 
 def _path(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list[str]:
-    """The order of members with the least sum of steps, the first from "" ."""
+    """Returns the order of members with the smallest sum of steps, starting from ""."""
     if len(members) > EXACT:
         return _greedy(members, step)
     best: dict[tuple[frozenset[str], str], tuple[float, list[str]]] = {
@@ -193,7 +202,10 @@ def _path(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list
 
 
 def _greedy(members: Sequence[str], step: Mapping[tuple[str, str], float]) -> list[str]:
-    """Always the material that gains most by coming next, beside its mean over predecessors."""
+    """Builds a path step by step from the material that gains most by coming next.
+
+    The gain of a material is relative to its mean over all predecessors.
+    """
     mean = {b: sum(step[a, b] for a in members if a != b) / (len(members) - 1) for b in members}
     path, rest = [""], set(members)
     while rest:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of other renderers: hands them to benchmarks/peers, which is in a checkout only."""
+"""Runs of other renderers, by scripts in benchmarks/peers, which only a checkout has."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ _KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "cycles": ("cycles", {"light_tree": True}),
 }
 _COMPILES = ("mitsuba-llvm",)
-"""Renderers that compile for each number of samples: they render twice, and the second counts."""
+"""Renderers that compile code for each sample count. They render twice, and the second is timed."""
 
 
 def check(renderers: set[str]) -> None:
-    """Raises WavecombError unless the tools for these peers are there."""
+    """Raises WavecombError unless the tools for these peers are installed."""
     if not renderers:
         return
     if not WORKER.is_file():
         raise WavecombError(
             f"renderer {min(renderers)}: needs benchmarks/peers/worker.py of a checkout of "
-            "Wavecomb, which is not there; leave the peers out with --only"
+            "Wavecomb, which is missing; leave the peers out with --only"
         )
     if "cycles" in renderers and not CYCLES_PYTHON.exists():
         raise WavecombError("renderer cycles: is not installed; run benchmarks/peers/setup first")
@@ -46,7 +46,7 @@ def check(renderers: set[str]) -> None:
 
 
 def record(stage: Path) -> Path:
-    """The arrays of a stage as the peers read them, made once, beside the stage."""
+    """Exports the arrays of a stage for the peers, once, to a folder beside the stage."""
     folder = stage.with_name(f"{stage.stem}-recorded")
     if folder.is_dir() and any(folder.iterdir()):
         return folder
@@ -62,14 +62,14 @@ def record(stage: Path) -> Path:
     _, err = process.communicate()
     if process.returncode != 0:
         said = err.strip().splitlines()[-1:] or ["no message"]
-        raise WavecombError(f"{stage}: cannot be given to the peers: {said[0]}")
+        raise WavecombError(f"{stage}: cannot be exported to the peers: {said[0]}")
     return folder
 
 
 def run_peer(
     config: Config, stage: Path, spp: int, seed: int, image: Path, threads: int
 ) -> Outcome:
-    """One render of a peer in a fresh process; the picture goes to ``image``."""
+    """Renders with a peer in a fresh process and writes the image to ``image``."""
     width, height = config.settings["size"]
     if width != height:
         raise WavecombError(f"{config.name}: peers render square pictures only; change its size")

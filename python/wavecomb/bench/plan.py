@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a suite to the list of runs: configurations, their short names, and the order in time."""
+"""The plan of a suite: configurations, their short names, and the order of runs."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from wavecomb.errors import WavecombError
 from wavecomb.options import expectation
 
 FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
-"""What settings that a row names are where a suite says nothing."""
+"""Defaults of settings that have a column, for suites that do not set them."""
 
 
 @dataclass(frozen=True)
 class Config:
-    """One configuration: everything but repetition and seed.
+    """One configuration: all inputs of a run except repetition and seed.
 
     Attributes:
-        name: Short, unique in the suite, fit for file names.
-        experiment: Its name.
+        name: Short name, unique in the suite and usable in file names.
+        experiment: Name of the experiment.
         renderer: "wavecomb" or a peer.
-        stage: Name of the stage, with the options that are varied.
-        source: Where the stage comes from.
-        settings: Settings of the render; policy may be "oracle".
+        stage: Name of the stage, with its varied options.
+        source: Source of the stage.
+        settings: Settings of the render; the policy may be an oracle.
         case: Name of the case, or "".
         factor: Name of the factor of a scaling curve, or "".
-        factor_value: Its value, or None.
+        factor_value: Value of the factor, or None.
         images: As in ``Experiment``.
-        golden: Whether the picture is compared with a converged one.
+        golden: Whether the image is compared with a converged one.
     """
 
     name: str
@@ -58,16 +58,22 @@ class Config:
     golden: bool
 
     def golden_key(self) -> str:
-        """Equal for configurations that converge to the same picture; fit for file names."""
+        """Returns a key for file names.
+
+        It is equal for configurations that converge to the same image.
+        """
         width, height = self.settings["size"]
         names = ("size", *expectation())
         of = {key: self.settings[key] for key in names if key in self.settings}
-        family = self.renderer.split("-")[0]  # variants of a renderer converge alike
+        family = self.renderer.split("-")[0]  # variants of a renderer converge to the same image
         stage = self.stage if self.renderer == WAVECOMB else f"{self.stage}-{family}"
         return f"{stage}-{width}x{height}-{digest(of)}"
 
     def recording_key(self) -> str:
-        """Equal for configurations whose shading costs are alike: all but policy and roulette."""
+        """Returns a key, equal for configurations with the same shading costs.
+
+        It depends on all settings but policy and roulette.
+        """
         left_out = ("policy", "roulette")
         of = {key: value for key, value in self.settings.items() if key not in left_out}
         return f"{self.stage}-{digest(of)}"
@@ -82,23 +88,23 @@ class Run:
 
     @property
     def run_id(self) -> str:
-        """Unique in the suite."""
+        """Name of the run, unique in the suite."""
         return f"{self.config.name}-{self.repetition}"
 
 
 def digest(value: Any) -> str:
-    """Eight hexadecimal digits of a JSON value."""
+    """Returns eight hexadecimal digits of a hash of a JSON value."""
     text = json.dumps(value, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
 def configurations(suite: Suite, limits: Limits, threads: int | None = None) -> list[Config]:
-    """All configurations, in the order of the file; values that this machine has not are left out.
+    """Lists all configurations, in the order of the file, without values that this machine lacks.
 
     Args:
         suite: The suite.
-        limits: What the machine has.
-        threads: For all runs in which threads are not what is varied.
+        limits: Limits of the machine.
+        threads: Number of threads of all runs that do not vary it; None uses the suite's.
     """
     found: list[Config] = []
     for experiment in suite.experiments:
@@ -111,18 +117,18 @@ def configurations(suite: Suite, limits: Limits, threads: int | None = None) -> 
 
 
 def chosen(configs: Sequence[Config], pattern: str | None) -> list[Config]:
-    """Those whose name matches a pattern of the shell."""
+    """Returns the configurations whose name matches a shell pattern."""
     if pattern is None:
         return list(configs)
     kept = [config for config in configs if fnmatch.fnmatch(config.name, pattern)]
     if not kept:
         some = ", ".join(config.name for config in configs[:3])
-        raise WavecombError(f"--only {pattern}: matches none of the names; they are like {some}")
+        raise WavecombError(f"--only {pattern}: matches none of the names; an example is {some}")
     return kept
 
 
 def schedule(configs: Sequence[Config], repetitions: int, seed: int) -> list[Run]:
-    """The runs in the order of time: rounds of one repetition of all, each in random order."""
+    """Returns the runs in execution order: rounds of one repetition each, in random order."""
     rng = random.Random(seed)
     runs: list[Run] = []
     for repetition in range(repetitions):
@@ -205,7 +211,7 @@ def _safe(text: str) -> str:
 
 
 def _resolved(path: Path, key: str, values: Sequence[Any], limits: Limits) -> list[Any]:
-    """Values of this machine: each once, and of threads none above what there is."""
+    """Returns the values that this machine supports, without duplicates or excess threads."""
     found: list[Any] = []
     for value in values:
         number = _resolve(path, key, value, limits)
@@ -230,7 +236,7 @@ def _resolve(path: Path, key: str, value: Any, limits: Limits) -> Any:
 
 
 def _cache_mb(path: Path, text: str, limits: Limits) -> float:
-    """Megabytes of 1e6 bytes from "L2" or "0.5*L3"."""
+    """Converts "L2" or "0.5*L3" to megabytes of 10^6 bytes."""
     match = re.fullmatch(r"(?:([0-9.]+) ?\* ?)?(L2|L3)", text)
     if match is None:
         raise WavecombError(
@@ -238,29 +244,31 @@ def _cache_mb(path: Path, text: str, limits: Limits) -> float:
         )
     size = limits.cache_bytes.get(match[2], 0)
     if size <= 0:
-        raise WavecombError(f"{path}: this machine does not say how large its {match[2]} is")
+        raise WavecombError(f"{path}: the size of {match[2]} is unknown on this machine")
     return round(float(match[1] or 1.0) * size / 1e6, 3)
 
 
-# ---- How long a sitting takes: from results that are there, else from a short calibration --------
+# ---- Duration of a sitting, estimated from existing results or from a short calibration
+# -----------
 
 
 _SIZE = 160
 _SPP = 8
 _BYTES_PER_SECOND = 25e6
-"""Speed at which textures are read and tiled while a stage is loaded; rough."""
+"""Assumed speed of reading and tiling textures during loading, in bytes per second."""
 _TRIANGLES_PER_SECOND = 1.5e6
-"""Speed at which meshes are read and their acceleration structure is built; rough."""
+"""Assumed speed of reading meshes and building the BVH, in triangles per second."""
 
 
 @dataclass
 class Estimator:
-    """Seconds of a run.
+    """Estimator of the duration of runs.
 
     Attributes:
-        start_s: Of a process that renders next to nothing of a small stage.
-        rate: Samples per second and thread, by lanes; other renderers are taken to be as quick.
-        measured: Wall times of runs that are done, by configuration.
+        start_s: Time in seconds of a process that renders almost nothing of a small stage.
+        rate: Samples per second and thread, by number of lanes. Other renderers are assumed to be
+            equally fast.
+        measured: Wall times in seconds of finished runs, by configuration.
     """
 
     start_s: float = 1.0
@@ -269,21 +277,21 @@ class Estimator:
     _bias: list[float] = field(default_factory=list)
 
     def learn(self, config: Config, wall_s: float) -> None:
-        """Takes a run that is done into account; it tells of others that are like it, too."""
+        """Takes a finished run into account, also for similar configurations."""
         guess = self._guess(config)
         self.measured[config.name].append(wall_s)
         if guess > 0.0:
             self._bias.append(wall_s / guess)
 
     def seconds(self, config: Config) -> float:
-        """Seconds of one run."""
+        """Returns the estimated seconds of one run."""
         known = self.measured.get(config.name)
         if known:
             return statistics.fmean(known)
         return self._guess(config) * (statistics.median(self._bias) if self._bias else 1.0)
 
     def total(self, runs: Iterable[Run]) -> float:
-        """Seconds of all of them."""
+        """Returns the estimated seconds of several runs."""
         return sum(self.seconds(run.config) for run in runs)
 
     def _guess(self, config: Config) -> float:
@@ -298,7 +306,7 @@ class Estimator:
 
 
 def _load_s(config: Config) -> float:
-    """Seconds that loading a generated stage takes, beyond those of the small one."""
+    """Estimates the seconds for loading a generated stage, beyond those of a small one."""
     if not config.source.scene:
         return 0.0
     from wavecomb.scenes import SceneOptions
@@ -314,7 +322,7 @@ def _load_s(config: Config) -> float:
 
 
 def calibrate(configs: Sequence[Config], cpus: Sequence[int]) -> Estimator:
-    """Renders a small stage with each number of lanes that the plan has; takes seconds."""
+    """Measures a small stage with each number of lanes in the plan, which takes seconds."""
     from wavecomb.bench.process import run_worker
     from wavecomb.scenes import write_scene
 
@@ -340,7 +348,7 @@ def calibrate(configs: Sequence[Config], cpus: Sequence[int]) -> Estimator:
 def from_results(
     objects: Iterable[Mapping[str, Any]], configs: Mapping[str, Config]
 ) -> Estimator | None:
-    """From runs that are done; None without any."""
+    """Creates an estimator from finished runs, or returns None if there are none."""
     found = Estimator()
     for entry in objects:
         row = entry["row"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs in processes of their own, and what the machine did meanwhile."""
+"""Runs jobs in separate processes, and measures the load of the machine meanwhile."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from wavecomb.bench.counters import Session
 
 @dataclass
 class Outcome:
-    """What a process answered.
+    """Answer and measurements of a process.
 
     Attributes:
-        answer: Its JSON object; {"status": "failed", "error": line} where there is none.
-        wall_s: From its start to its end.
-        others_share: Share of all cores' time that other processes took; None where unknown.
-        load_average: Of one minute, at its start.
-        started: Time of day.
-        code: What the process ended with.
+        answer: Its JSON object, or {"status": "failed", "error": line} if there is none.
+        wall_s: Wall time in seconds.
+        others_share: Fraction of all cores' time that other processes took; None if unknown.
+        load_average: Load average of one minute, at the start.
+        started: UTC time of the start.
+        code: Exit code.
     """
 
     answer: dict[str, Any]
@@ -42,7 +42,7 @@ class Outcome:
 
 
 def run_worker(job: dict[str, Any], events: dict[str, str], scratch: Path) -> Outcome:
-    """Runs ``wavecomb.bench.worker``, under perf where there are events to count."""
+    """Runs ``wavecomb.bench.worker``, under perf if there are events to count."""
     if not events:
         return run_process(processes.command("wavecomb.bench.worker", parent=os.getpid()), job)
     session = Session(events, scratch / f".perf-{os.getpid()}.csv")
@@ -57,7 +57,7 @@ def run_worker(job: dict[str, Any], events: dict[str, str], scratch: Path) -> Ou
 def run_process(
     command: Sequence[str], job: dict[str, Any], *, fds: tuple[int, ...] = ()
 ) -> Outcome:
-    """Runs a command that reads a JSON job and answers with one JSON line, its last on stdout."""
+    """Runs a command that reads a JSON job, and takes its last line on stdout as JSON answer."""
     done = run_lines(command, json.dumps(job), fds=fds)
     outcome = done.outcome
     answer = done.lines[-1] if done.lines else None
@@ -68,14 +68,14 @@ def run_process(
 
 @dataclass
 class Lines:
-    """The JSON objects that a process wrote, and its outcome, failed as if none would do."""
+    """JSON objects that a process printed, and its outcome with status "failed"."""
 
     lines: list[Any]
     outcome: Outcome
 
 
 def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -> Lines:
-    """Runs a command on a text; reads the JSON lines of its stdout."""
+    """Runs a command with a text as input, and reads JSON lines from its stdout."""
     load, started = machine.load_average()[0], machine.now()
     busy, own, clock = machine.busy_seconds(), _own_seconds(), time.perf_counter()
     process = processes.popen(
@@ -90,7 +90,7 @@ def run_lines(command: Sequence[str], text: str, *, fds: tuple[int, ...] = ()) -
         out, err = process.communicate(text)
     except BaseException:
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)  # what it started, too
+            os.killpg(process.pid, signal.SIGKILL)  # also kills child processes
         process.wait()
         raise
     wall = time.perf_counter() - clock
@@ -118,6 +118,6 @@ def _failure(err: str, code: int) -> dict[str, Any]:
 
 
 def _own_seconds() -> float:
-    """CPU seconds of this process and of its children that have ended."""
+    """Returns the CPU seconds of this process and its ended children."""
     usage = [resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(u.ru_utime + u.ru_stime for u in usage)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a result folder: one HTML page that needs nothing else, and figure files."""
+"""Report of a result folder: a self-contained HTML page, and figure files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 LARGEST_SVG = 150_000
 LARGEST_PNG = 120_000
-"""Bytes of a figure beside a Markdown page; a repository keeps every version of them."""
+"""Largest size in bytes of a PNG beside a Markdown page, because a repository keeps every
+version."""
 _HERE = Path(__file__).parent
 
 
@@ -48,13 +49,13 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
 
     Args:
         folder: DIR.
-        markdown: A .md file to write too, with a folder of figures beside it. It has the same
+        markdown: Also write this .md file, with a folder of figures beside it. It has the same
             text, tables and figures, without viewers and folded parts.
 
     Raises:
-        WavecombError: The folder holds no results, or a file in it is damaged; or a library of the
+        WavecombError: The folder holds no results, a file in it is damaged, or a library of the
             extra "bench" is missing.
-        OSError: It cannot be written.
+        OSError: The report cannot be written.
     """
     environment = _environment()
     results = load(folder)
@@ -88,7 +89,7 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
 
 
 def _environment() -> Any:
-    """Jinja2 with the filters of the templates; text is escaped in HTML."""
+    """Returns a Jinja2 environment with the filters of the templates, which escapes HTML."""
     jinja2 = needed("jinja2", "the report")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE),
@@ -101,12 +102,12 @@ def _environment() -> Any:
 
 
 def _prose(text: str) -> str:
-    """Keeps numbers beside their unit."""
+    """Inserts no-break spaces between numbers and units."""
     return text.replace(" %", "\u00a0%").replace("n = ", "n\u00a0=\u00a0")
 
 
 def _markdown(text: str) -> str:
-    """Text on one line that a Markdown table can hold."""
+    """Converts text to one line that can be put into a Markdown table."""
     return " ".join(text.split()).replace("<", "&lt;").replace("|", "\\|")
 
 
@@ -117,7 +118,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
-    """Copies the figures of all sections and returns their files: SVG, or if too large PNG."""
+    """Copies the figures of all sections; returns their files, as SVG or, if too large, PNG."""
     folder.mkdir(parents=True, exist_ok=True)
     files = {}
     for part in (part for section in out.sections for part in section.parts):
@@ -134,7 +135,7 @@ def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
 
 
 def _small_png(source: Path, target: Path) -> None:
-    """Writes the image with 256 colours, and smaller until its file is small enough."""
+    """Writes the image with 256 colours, and scales it down until its file is small enough."""
     from PIL import Image
 
     with Image.open(source) as opened:
@@ -172,11 +173,11 @@ def _lead(results: Results) -> list[str]:
 
 def _findings(out: Writer) -> Section:
     note = Text(
-        "Found by the rules of docs/bench-report.md, not chosen by hand. A difference is spoken of "
-        "where its p-value, corrected for all comparisons of its table, is below 5 %.",
+        "Found by the rules of docs/bench-report.md. A difference is reported if its p-value, "
+        "corrected for all comparisons of its table, is below 5 %.",
         "note",
     )
-    return Section("What the figures say", [Lines(out.findings), note])
+    return Section("Findings", [Lines(out.findings), note])
 
 
 def _pictures(out: Writer, results: Results) -> None:
@@ -199,7 +200,7 @@ def _pictures(out: Writer, results: Results) -> None:
 
 
 def _about(out: Writer, results: Results) -> None:
-    out.begin("How to repeat it")
+    out.begin("How to repeat the benchmark")
     commands = [
         sitting["command"]
         for sitting in results.machine.get("sittings", ())
@@ -222,7 +223,7 @@ def _about(out: Writer, results: Results) -> None:
 
 
 def _settings(results: Results) -> Table:
-    """The settings of each configuration as they were used, folded."""
+    """Returns a folded table of the settings used by each configuration."""
     names = ["spp", "threads", "lanes", "wave_size", "max_depth"]
     by_config = results.runs.groupby("config", sort=False)
     used = by_config[["width", "height", *names]].first().assign(runs=by_config.size())
@@ -244,21 +245,22 @@ def _settings(results: Results) -> Table:
 WORDS = {
     "record": "A hit that waits for shading.",
     "round": "One repetition of all configurations, in random order.",
-    "order": "Keys, sort and moving of records: what an order of shading costs.",
-    "placebo": "random-runs: the runs of a material in an order that means nothing.",
-    "oracle": "cost-benefit with true costs, recorded before: what a cost model could win.",
+    "order": "Keys, sort and moving of records: the cost of an order of shading.",
+    "placebo": "random-runs: the runs of a material in random order.",
+    "oracle": "cost-benefit with recorded true costs: a bound for the gain of a cost model.",
     "oracle-best, oracle-worst": (
-        "the order of the runs of materials that a trace with true costs says is quickest, slowest."
+        "the fastest and the slowest order of material runs, by recorded true costs."
     ),
     "run length": "Mean number of consecutive records of one material.",
     "relMSE": "Mean of (x − r)² / (r² + 0.01) to the golden picture r.",
     "efficiency": "1 / (relMSE × render time).",
-    "regret": "Time above that of the best fixed policy, as a share of it.",
+    "regret": "Time beyond the best fixed policy, as a fraction of its time.",
     "interval": "95 %; rounds are resampled whole. docs/bench-report.md has the formulas.",
 }
 
 
-# ---- Warnings of a report, and facts about its machine -------------------------------------------
+# ---- Warnings of a report, and facts about its machine
+# ---------------------------------------------
 
 
 FEW_ROUNDS = 5
@@ -270,14 +272,14 @@ _EQUAL_IN = [
 
 
 def warnings_of(results: Results) -> list[str]:
-    """Returns reasons to read the figures with care, most serious first."""
+    """Returns reasons to read the figures with care, the most serious first."""
     lines: list[str] = []
     machine, runs, failed = results.machine, results.runs, results.failed
     _, different = equality(runs)
     if different:
         lines.append(
-            f"Pictures that must be equal differ, in {len(different)} groups: times of unequal "
-            f"work are compared. {different[0]}."
+            f"Pictures that must be equal differ, in {len(different)} groups: their times are for "
+            f"unequal work. {different[0]}."
         )
     noise = machine.get("noise")
     reasons = noise.get("lines", ()) if isinstance(noise, Mapping) else ()
@@ -295,15 +297,15 @@ def warnings_of(results: Results) -> list[str]:
         first = failed.iloc[0]
         lines.append(f"{len(failed)} runs failed; the first: {first['run_id']}: {first['error']}")
     if machine.get("dirty"):
-        lines.append("The source was changed after the commit that is named.")
+        lines.append("The source was changed after the commit shown here.")
     return lines
 
 
 def equality(runs: pd.DataFrame) -> tuple[int, list[str]]:
-    """Counts groups of runs that must have equal images, and names those that have not.
+    """Counts groups of runs that must have equal images, and names those that differ.
 
-    A group agrees in the seed and all settings except those that only order or distribute the
-    work. Runs with a time limit are left out, since no two of them take the same samples.
+    A group agrees in the seed and all settings except those that only order or distribute the work.
+    Runs with a time limit are left out, since their sample counts differ.
     """
     ours = runs[(runs["renderer"] == "wavecomb") & (runs["picture_sha256"] != "")]
     ours = ours[ours["time_limit"].fillna(0) == 0]
@@ -319,7 +321,7 @@ def equality(runs: pd.DataFrame) -> tuple[int, list[str]]:
 
 
 def machine_parts(machine: Mapping[str, Any]) -> list[Part]:
-    """Describes the machine, and which hardware counters it lacks for which reason."""
+    """Describes the machine, and gives the reasons for missing hardware counters."""
     counters = machine.get("counters")
     missing = (counters.get("missing") if isinstance(counters, Mapping) else None) or {}
     reasons: dict[str, list[str]] = {}

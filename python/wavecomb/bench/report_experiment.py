@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sections about one experiment each."""
+"""Sections of the report about single experiments and about the suite."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
     factor = str(runs["factor"].iloc[0])
     if factor and runs["factor_value"].notna().all():
-        # The stage's name ends with the value of a factor of the stage.
+        # The name of such a stage ends with the value of its varied option.
         bases = runs["stage"].map(lambda stage: stage.partition(f"-{factor}-")[0])
         curves(bases, "factor_value", factor.replace("_", " "), "curve")
         return
@@ -139,7 +139,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
 
 def _errors(out: Writer, runs: pd.DataFrame) -> None:
-    """Shows variance and efficiency, where images were compared with golden ones."""
+    """Shows variance and efficiency of images that were compared with golden ones."""
     if runs["rel_mse"].isna().all():
         return
     factor = "renderer" if runs["renderer"].nunique() > 1 else "policy"
@@ -168,13 +168,14 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
     columns = {"shade": "shade_s", "render": "render_s", "shade + order": "shade_and_order_s"}
     metrics = compared(runs, "policy", columns)
     note = (
-        "Brackets: 95 % intervals, rounds resampled whole. At none: seconds, threads together "
-        "but for render. The verdict is on shade + order, which holds what an order costs."
+        "Brackets: 95 % intervals, rounds resampled whole. At none: seconds, summed over "
+        "threads except for render. The verdict is on shade + order, which includes the cost of an "
+        "order."
     )
     title = "Times by policy, ratio of means to none"
     out.add(ratio_table(title, metrics, "policy", note))
     if (runs["factor"] != "").any():
-        return  # curves over the factor say more
+        return  # the curves over the factor show the same
     key = key_of(name)
     for words, end in (("shade", "shade"), ("shade + order", "policies")):
         title = f"{words.capitalize()} time by policy"
@@ -197,7 +198,8 @@ def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
             worst = adaptive.loc[adaptive["regret"].idxmax()]
             out.findings.append(
                 f"{name}: adaptive takes {100 * adaptive['regret'].mean():+.1f} % on average "
-                f"beside the best fixed policy of each cell, at worst {100 * worst.regret:+.1f} % "
+                f"relative to the best fixed policy of each cell, at worst "
+                f"{100 * worst.regret:+.1f} % "
                 f"{interval(100 * worst.low, 100 * worst.high, 1)} ({worst.cell})."
             )
 
@@ -224,10 +226,10 @@ def _order_findings(name: str, order: pd.DataFrame) -> list[str]:
 
 
 def _bound_words(part: pd.DataFrame) -> str:
-    """States the gain of the oracles; "" without placebo and oracle."""
+    """States the gain of the oracles, or returns "" without placebo and oracle."""
     known = part.dropna(subset=["placebo_ratio"]).set_index("policy")
     words = {
-        BEST: "The best order of runs that a trace with true costs gives",
+        BEST: "The best order of runs by recorded true costs",
         COSTS: "Cost-benefit with true costs",
         WORST: "The worst order of runs",
     }
@@ -245,11 +247,12 @@ def _bound_words(part: pd.DataFrame) -> str:
     return text
 
 
-# ---- Sections about a suite as a whole: roulette, effects, costs ---------------------------------
+# ---- Sections about a whole suite: roulette, effects, costs
+# ----------------------------------------
 
 
 def suite(out: Writer, results: Results) -> None:
-    """Writes the sections that go across experiments."""
+    """Writes the sections that cover all experiments."""
     ours = results.runs[results.runs["renderer"] == "wavecomb"]
     flat = ours[ours["factor"] == ""]
     if flat["roulette"].nunique() > 1:
@@ -264,7 +267,7 @@ def suite(out: Writer, results: Results) -> None:
         out.draw(figures_forest.cost_figure(costs, lines, "costs"))
         first = lines["calibrated_ns"] or lines["predicted_ns"]
         out.findings.append(
-            f"Calibration predicts what materials cost with r² = {fixed(first['r2'], 2)} and "
+            f"Calibration predicts the cost of materials with r² = {fixed(first['r2'], 2)} and "
             f"slope {first['slope']:.2f} [{first['slope_low']:.2f}, {first['slope_high']:.2f}]."
         )
 
@@ -282,8 +285,8 @@ def _roulette(out: Writer, runs: pd.DataFrame) -> None:
     out.begin("Roulette apart from order")
     out.add(
         Text(
-            "Roulette changes how much is shaded, and with it the noise; order does not. So it is "
-            "judged by efficiency, with the policy the same on both sides."
+            "Roulette changes the amount of shading, and thus the noise; order does not. So it is "
+            "judged by efficiency, with the same policy on both sides."
         ),
         ratio_table(
             "Roulette at the same policy, ratio of means to throughput", metrics, "roulette"

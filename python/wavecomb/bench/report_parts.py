@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a report; the templates ``report.html.j2`` and ``report.md.j2`` render them."""
+"""Parts of a report. The templates ``report.html.j2`` and ``report.md.j2`` render them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import Any, ClassVar
 from wavecomb.bench.figures_style import Drawn, fixed, lay_out, save, svg
 
 MOST_ROWS = 60
-"""Longer tables are folded."""
+"""Largest number of rows of a table that is not folded."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Anything below a heading.
+    """Base class of everything below a heading.
 
     Attributes:
         kind: Name of the macro of the templates that renders it.
@@ -32,7 +32,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Text(Part):
-    """A paragraph, or with ``mark="heading"`` a heading; other marks are CSS classes."""
+    """A paragraph, or a heading with ``mark="heading"``. Other marks are CSS classes."""
 
     kind = "text"
     text: str
@@ -57,7 +57,7 @@ class Code(Part):
 
 @dataclass(frozen=True)
 class Facts(Part):
-    """Names and values, which may be tables of names and values; empty values are left out."""
+    """Names and values, which may be nested tables of names and values. Omits empty values."""
 
     kind = "facts"
     values: Mapping[str, Any]
@@ -69,7 +69,7 @@ class Cell:
 
     Attributes:
         text: The value.
-        note: Smaller text after it: an interval.
+        note: Smaller text after the value, such as an interval.
         mark: CSS classes: "word" for text, "better", "worse".
     """
 
@@ -80,7 +80,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table(Part):
-    """A table; its first column heads the rows, and equal neighbours in it are one head.
+    """A table whose first column holds the row headings; equal neighbours in it are merged.
 
     Attributes:
         caption: Title.
@@ -112,7 +112,7 @@ def table(
     note: str = "",
     summary: str = "",
 ) -> Table:
-    """Makes a table of cells and plain texts; a long one is folded in any case."""
+    """Makes a table of cells and plain texts. Always folds a long one."""
     filled = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
     if not summary and len(rows) > MOST_ROWS:
         summary = f"{caption} ({len(rows)} rows)"
@@ -160,7 +160,7 @@ class Section:
 
     @property
     def key(self) -> str:
-        """Its address in the page."""
+        """Anchor of the section in the page."""
         return key_of(self.title)
 
 
@@ -177,7 +177,7 @@ class Writer:
         self.sections.append(Section(title))
 
     def add(self, *parts: Part | None) -> None:
-        """Adds parts to the section, without those that are None."""
+        """Adds parts to the section, skipping None."""
         self.sections[-1].parts += [part for part in parts if part is not None]
 
     def draw(self, drawn: Drawn | None) -> None:
@@ -190,7 +190,7 @@ class Writer:
 
 
 def key_of(text: str) -> str:
-    """Returns an address in the page for any text.
+    """Converts text to an anchor of the page.
 
     >>> key_of("Wave size, 4 K")
     'wave-size-4-k'
@@ -199,7 +199,7 @@ def key_of(text: str) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Formats a number with some significant digits; an en dash if it is unknown.
+    """Formats a number with a few significant digits, or as an en dash if it is unknown.
 
     >>> number(0.00123456), number(1234567.0), number(12.0), number(float("nan"))
     ('0.00123', '1,230,000', '12.0', '–')
@@ -216,7 +216,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def interval(low: float, high: float, digits: int = 3) -> str:
-    """Formats an interval as [low, high]; "" if it is unknown."""
+    """Formats an interval as [low, high], or as "" if it is unknown."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
     return f"[{fixed(low, digits)}, {fixed(high, digits)}]"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pictures of the report: viewers, difference maps."""
+"""Images in the report: viewers and difference maps."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 MOST_STAGES = 12
 MOST_PICTURES = 8
 LARGEST = 720
-"""Side of a picture in the page, in pixels; a larger one is made smaller by averaging."""
+"""Largest width or height of an image in the page, in pixels. Larger images are averaged down."""
 
 
 @dataclass(frozen=True)
 class Kept:
-    """A picture that runs gave.
+    """An image that one or more runs rendered.
 
     Attributes:
-        name: Policies that gave it, and what else tells it from the others.
-        pixels: Linear, (height, width, 3).
+        name: Policies that rendered it, and the settings that distinguish it from other images.
+        pixels: Linear colours, (height, width, 3).
     """
 
     name: str
@@ -43,7 +43,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class Shot:
-    """All pictures of one stage and frame, with the golden one; titles are unique in a report."""
+    """All images of one stage and frame, with the golden one. Titles are unique in a report."""
 
     stage: str
     golden: NDArray[Any] | None
@@ -51,10 +51,10 @@ class Shot:
 
 
 def shots(results: Results) -> list[Shot]:
-    """The kept pictures by stage and golden picture; equal ones together.
+    """Returns the kept images by stage and golden image, with equal images merged.
 
     Raises:
-        WavecombError: A picture file is damaged.
+        WavecombError: An image file is damaged.
     """
     found: dict[str, list[tuple[dict[str, Any], Path]]] = {}
     for record in results.records():
@@ -74,7 +74,7 @@ def shots(results: Results) -> list[Shot]:
 
 
 def _titled(row: dict[str, Any], frames: Iterable[list[tuple[dict[str, Any], Path]]]) -> str:
-    """The stage, with renderer and size where other frames show the same stage."""
+    """Returns the stage, with renderer and size if other frames show the same stage."""
     others = [frame[0][0] for frame in frames if frame[0][0]["stage"] == row["stage"]]
     parts = [str(row["stage"])]
     if len({other["renderer"] for other in others}) > 1:
@@ -98,7 +98,10 @@ def _distinct(pictures: Sequence[tuple[dict[str, Any], Path]]) -> list[Kept]:
 
 
 def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, Any], Path]]) -> str:
-    """Who gave a picture: renderers, roulettes and sizes where they differ, and policies."""
+    """Names an image by its policies.
+
+    The name includes renderer, roulette and sample count if those differ.
+    """
     parts = []
     for key in ("renderer", "roulette", "spp"):
         if len({row.get(key) for row, _ in everything}) > 1:
@@ -109,7 +112,7 @@ def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, A
 
 
 def viewer(shot: Shot) -> Viewer | None:
-    """Returns the images of a shot for flipping and subtraction; None if there is only one."""
+    """Returns the images of a shot for flipping and subtraction, or None if there is only one."""
     entries = [(kept.name, kept.pixels) for kept in shot.kept]
     if shot.golden is not None:
         entries.append(("golden (converged)", shot.golden))
@@ -118,7 +121,7 @@ def viewer(shot: Shot) -> Viewer | None:
 
 
 def differences(shot: Shot) -> Drawn | None:
-    """Maps of the differences to the golden picture."""
+    """Draws maps of the differences to the golden image."""
     if shot.golden is None or not shot.kept:
         return None
     pictures = [
@@ -133,11 +136,11 @@ def differences(shot: Shot) -> Drawn | None:
 
 
 def _read(path: Path) -> NDArray[Any]:
-    """Pixels of a .npy file or a picture, (height, width, 3)."""
+    """Reads the pixels of a .npy file or an image, (height, width, 3)."""
     try:
         pixels = np.load(path, allow_pickle=False) if path.suffix == ".npy" else read_image(path)
     except (OSError, ValueError) as error:
-        raise WavecombError(f"{path}: cannot be read as a picture: {error}") from error
+        raise WavecombError(f"{path}: cannot be read as an image: {error}") from error
     if pixels.ndim != 3 or pixels.shape[2] < 3:
-        raise WavecombError(f"{path}: is no colour picture: its shape is {pixels.shape}")
+        raise WavecombError(f"{path}: is not a colour image: its shape is {pixels.shape}")
     return np.asarray(pixels[:, :, :3], np.float32)

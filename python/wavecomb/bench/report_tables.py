@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of the report, from the tables of the analysis."""
+"""Tables of the report, built from the tables of the analysis."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _MARKS = {"faster": "better", "slower": "worse"}
 HOLM = (
     "Verdicts at 5 %, by paired t-tests of log ratios, corrected after Holm over the table. Same "
-    "(1 %): the interval lies within 1 % of 1. Not shown: neither can be said."
+    "(1 %): the interval lies within 1 % of 1. Not shown: neither is certain."
 )
 
 
@@ -27,7 +27,7 @@ def ratio_table(
 
     Args:
         caption: Title of the table.
-        metrics: Titles and tables of ``ratios``; the verdict is that of the last one.
+        metrics: Titles and tables of ``ratios``; the last one provides the verdict.
         level_words: Heading of the level column.
         note: Text below.
     """
@@ -53,7 +53,7 @@ def ratio_table(
 
 
 def order_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows the verdict on order."""
+    """Shows the verdict on each order."""
     rows = []
     for row in found.itertuples():
         none = row.policy == "none"
@@ -100,14 +100,14 @@ def regret_table(found: pd.DataFrame, caption: str) -> Table:
             ]
         )
     note = (
-        "Render time above that of the best fixed policy of each cell. The best of noisy means "
-        "looks a little better than it is, so regret is rather over- than understated."
+        "Render time relative to the best fixed policy of each cell. The smallest of noisy means "
+        "is biased low, so regret is overstated rather than understated."
     )
     return table(caption, ["policy", "mean regret", "worst", "where", "cells", "n"], rows, note)
 
 
 def effects_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows all effects of a factorial, folded."""
+    """Shows all effects of a factorial experiment, folded."""
     rows: list[list[Cell | str]] = [
         [
             str(row.kind),
@@ -128,7 +128,7 @@ def effects_table(found: pd.DataFrame, caption: str) -> Table:
 def mean_table(
     found: pd.DataFrame, caption: str, level_words: str, columns: Mapping[str, str], note: str = ""
 ) -> Table | None:
-    """Shows plain means, by title and column; columns without a value are left out."""
+    """Shows means by title and column. Omits columns without a value."""
     kept = {words: name for words, name in columns.items() if found[name].notna().any()}
     rows = [
         [

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result folder: written so that a kill at any moment costs one run at most.
+"""The result folder, written so that a kill at any moment loses at most one run.
 
-``runs.jsonl`` is the truth: an object is appended and on disk before the row is. A folder that is
-opened again has its torn last line cut off and ``runs.csv`` made anew from it.
+``runs.jsonl`` is authoritative: each object is appended and flushed to disk before the row in
+``runs.csv``. Resuming a folder cuts off an incomplete last line and rebuilds ``runs.csv``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FOLDERS = ("images", "golden", "trace", "stages")
 
 
 class ResultFolder:
-    """A folder of results, made or opened."""
+    """A folder of results."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -33,10 +33,10 @@ class ResultFolder:
         self.objects: list[dict[str, Any]] = []
 
     def create(self, suite: Suite) -> None:
-        """Makes the folder, which must not hold results yet."""
+        """Creates the folder, which must not hold results yet."""
         if self.runs_csv.exists() or self.runs_jsonl.exists():
             raise WavecombError(
-                f"{self.path}: holds results already; add --resume to go on with them, "
+                f"{self.path}: holds results already; add --resume to continue, "
                 "or choose another folder"
             )
         try:
@@ -48,14 +48,14 @@ class ResultFolder:
         self._rewrite()
 
     def resume(self, suite: Suite) -> None:
-        """Opens the folder of the same suite and mends what a kill has torn."""
+        """Opens the folder of the same suite and repairs incomplete files."""
         if not self.suite_toml.is_file():
-            raise WavecombError(f"{self.path}: nothing to resume here; leave --resume away")
+            raise WavecombError(f"{self.path}: nothing to resume here; leave --resume out")
         if self.suite_toml.read_text(encoding="utf-8") != suite.text:
             raise WavecombError(
                 f"{self.path}: was made with another suite than {suite.path}; "
-                "choose another folder, or give this folder's suite.toml, which names the "
-                "folder of --stages, too"
+                "choose another folder, or give this folder's suite.toml, which also names "
+                "the folder of --stages"
             )
         for name in FOLDERS:
             (self.path / name).mkdir(parents=True, exist_ok=True)
@@ -63,23 +63,23 @@ class ResultFolder:
         self._rewrite()
 
     def done(self) -> set[str]:
-        """Runs that came to a good end."""
+        """Returns the ids of successful runs."""
         return {o["row"]["run_id"] for o in self.objects if o["row"]["status"] == "ok"}
 
     def append(self, entry: dict[str, Any]) -> None:
-        """Adds a run: {"row": its row, ...}."""
+        """Appends a run, given as {"row": its row, ...}."""
         _append(self.runs_jsonl, json.dumps(entry, allow_nan=False) + "\n")
         _append(self.runs_csv, row_line(entry["row"]))
         self.objects.append(entry)
 
     def machine(self) -> dict[str, Any]:
-        """What machine.json holds, {} where there is none."""
+        """Returns the contents of machine.json, or {} without that file."""
         if not self.machine_json.is_file():
             return {}
         try:
             document: dict[str, Any] = json.loads(self.machine_json.read_text(encoding="utf-8"))
         except ValueError as error:
-            raise WavecombError(f"{self.machine_json}: is no JSON: {error}") from error
+            raise WavecombError(f"{self.machine_json}: is not JSON: {error}") from error
         return document
 
     def write_machine(self, document: dict[str, Any]) -> None:
@@ -92,10 +92,10 @@ class ResultFolder:
 
 
 def read_objects(path: Path) -> list[dict[str, Any]]:
-    """The objects of runs.jsonl; a torn last line is left out.
+    """Reads the objects of runs.jsonl, skipping an incomplete last line.
 
     Raises:
-        WavecombError: Another line is no object.
+        WavecombError: Another line is not a JSON object.
     """
     if not path.is_file():
         return []
@@ -107,7 +107,7 @@ def read_objects(path: Path) -> list[dict[str, Any]]:
             entry["row"]["run_id"]
         except (ValueError, KeyError, TypeError) as error:
             raise WavecombError(
-                f"{path}: line {number} is no run; remove that line, and --resume"
+                f"{path}: line {number} is not a run; remove that line, and --resume"
             ) from error
         objects.append(entry)
     return objects
@@ -119,7 +119,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _append(path: Path, line: str) -> None:
-    """One write and a flush to the disk, so that a line is whole or the last."""
+    """Appends a line with one write and a flush, so that only the last can be incomplete."""
     fd = os.open(path, os.O_WRONLY | os.O_APPEND)
     try:
         os.write(fd, line.encode("utf-8"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a suite: prepares stages, converged pictures and true costs, then run after run."""
+"""Runs a suite: prepares stages, converged images and true costs, then executes the runs."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ Say = Callable[[str], None]
 
 
 def _no_event(name: str, /, **values: Any) -> None:
-    """Nobody listens."""
+    """Ignores an event."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line chose.
+    """Options of ``wavecomb bench run``.
 
     Attributes:
-        repetitions: In place of the suite's.
-        only: Pattern of configurations' names.
-        threads: In place of the suite's, where threads are not what is varied.
-        seed: Of the order, in place of the suite's.
-        time_limit_s: No run is begun that would end after it.
-        resume: Go on with the folder.
-        stages: Names of stages to run; all where it is empty.
+        repetitions: Overrides the suite's repetitions.
+        only: Pattern for names of configurations.
+        threads: Overrides the suite's threads in runs that do not vary them.
+        seed: Overrides the suite's seed of the order of runs.
+        time_limit_s: Starts no run that would end after this time, in seconds.
+        resume: Whether to continue with the results in the folder.
+        stages: Names of stages to run; empty means all.
     """
 
     repetitions: int | None = None
@@ -69,9 +69,9 @@ class Options:
 class Sitting:
     """One call of ``wavecomb bench run``.
 
-    ``event`` is told what ``say`` says, for programs: docs/bench.md lists names and values.
+    ``event`` receives the messages of ``say`` as values for programs; docs/bench.md lists them.
 
-    Contract: ``run`` may be stopped at any moment, by a signal too; what is done is kept.
+    ``run`` may be stopped at any moment, also by a signal. Finished runs are kept.
     """
 
     suite: Suite
@@ -83,7 +83,7 @@ class Sitting:
     spins: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Makes the plan."""
+        """Builds the plan."""
         limits = machine.limits()
         if self.options.threads is not None and self.options.threads > limits.threads:
             raise WavecombError(
@@ -99,18 +99,18 @@ class Sitting:
         self.jobs = Jobs(self.suite, self.folder, self.cpus)
 
     def estimator(self) -> Estimator:
-        """From the folder's results, else from a calibration."""
+        """Returns an estimator from the folder's results, else from a calibration."""
         by_name = {config.name: config for config in self.configs}
         known = from_results(self.folder.objects, by_name)
         return known or calibrate(self.configs, self.cpus)
 
     def left(self) -> list[Run]:
-        """Runs of the plan that are not done."""
+        """Returns the runs of the plan that are not done."""
         done = self.folder.done()
         return [run for run in self.plan if run.run_id not in done]
 
     def run(self) -> bool:
-        """Runs what is left; False if the time limit came first."""
+        """Executes the remaining runs. Returns False if the time limit stopped them."""
         check_files(self.configs)
         peers.check({config.renderer for config in self.configs} - {WAVECOMB})
         if self.options.resume:
@@ -131,7 +131,7 @@ class Sitting:
             rest = estimator.seconds(run.config)
             limit = self.options.time_limit_s
             if limit is not None and time.monotonic() - begun + rest > limit:
-                self.say(f"time limit: {len(left) - index} runs are left; --resume goes on")
+                self.say(f"time limit: {len(left) - index} runs are left; --resume continues")
                 whole = False
                 break
             self.event("begin", number=index + 1, run=run.run_id, seconds=rest)
@@ -145,7 +145,7 @@ class Sitting:
     # ---- before the first run ------------------------------------------------------------------
 
     def _begin(self) -> None:
-        """Records the machine; refuses to mix builds."""
+        """Records the machine. Raises WavecombError if the results are of another build."""
         document = self.folder.machine()
         state = machine.machine_state()
         if document and document.get("native_sha256") != state["native_sha256"]:
@@ -180,14 +180,15 @@ class Sitting:
         self._keep_machine()
 
     def _prepare(self, left: Sequence[Run]) -> None:
-        """Stages, converged pictures, true costs; then the warm-up."""
+        """Prepares stages, converged images and true costs, then warms up."""
         configs = list({run.config.name: run.config for run in left}.values())
         stages = {self.jobs.stage(config): config for config in configs}
         for path, config in stages.items():
             if not path.exists():
                 self._prepares("stage", config.stage)
                 generate(config.source, path)
-        # The last of a family makes its golden picture: Mitsuba's llvm, not its scalar variant.
+        # The last renderer of a family makes its golden image: Mitsuba's llvm, not its scalar
+        # variant.
         by_name = sorted(configs, key=lambda config: config.renderer, reverse=True)
         goldens = {self.jobs.golden(c): c for c in by_name if c.golden}
         for path, config in goldens.items():
@@ -218,7 +219,7 @@ class Sitting:
             stage = self.jobs.stage(config)
             outcome = peers.run_peer(config, stage, golden.spp, golden.seed, path, threads)
         if outcome.answer["status"] != "ok":
-            raise WavecombError(f"golden picture of {config.stage}: {outcome.answer['error']}")
+            raise WavecombError(f"golden image of {config.stage}: {outcome.answer['error']}")
 
     # ---- runs ----------------------------------------------------------------------------------
 
@@ -247,7 +248,7 @@ class Sitting:
         return outcome
 
     def _one(self, run: Run) -> dict[str, Any]:
-        """A run between two spins; its row."""
+        """Executes a run between two spins, and returns its row."""
         threads = len(self.cpus)
         before = machine.spin(threads)
         outcome = self._start(run)
@@ -301,7 +302,7 @@ class Sitting:
             self.say(f"warning: {failed} runs failed; --resume tries them again")
 
     def _failed(self) -> int:
-        """Runs without a good end, of this sitting or an earlier one."""
+        """Counts runs of this and earlier sittings that failed and have not succeeded since."""
         failed = {o["row"]["run_id"] for o in self.folder.objects if o["row"]["status"] != "ok"}
         return len(failed - self.folder.done())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suites: what is to be run, as a TOML file says it. docs/bench.md has the keys."""
+"""Suites of runs, read from TOML files. docs/bench.md documents the keys."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from wavecomb.picture.files import check_regular, reason
 
 
 class Table:
-    """A table of the file; takes keys one by one, so that what is left over is unknown."""
+    """A TOML table. Keys are taken one by one, and keys that remain are unknown."""
 
     def __init__(self, path: Path, where: str, values: Mapping[str, Any]) -> None:
         self.path = path
@@ -34,18 +34,18 @@ class Table:
         self._known: list[str] = []
 
     def error(self, key: str, what: str) -> WavecombError:
-        """What to raise: a line that names the file, this table and the key."""
+        """Returns an error whose message names the file, the table and the key."""
         place = f"{self.where}: {key}" if self.where else key
         return WavecombError(f"{self.path}: {place}: {what}")
 
     def below(self, where: str, values: Any) -> Table:
-        """A table in it."""
+        """Returns a nested table."""
         if not isinstance(values, Mapping):
             raise self.error(where, "must be a table")
         return Table(self.path, where, values)
 
     def take(self, key: str, kind: type, default: Any) -> Any:
-        """The value of a key, of a type."""
+        """Takes the value of a key and checks its type."""
         self._known.append(key)
         value = self._values.pop(key, default)
         if value is not default and (
@@ -56,25 +56,25 @@ class Table:
         return value
 
     def count(self, key: str, default: int, least: int) -> int:
-        """A whole number from ``least`` up."""
+        """Takes an integer of at least ``least``."""
         value = int(self.take(key, int, default))
         if value < least:
             raise self.error(key, f"must be at least {least}, not {value}")
         return value
 
     def choice(self, key: str, default: str, allowed: tuple[str, ...]) -> str:
-        """One of some words."""
+        """Takes one of several words."""
         value = str(self.take(key, str, default))
         if value not in allowed:
             raise self.error(key, f"must be one of {', '.join(allowed)}, not {value!r}")
         return value
 
     def tables(self, key: str) -> list[tuple[str, Any]]:
-        """Tables by name."""
+        """Takes a table of tables; returns names and tables."""
         return list(self.take(key, dict, {}).items())
 
     def list_of_tables(self, key: str) -> list[Any]:
-        """Tables in a list."""
+        """Takes a list of tables."""
         entries = list(self.take(key, list, []))
         for entry in entries:
             if not isinstance(entry, Mapping):
@@ -82,12 +82,12 @@ class Table:
         return entries
 
     def rest(self) -> dict[str, Any]:
-        """All keys that are left."""
+        """Takes all remaining keys."""
         values, self._values = self._values, {}
         return values
 
     def end(self) -> None:
-        """Raises WavecombError if a key is left."""
+        """Raises WavecombError if a key remains."""
         for key in self._values:
             raise self.error(key, f"no such key; there are {', '.join(self._known)}")
 
@@ -106,7 +106,7 @@ _NOT_OF_SUITES = ("width", "height", "seed", "adaptive", "noise", "min_spp", "er
 
 @cache
 def suite_settings() -> dict[str, str]:
-    """Settings that a suite may choose, and their kinds.
+    """Returns the settings that a suite may choose, with their kinds.
 
     A count is an integer, "all" or "widest".
     """
@@ -119,12 +119,12 @@ def suite_settings() -> dict[str, str]:
 
 
 def suite_names() -> list[str]:
-    """The suites that come with Wavecomb."""
+    """Returns the names of the suites that come with Wavecomb."""
     return sorted(path.stem for path in SUITES.glob("*.toml"))
 
 
 def find_suite(name: str) -> Path:
-    """The file of a suite: one of ours by its name, or a path that ends in .toml."""
+    """Returns the file of a suite, given the name of a shipped suite or a path to a .toml file."""
     if name.endswith(".toml"):
         return Path(name)
     path = SUITES / f"{name}.toml"
@@ -140,7 +140,7 @@ def load_suite(path: Path) -> Suite:
     """Reads a suite.
 
     Raises:
-        WavecombError: It is no good; one line that names the file and the key.
+        WavecombError: The suite is invalid. The message names the file and the key.
     """
     try:
         check_regular(path)

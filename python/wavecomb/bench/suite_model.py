@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a suite is: stages, experiments, converged pictures."""
+"""Data classes of a suite: stages, experiments, converged images."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ RENDERERS = (WAVECOMB, *PEERS)
 
 @dataclass(frozen=True)
 class StageSource:
-    """Where a stage comes from: a generated scene with options, or a file.
+    """Source of a stage: a generated scene with options, or a file.
 
     Attributes:
         scene: Name of a generated scene, or "".
-        options: Its ``SceneOptions``.
+        options: Fields of ``SceneOptions`` for the scene.
         file: Path of a stage, or None.
         camera: Camera prim of a file, or None.
     """
@@ -38,19 +38,19 @@ class Experiment:
     """Runs that are compared with one another.
 
     Attributes:
-        name: Unique in the suite.
+        name: Name, unique in the suite.
         stages: Names of stages.
-        renderers: Of ``RENDERERS``.
-        settings: The same in all runs.
-        vary: Setting -> values; all combinations are run.
-        stage_vary: Option of the stage -> values, likewise.
+        renderers: Names from ``RENDERERS``.
+        settings: Settings that all runs share.
+        vary: Values by setting; all combinations are run.
+        stage_vary: Values by option of the stage; all combinations are run.
         cases: Settings that change together; each is combined with all of ``vary``.
-        case_names: Of the cases, in their order; "": it has none. Cases that have names are
-            compared with the one that is named "off".
+        case_names: Names of the cases, in their order, or "". Named cases are compared with the
+            case named "off".
         skip: Combinations to leave out: those that agree with all keys of one entry.
-        factor: The key of ``vary`` or ``stage_vary`` that a scaling curve is drawn over, or "".
-        images: Which repetitions keep their picture: "none", "first" or "all".
-        golden: Pictures are compared with a converged one.
+        factor: Key of ``vary`` or ``stage_vary`` over which a scaling curve is drawn, or "".
+        images: Repetitions that keep their image: "none", "first" or "all".
+        golden: Whether images are compared with a converged one.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Golden:
-    """How converged pictures are made: samples per pixel, integrator, seed."""
+    """Settings of converged images: samples per pixel, integrator, seed."""
 
     spp: int = 1024
     integrator: str = "reference"
@@ -78,19 +78,19 @@ class Golden:
 
 @dataclass(frozen=True)
 class Suite:
-    """A suite as its file says it.
+    """A suite, as its file describes it.
 
     Attributes:
-        name: Short.
-        title: One line.
-        path: The file.
-        text: What it holds.
-        repetitions: Of each configuration.
-        warm_up: Discarded runs of each stage before the first round.
-        seed: Of the order of runs.
+        name: Short name.
+        title: Title in one line.
+        path: File of the suite.
+        text: Contents of the file.
+        repetitions: Repetitions of each configuration.
+        warm_up: Number of discarded runs of each stage before the first round.
+        seed: Seed of the order of runs.
         golden: See ``Golden``.
-        stages: By name.
-        experiments: In order.
+        stages: Sources of stages by name.
+        experiments: Experiments in the order of the file.
     """
 
     name: str
@@ -105,17 +105,18 @@ class Suite:
     experiments: tuple[Experiment, ...]
 
 
-# ---- Which stages a suite is run on: those of a folder besides, or only some ---------------------
+# ---- Choice of stages: additional ones from a folder, or only some of the suite
+# --------------------
 
 
 STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def with_folder(suite: Suite, folder: Path) -> Suite:
-    """The suite with the stages of a folder added to each experiment that varies none.
+    """Adds the stages of a folder to each experiment that does not vary options of stages.
 
     Raises:
-        WavecombError: There is none, or two have one name.
+        WavecombError: The folder has no stages, or two stages have the same name.
     """
     files = sorted(p for p in folder.glob("*") if p.suffix.lower() in STAGE_SUFFIXES)
     if not folder.is_dir() or not files:
@@ -124,7 +125,9 @@ def with_folder(suite: Suite, folder: Path) -> Suite:
     twice = set(more) & set(suite.stages)
     if twice or len(more) < len(files):
         name = min(twice) if twice else "two of its files"
-        raise WavecombError(f"stages of {folder}: {name} has the name of another stage; rename it")
+        raise WavecombError(
+            f"stages of {folder}: {name} has the same name as another stage; rename it"
+        )
     experiments = tuple(
         experiment
         if experiment.stage_vary
@@ -135,15 +138,15 @@ def with_folder(suite: Suite, folder: Path) -> Suite:
 
 
 def naming_folder(suite: Suite, folder: Path) -> Suite:
-    """``with_folder``, and the suite's text names the folder: what was run can be read from it."""
+    """Applies ``with_folder``, and records the folder in the suite's text for later reference."""
     more = with_folder(suite, folder)
-    # A JSON string is a basic string of TOML.
+    # A JSON string is also a valid basic string of TOML.
     key = f"stages_folder = {json.dumps(folder.resolve().as_posix(), ensure_ascii=False)}\n"
     return replace(more, text=key + suite.text)
 
 
 def only_stages(suite: Suite, names: Sequence[str]) -> Suite:
-    """The suite with these stages alone; all of them where no name is given.
+    """Restricts the suite to the given stages; keeps all of them if no name is given.
 
     Raises:
         WavecombError: The suite has no such stage.

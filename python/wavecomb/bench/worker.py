@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One render in a process of its own, which ``bench.process`` starts.
+"""Process for one render, started by ``bench.process``.
 
-Reads a job as JSON from its standard input and writes one JSON line with what came of it. The job:
+Reads a job as JSON from its standard input and writes the result as one JSON line. The job:
 
     stage, camera   file, and camera prim or null
     settings        of the render, as ``wavecomb.render`` takes them, with "size" and "spp"
-    cpus            cores to stay on, or null
-    warm            renders with 1 sample per pixel before the timed one, which are thrown away
-    profile         costs to start from, a file, or null
-    golden          {"file", "spp"} of the converged picture, or null
-    image           where to keep the picture (.npy), or null
-    perf            of ``counters.Session``, or null
+    cpus            cores to run on, or null
+    warm            number of discarded renders with 1 sample per pixel before the timed one
+    profile         file of initial costs, or null
+    golden          {"file", "spp"} of the converged image, or null
+    image           file that keeps the image (.npy), or null
+    perf            ``counters.Session.job``, or null
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Job = dict[str, Any]
 
 
 def main() -> None:
-    """Does the job; an error of the render is an answer, too."""
+    """Performs the job and prints the answer. An error of the render is also an answer."""
     job = json.load(sys.stdin)
-    # What libraries print goes to stderr: the answer is the only line of stdout.
+    # Libraries may print to stdout. Redirect it to stderr, so that the answer is its only line.
     answer = os.dup(1)
     os.dup2(2, 1)
     if job.get("cpus"):
@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def run(job: Job) -> dict[str, Any]:
-    """Loads, warms up, renders, compares."""
+    """Loads the stage, warms up, renders and compares the image."""
     from wavecomb import api
     from wavecomb.bench.counters import Switch
     from wavecomb.run.costs import load_costs
@@ -59,7 +59,8 @@ def run(job: Job) -> dict[str, Any]:
     if profile is not None:
         settings["costs"] = profile
     for _ in range(int(job.get("warm", 0))):
-        api.render(stage.scene, size=size, spp=1, **settings)  # keeps nothing for the next
+        # does not keep data for the timed render
+        api.render(stage.scene, size=size, spp=1, **settings)
     switch = Switch(job.get("perf"))
     switch.start()
     picture = api.render(stage, size=size, spp=spp, **settings)
@@ -75,19 +76,19 @@ def run(job: Job) -> dict[str, Any]:
 
 
 def _mean_spp(stats: Mapping[str, Any]) -> float:
-    """Samples of a pixel in the mean: not what was asked for, where time is limited."""
+    """Returns the mean samples per pixel, which differs from spp in renders with a time limit."""
     from wavecomb.run.stats import rendered_pixels
 
     return float(stats["counts"]["samples"]) / rendered_pixels(stats["settings"])
 
 
 def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dict[str, Any]:
-    """Digest of the picture, and its error against the converged one.
+    """Returns a hash of the image, and its error against the golden (converged) image.
 
-    The golden picture has noise of its own, 1 / golden spp of what one sample has; so a measured
-    squared error is too large by the factor 1 + spp / golden spp, and is divided by it. Of samples
-    that are better than the golden picture's, which nothing was learned for, this takes off too
-    little.
+    The variance of the golden image is that of one sample divided by the golden spp. It increases
+    the measured squared error by the factor 1 + spp / golden spp, so the error is divided by this
+    factor. The correction is too small if learning made the samples better than those of the golden
+    image, which is rendered without learning.
     """
     import hashlib
 

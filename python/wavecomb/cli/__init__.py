@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command ``wavecomb``: one module for each subcommand."""
+"""Command-line program ``wavecomb``, with one module for each subcommand."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 
 
 def _stop(number: int, frame: Any) -> None:
-    """Ends the process at a Ctrl-C while modules are imported, when there is nothing to keep."""
+    """Ends the process on Ctrl-C during imports, when there are no results to save yet."""
     os.write(2, b"stopped\n")
     os._exit(130)
 
 
-# An exception in the midst of imports would be a traceback.
+# An exception raised in the middle of an import would print a traceback.
 _handles = (
     threading.current_thread() is threading.main_thread()
     and signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -59,5 +59,6 @@ def main() -> None:
     Exit codes: 0 done, 1 pictures differ (compare), 2 an error, 130 stopped by Ctrl-C.
     `wavecomb COMMAND --help` says more.
     """
-    # NumPy's matrix products here are three wide: more threads would only spin beside ours.
+    # NumPy multiplies only 3 x 3 matrices here. Its thread pool would only compete with ours for
+    # cores.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options for the layers of a picture and the files that they go into."""
+"""Options that select AOVs and the EXR files they are written to."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ _COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "d
 
 
 class _AovOption(click.Option):
-    """Its help names what the core keeps, which is loaded when it is read."""
+    """Option --aov. Builds its help text on demand, because listing the AOVs loads the core."""
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Names of AOVs."""
+        """Returns the names of AOVs, groups and expressions that begin with ``incomplete``."""
         named = (f"{expressions.PREFIX}{name}" for name in expressions.NAMED)
         names = (*aov_names.names(), *aov_names.groups(), *named)
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """The option, and its help."""
+        """Returns the option and its help text, as ``click`` expects them."""
         self.help = (
-            f"Layer to keep, may be given again: {', '.join(aov_names.names()[1:])}, "
+            f"AOV to write as a layer; repeat for more: {', '.join(aov_names.names()[1:])}, "
             f"{aov_names.LIGHT}NAME, lpe:NAME=EXPRESSION, crypto, techniques, all; "
-            "beauty is always there (docs/aovs.md).  "
+            "beauty is always written (docs/aovs.md).  "
             f"[default: {', '.join(aov_names.DEFAULT[1:])}]"
         )
         return super().get_help_record(ctx)
 
 
 def aov_options(command: F) -> F:
-    """--aov, and ``file_options``."""
+    """Adds --aov and the options of ``file_options`` to a command."""
     command = click.option(
         "--aov",
         "aovs",
@@ -51,13 +51,13 @@ def aov_options(command: F) -> F:
 
 
 def file_options(command: F) -> F:
-    """--half, --compression, --exr-tile and --split-aovs."""
+    """Adds --half, --compression, --exr-tile and --split-aovs to a command."""
     for option in (
         click.option(
             "--split-aovs",
             "split",
             is_flag=True,
-            help="A file for each AOV, FILE.NAME.exr; the beauty is in FILE.exr.",
+            help="Write a file FILE.NAME.exr for each AOV; the beauty is in FILE.exr.",
         ),
         click.option(
             "--exr-tile",
@@ -65,16 +65,16 @@ def file_options(command: F) -> F:
             type=click.IntRange(min=0),
             default=0,
             metavar="N",
-            help="EXR in tiles of N x N pixels, a multiple of 16.  [default: scanlines]",
+            help="Write the EXR in tiles of N x N pixels, a multiple of 16.  [default: scanlines]",
         ),
         click.option(
             "--compression",
             type=click.Choice(_COMPRESSIONS),
             default="zip",
             show_default=True,
-            help="Of the EXR.",
+            help="Compression of the EXR.",
         ),
-        click.option("--half", is_flag=True, help="16 bit colours and normals in the EXR."),
+        click.option("--half", is_flag=True, help="Store colours and normals as 16-bit floats."),
     ):
         command = option(command)
     return command
@@ -82,7 +82,7 @@ def file_options(command: F) -> F:
 
 @dataclass(frozen=True)
 class AovOptions:
-    """What ``aov_options`` gave."""
+    """Values of the options that ``aov_options`` or ``file_options`` added to a command."""
 
     aovs: tuple[str, ...]
     half: bool
@@ -92,19 +92,20 @@ class AovOptions:
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> AovOptions:
-        """Moves them out of a command's arguments; those of AOVs may not be there."""
+        """Removes these options from a command's arguments. ``aovs`` may be missing."""
         options.setdefault("aovs", ())
         return cls(**{field.name: options.pop(field.name) for field in fields(cls)})
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The AOVs, expanded; raises WavecombError for one that is not known."""
+        """Returns the AOV names with groups expanded. Raises WavecombError for an unknown name."""
         return aov_names.expand(self.aovs) if self.aovs else aov_names.DEFAULT
 
     def check(self, output: str, aovs: Sequence[str]) -> None:
-        """Raises, in one line, what would else come up when files of these AOVs are written.
+        """Checks that files with these AOVs can be written; raises WavecombError if not.
 
-        The names of light groups are known once a stage is loaded: those of all are not checked.
+        Light groups are known only after the stage is loaded, so the file names of ``light_groups``
+        are not checked here.
         """
         from wavecomb.picture import cryptomatte
         from wavecomb.picture.exr import check_options
@@ -120,7 +121,7 @@ class AovOptions:
                 check_writable(file)
 
     def file_options(self) -> dict[str, Any]:
-        """Keyword arguments of ``Picture.save``."""
+        """Returns keyword arguments for ``Picture.save``."""
         return {
             "half": self.half,
             "compression": self.compression,

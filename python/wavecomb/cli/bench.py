@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb bench``."""
+"""Commands ``wavecomb bench ...``, which measure and report benchmark suites."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ _METRICS = (
     ),
 )
 def bench_command() -> None:
-    """Measure: suites of runs, interleaved, with the state of the machine (docs/bench.md)."""
+    """Run benchmark suites and record the state of the machine.
+
+    Runs of different configurations are interleaved. See docs/bench.md.
+    """
 
 
 @bench_command.command("list")
@@ -57,24 +60,24 @@ def list_command() -> None:
 @click.argument("suite")
 @add_options(
     option("-o --output DIR", "path", "Folder for results.", required=True),
-    option("--dry-run", "flag", "Say what would be run, and for how long."),
-    option("--resume", "flag", "Go on with the results in DIR."),
-    option("--repetitions N", "count", "In place of the suite's."),
-    option("--only GLOB", "text", "Only configurations whose name matches."),
+    option("--dry-run", "flag", "Print the runs and their estimated time, but run nothing."),
+    option("--resume", "flag", "Continue with the results in DIR."),
+    option("--repetitions N", "count", "Repetitions of each run.  [default: of the suite]"),
+    option("--only GLOB", "text", "Run only configurations whose name matches."),
     option(
-        "--stage NAME", "text", "Only this stage; repeat for more.",
+        "--stage NAME", "text", "Run only this stage; repeat for more.",
         name="only_these", multiple=True,
     ),
-    option("--threads N", "count", "In place of the suite's."),
-    option("--seed N", click.IntRange(min=0), "Of the order of the runs."),
-    option("--time-limit MINUTES", "positive", "Begin no run past it."),
-    option("--stages FOLDER", "path", "More stages, of a folder."),
+    option("--threads N", "count", "Render threads.  [default: of the suite]"),
+    option("--seed N", click.IntRange(min=0), "Seed of the random order of runs."),
+    option("--time-limit MINUTES", "positive", "Start no run that would end after this time."),
+    option("--stages FOLDER", "path", "Folder with more stages."),
     option(
         "--progress", click.Choice(["text", "json"]),
-        "json: also lines on stdout, for programs (docs/bench.md).",
+        "json: also print lines of JSON on standard output (docs/bench.md).",
         default="text", show_default=True,
     ),
-    option("--quiet", "flag", "Only warnings and errors."),
+    option("--quiet", "flag", "Print only warnings and errors."),
 )  # fmt: skip
 def run_command(
     suite: str,
@@ -91,10 +94,10 @@ def run_command(
     progress: str,
     quiet: bool,
 ) -> None:
-    """Run SUITE, a name of `wavecomb bench list` or a TOML file.
+    """Run SUITE, a name from `wavecomb bench list` or a TOML file.
 
-    Each run is a process of its own, on cores of its own. Results are in DIR as soon as a run is
-    done; after Ctrl-C, SIGTERM or a kill, --resume goes on.
+    Each run is a separate process, pinned to its cores. Results are written to DIR after each run.
+    After Ctrl-C, SIGTERM or a kill, --resume continues.
     """
     from wavecomb.bench.results import ResultFolder
     from wavecomb.bench.runner import Options, Sitting
@@ -124,13 +127,13 @@ def run_command(
 
 
 def _event(name: str, /, **values: object) -> None:
-    """A line of JSON on stdout."""
+    """Prints a line of JSON on standard output."""
     click.echo(json.dumps({"event": name, **values}))
 
 
 @contextlib.contextmanager
 def _stopped_by_sigterm() -> Iterator[None]:
-    """SIGTERM ends a sitting as Ctrl-C does, so that the run that goes on ends with it."""
+    """Makes SIGTERM end a sitting as Ctrl-C does, so that the current run ends too."""
 
     def stop(number: int, frame: object) -> None:
         raise KeyboardInterrupt
@@ -161,7 +164,7 @@ def _dry_run(sitting: object) -> None:
     click.echo(
         f"{len(left)} runs of {len(sitting.configs)} configurations, "
         f"about {time_text(estimator.total(left))} (from {basis}), "
-        "and what stages and golden pictures take to make"
+        "plus the time for making stages and golden images"
     )
 
 
@@ -169,7 +172,7 @@ def _dry_run(sitting: object) -> None:
 @click.argument("folder", type=click.Path(), metavar="DIR")
 @option(
     "--markdown FILE.md", "path",
-    "Also a page of Markdown, with its figures in a folder FILE beside it.",
+    "Also write a Markdown page, with its figures in a folder FILE beside it.",
 )  # fmt: skip
 def report_command(folder: str, markdown: str | None) -> None:
     """Write DIR/report.html and DIR/figures from the results in DIR."""
@@ -196,16 +199,16 @@ def report_command(folder: str, markdown: str | None) -> None:
 @click.argument("before", type=click.Path(), metavar="BEFORE")
 @click.argument("after", type=click.Path(), metavar="AFTER")
 @option(
-    "--metric", click.Choice(_METRICS), "The column of runs.csv that is compared.",
+    "--metric", click.Choice(_METRICS), "Column of runs.csv to compare.",
     default="render_s", show_default=True,
 )  # fmt: skip
-@option("--json", "flag", "For programs.", name="as_json")
+@option("--json", "flag", "Print JSON on standard output.", name="as_json")
 def compare_command(before: str, after: str, metric: str, as_json: bool) -> None:
-    """Say what changed from the results in BEFORE to those in AFTER.
+    """Report what changed from the results in BEFORE to those in AFTER.
 
-    Configurations that both have are compared, AFTER / BEFORE, with 95 % intervals. Two sittings
-    do not share their rounds: what the machine did between them is in the ratios, and warnings say
-    what is known of it.
+    Prints the ratio AFTER / BEFORE with a 95 % interval for each configuration that both have. The
+    two folders do not share their rounds, so changes of the machine between them affect the ratios;
+    warnings name the known ones.
     """
     from wavecomb.bench.folders import compare_folders, lines_of
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb compare``."""
+"""Command ``wavecomb compare``."""
 
 from __future__ import annotations
 
@@ -34,43 +34,43 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
 @click.argument("b", type=click.Path())
 @add_options(
     option(
-        "--metric", click.Choice(_METRICS), "How different they look, may be given again.",
+        "--metric", click.Choice(_METRICS), "Image metric to compute; repeat for more.",
         name="metrics", multiple=True,
     ),
     option(
         "--exposure STOPS", "number",
-        "For psnr, ssim, flip-ldr, --page and --wipe: pictures times 2^STOPS.  [default: 0]",
+        "Scale images by 2^STOPS for psnr, ssim, flip-ldr, --page and --wipe.  [default: 0]",
         default=0.0,
     ),
     option(
-        "--variance-a FILE", "path", "Variance of A's pixels, for a z-test.  [default: none]"
+        "--variance-a FILE", "path", "Variance image of A, for a z-test.  [default: none]"
     ),
-    option("--variance-b FILE", "path", "Likewise of B."),
+    option("--variance-b FILE", "path", "Variance image of B."),
     option(
         "--significance", click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
-        "Of the z-test.", default=0.01, show_default=True,
+        "Significance level of the z-test.", default=0.01, show_default=True,
     ),
-    option("--heatmap FILE.png", "path", "Where they differ."),
+    option("--heatmap FILE.png", "path", "Write an image of the differences."),
     option(
-        "--map", click.Choice(_MAPS), "What --heatmap shows.",
+        "--map", click.Choice(_MAPS), "Kind of difference in --heatmap and --page.",
         name="kind", default="absolute", show_default=True,
     ),
     option(
-        "--page FILE.html", "path", "A page in which A and B are wiped, with their difference."
+        "--page FILE.html", "path", "Write a page with a wipe of A and B, and their difference."
     ),
-    option("--wipe FILE.png", "path", "A left of a line, B right."),
+    option("--wipe FILE.png", "path", "Write an image with A left and B right of a line."),
     option(
         "--at X", click.FloatRange(0, 1),
-        "Where the line of --wipe is, of the width.  [default: 0.5]", default=0.5,
+        "Position of the wipe line, 0 to 1 of the image width.  [default: 0.5]", default=0.5,
     ),
     option(
         "--tone-map", click.Choice(["clamp", "neutral"]),
-        "Of --page and --wipe.  [default: clamp]", default="clamp",
+        "Tone mapping of --page and --wipe.  [default: clamp]", default="clamp",
     ),
-    option("--json", "flag", "For programs.", name="as_json"),
+    option("--json", "flag", "Print JSON on standard output.", name="as_json"),
     option(
         "--tolerance X", Real(0),
-        "Exit with 0, too, where no colour channel differs by more than X.",
+        "Exit with 0 if no colour channel differs by more than X.",
     ),
 )  # fmt: skip
 @isolate_option
@@ -91,22 +91,21 @@ def compare_command(
     as_json: bool,
     tolerance: float | None,
 ) -> None:
-    """Say how picture A differs from picture B, the reference.
+    """Compare image A with image B, the reference.
 
-    Two folders are compared by the names below them, two sequences (shot.####.exr) by their frames;
-    a picture without its other counts as different.
+    Two folders are compared by the file names inside them, two sequences (shot.####.exr) by frame.
+    An image without a counterpart counts as different.
 
-    Equal means bit for bit, in every layer that both have. relMSE is the mean of
-    (A - B)^2 / (B^2 + 0.01), and trimmed the same without the 0.1 % of pixels with the largest
-    terms. Pixels with a NaN or an infinity in A or B are counted and left out of all figures; they
-    are equal where their bits are. Whole-number formats (PNG, JPEG) are read as sRGB and compared
-    as linear light.
+    Equal means bit for bit, in every layer that both images have. relMSE is the mean of (A - B)^2 /
+    (B^2 + 0.01); trimmed relMSE leaves out the 0.1 % of pixels with the largest terms. Pixels with
+    a NaN or an infinity in A or B are counted and left out of all figures; they are equal if their
+    bits are equal. Integer formats (PNG, JPEG) are decoded from sRGB and compared as linear light.
 
-    A variance picture holds the variance of each pixel's mean. With one, or with both, a z-test
-    says whether the pictures can have the same expectation.
+    A variance image holds the variance of each pixel's mean. With one or two of them, a z-test
+    reports whether the images can have the same expectation.
 
-    Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different,
-    2 an error.
+    Exit codes: 0 equal (or within --tolerance, or the z-test finds no difference), 1 different, 2
+    an error.
     """
     from wavecomb.picture.collect import is_many
 
@@ -117,7 +116,8 @@ def compare_command(
     from wavecomb.picture.files import check_writable
     from wavecomb.picture.thumbnails import Look
 
-    # What is compared is what is shown.
+    # Pages and wipes show the beauty, not the denoised layer, because the metrics compare the
+    # beauty.
     look = Look(denoised=False, exposure=exposure, tone_map=tone_map)
     for name, file, ending in (("--page", page, ".html"), ("--wipe", wipe, ".png")):
         if file is not None and not file.lower().endswith(ending):
@@ -173,14 +173,12 @@ def compare_command(
 
 
 def _refuse(options: dict[str, Any]) -> None:
-    """Raises WavecombError for what is of two pictures."""
+    """Raises WavecombError for options that apply only to a pair of images."""
     from wavecomb.errors import WavecombError
 
     for name, value in options.items():
         if value:
-            raise WavecombError(
-                f"{name} is of two pictures; --page FILE.html shows those of folders"
-            )
+            raise WavecombError(f"{name} is only for two images; --page FILE.html compares folders")
 
 
 def _write_looks(
@@ -221,7 +219,7 @@ def _metric_lines(measured: dict[str, float], test: Any) -> list[str]:
             f"z-test: {verdict}, p = {test.p_value:.3g} over {test.tests} tests{where}; "
             f"{100.0 * test.pixels_accepted:.4g} % of pixel channels accepted"
         )
-        lines.append("        mean of the picture, z  " + _row(test.mean_z))
+        lines.append("        mean of the image, z    " + _row(test.mean_z))
     return lines
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb compare`` of folders and of sequences, and the pages and wipes of any."""
+"""Comparison of folders and sequences, and the HTML pages and wipe images of all comparisons."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ def compare_many(
     a: str, b: str, *, tolerance: float | None, as_json: bool, page: str | None, kind: str,
     look: Look,
 ) -> bool:  # fmt: skip
-    """Compares all pairs and says what came of it; whether all pass, and none lacks its other.
+    """Compares all pairs of images and prints the results.
+
+    Returns:
+        True if all pairs pass and no image lacks a counterpart.
 
     Raises:
         WavecombError: There is nothing to compare.
@@ -68,7 +71,7 @@ def write_page(
     page: str, results: list[PairResult], sources: tuple[str, str], folders: Folders | None,
     tolerance: float | None, kind: str, look: Look,
 ) -> None:  # fmt: skip
-    """Writes the page of pairs, whole or not at all."""
+    """Writes an HTML page of compared pairs, replacing the file only when complete."""
     from wavecomb.picture.compare_folders import compare_page
 
     chosen: Kind = next((one for one in KINDS if one == kind), "absolute")
@@ -80,16 +83,16 @@ def write_page(
 
 
 def write_pair_page(page: str, a: str, b: str, found: Comparison, kind: str, look: Look) -> None:
-    """The page of two pictures, of which it is known how they differ."""
+    """Writes an HTML page of two images from their finished comparison."""
     result = PairResult("", a, b, found)
     write_page(page, [result], (a, b), None, None, kind, look)
 
 
 def write_wipe(file: str, a: str, b: str, at: float, look: Look) -> None:
-    """Writes A and B with a line between them as a PNG.
+    """Writes a PNG with A left and B right of a vertical line.
 
     Raises:
-        WavecombError: They have other sizes.
+        WavecombError: The images differ in size.
     """
     from wavecomb.picture.image import write_png_codes
     from wavecomb.picture.thumbnails import wipe

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb completion``: commands, options and their values on TAB."""
+"""Command ``wavecomb completion``, which prints shell completion scripts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from wavecomb.cli.options import examples
 SHELLS = ("bash", "zsh", "fish")
 PROGRAM = "wavecomb"
 VARIABLE = "_WAVECOMB_COMPLETE"
-"""By which the shell asks the command for what may come next."""
+"""Environment variable by which the shell asks ``wavecomb`` for completions."""
 
 
 @click.command(
@@ -24,14 +24,14 @@ VARIABLE = "_WAVECOMB_COMPLETE"
 )
 @click.argument("shell", type=click.Choice(SHELLS))
 def completion_command(shell: str) -> None:
-    """Print what makes SHELL complete commands, options and their values.
+    """Print the script that makes SHELL complete commands, options and their values on TAB.
 
-    The shell asks `wavecomb` itself, whose answers come from the tables that it reads options by:
-    what is printed stays right when those change.
+    The script asks `wavecomb` itself for completions, so it stays valid when options change.
     """
     made = get_completion_class(shell)
     assert made is not None
     root = click.get_current_context().find_root().command
-    # Of bash, click asks for the version first, by starting it: all that are in use do.
+    # click checks the version of bash by starting it when ``source`` is called. Filling in the
+    # template here skips this check, which every bash in use would pass.
     template = made(root, {}, PROGRAM, VARIABLE)
     click.echo(template.source_template % template.source_vars())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb doctor``."""
+"""Command ``wavecomb doctor``."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from wavecomb.cli.options import examples
 
 
 @click.command("doctor", epilog=examples("wavecomb doctor", "wavecomb doctor --json | jq .fit"))
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 def doctor_command(as_json: bool) -> None:
-    """Say what is installed and works, and what is missing.
+    """Report which parts are installed and work, and which are missing.
 
-    Beside what is missing stands the command that installs it. A small picture is rendered, too.
+    Prints the command that installs each missing part, and renders a small test image.
 
-    Exit codes: 0 all that renders need is there and works, 2 something of it is not.
+    Exit codes: 0 everything that rendering needs is installed and works, 2 it is not.
     """
     from wavecomb.doctor import as_plain, examine, is_fit, lines
 

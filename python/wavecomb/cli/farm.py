@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb farm``: one job, many workers."""
+"""Commands ``wavecomb farm ...``, which render one job with many workers."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from wavecomb.farm.folder import Folder
 
 JOB = click.argument("job", type=click.Path(), metavar="JOB")
-AS_JSON = click.option("--json", "as_json", is_flag=True, help="For programs.")
+AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 MAP = click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="Folder FROM of the job, its stage or its images lies at TO on this machine.",
+    help="Use folder TO on this machine for FROM in the job, its stage or its images.",
 )  # fmt: skip
 
 
@@ -36,10 +36,9 @@ MAP = click.option(
     ),
 )
 def farm_command() -> None:
-    """Render on several processes or machines: the same bits as one.
+    """Render on several processes or machines, with the same bits as on one.
 
-    Dask distributes the tasks of a job; finished tiles are kept in its folder. docs/farm.md says
-    more.
+    Dask distributes the tasks of a job. The job's folder keeps finished tiles. See docs/farm.md.
     """
 
 
@@ -48,7 +47,7 @@ farm_command.add_command(plan_command)
 
 
 def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
-    """The folder of a job, with path maps of this machine."""
+    """Opens the folder of a job and applies the path maps of this machine."""
     from wavecomb.farm.folder import Folder
 
     opened_maps(maps)
@@ -59,10 +58,10 @@ def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
 @JOB
 @ON
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
-              help="Of each local worker.  [default: as the job says, else its share]")  # fmt: skip
+              help="Threads per local worker.  [default: of the job, else equal]")  # fmt: skip
 @MAP
 @DASHBOARD
-@click.option("--quiet", is_flag=True, help="Only warnings and errors.")
+@click.option("--quiet", is_flag=True, help="Print only warnings and errors.")
 @AS_JSON
 def resume_command(
     job: str,
@@ -73,9 +72,9 @@ def resume_command(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Continue JOB: render what is missing or damaged, and nothing else.
+    """Continue JOB by rendering only missing or damaged tiles.
 
-    Tiles of a stage whose files have changed since are rendered again.
+    If files of the stage have changed since, all images are rendered again.
     """
     from wavecomb.farm.clusters import parse_where
     from wavecomb.farm.job import Job
@@ -87,9 +86,9 @@ def resume_command(
     found = Job.of(ask_plan({"again": short.as_json()})["job"], job)
     changed = refresh(folder, replace(folder.job, files=found.files))
     if changed and not (quiet or as_json):
-        click.echo(f"{changed} files of the stage have changed: all images are rendered again")
+        click.echo(f"{changed} files of the stage have changed, so all images are rendered again")
     if where.kind == "none":
-        raise WavecombError("--on none: nobody would render; give local:N, dask:ADDRESS or slurm:N")
+        raise WavecombError("--on none: renders nothing; give local:N, dask:ADDRESS or slurm:N")
     run_job(folder, where, threads=threads, dashboard=dashboard, as_json=as_json, quiet=quiet)
 
 
@@ -98,7 +97,7 @@ def resume_command(
 @MAP
 @AS_JSON
 def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
-    """Show how many tiles and images of JOB are there; each file is read and compared."""
+    """Report how many tiles and images of JOB are finished. Reads and verifies each file."""
     from wavecomb.farm.assemble import status
 
     folder = opened(job, maps)
@@ -114,11 +113,11 @@ def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
 )
 @JOB
 @click.option("--image", type=click.IntRange(1), default=1, metavar="I",
-              help="Image of the job, from 1.  [default: 1]")  # fmt: skip
-@click.option("--tile", default="1/1", metavar="I/N", help="Tile I of N.  [default: 1/1]")
+              help="Number of the image in the job, from 1.  [default: 1]")  # fmt: skip
+@click.option("--tile", default="1/1", metavar="I/N", help="Render tile I of N.  [default: 1/1]")
 @MAP
 def task_command(job: str, image: int, tile: str, maps: tuple[str, ...]) -> None:
-    """Render one tile of JOB in this process, unless it is there.
+    """Render one tile of JOB in this process, unless it is finished.
 
     For sites whose own queue starts the tasks. `wavecomb farm assemble JOB` joins the tiles.
     """
@@ -139,10 +138,10 @@ def task_command(job: str, image: int, tile: str, maps: tuple[str, ...]) -> None
 @MAP
 @AS_JSON
 def assemble_command(names: tuple[str, ...], maps: tuple[str, ...], as_json: bool) -> None:
-    """Join tiles to images in this process: those of a JOB, or those beside an IMAGE.
+    """Join the tiles of a JOB, or the tiles beside an IMAGE, to images in this process.
 
-    The tiles are those of `wavecomb farm task`, or of `wavecomb render --tile`. An image that lacks
-    tiles is an error that names them; the others are written.
+    `wavecomb farm task` or `wavecomb render --tile` renders the tiles. An image with missing tiles
+    is an error that names them; all other images are written.
     """
     from wavecomb.farm.api import assemble_job
 
@@ -164,14 +163,14 @@ def assemble_command(names: tuple[str, ...], maps: tuple[str, ...], as_json: boo
     elif written:
         click.echo(f"wrote {', '.join(written)}")
     elif not wrong:
-        click.echo("all images are there")
+        click.echo("all images are finished")
     if wrong:
         more = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
         raise WavecombError(f"{wrong[0]}{more}")
 
 
 def opened_maps(maps: tuple[str, ...]) -> None:
-    """Has this process use path maps."""
+    """Applies path maps to this process."""
     from wavecomb.path_maps import parse_maps, use_maps
 
     use_maps(parse_maps(maps))
@@ -182,9 +181,9 @@ def opened_maps(maps: tuple[str, ...]) -> None:
 )
 @JOB
 @click.option("--openjd", type=click.Path(), required=True, metavar="FILE.json",
-              help="Template of Open Job Description.")  # fmt: skip
+              help="Write a template of Open Job Description.")  # fmt: skip
 def export_command(job: str, **options: Any) -> None:
-    """Write JOB for schedulers that run Open Job Description: one task for each tile."""
+    """Write JOB for schedulers that run Open Job Description, with one task for each tile."""
     from wavecomb.farm.openjd import write_template
 
     write_template(options["openjd"], opened(job))

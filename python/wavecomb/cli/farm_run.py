@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Works on a job and shows how far it is."""
+"""Runs a farm job on a cluster and shows its progress."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ def run_job(
     as_json: bool = False,
     quiet: bool = False,
 ) -> None:
-    """Has a cluster work on a job until all is done, and reports the result.
+    """Runs a job on a cluster until all tasks are done, and reports the result.
 
     Args:
-        folder: The job's.
+        folder: Folder of the job.
         where: The cluster.
-        threads: Of each local worker; 0 means: as is best.
-        dashboard: Port of Dask's dashboard; None means: there is none.
-        as_json: Progress and the result as a line of JSON each, for programs.
-        quiet: Only warnings and errors.
+        threads: Threads of each local worker; 0 lets the job or the number of workers decide.
+        dashboard: Port of Dask's dashboard; None starts no dashboard.
+        as_json: Print progress and result as lines of JSON.
+        quiet: Print only warnings and errors.
 
     Raises:
         WavecombError: Tasks failed, or there are no workers.
-        click.exceptions.Exit: Somebody stopped it.
+        click.exceptions.Exit: The user stopped the job.
     """
     from wavecomb.farm.client import run
 
@@ -90,7 +90,7 @@ def run_job(
 
 
 def how_far(out: Outcome) -> str:
-    """How much of a job is done."""
+    """Returns a phrase for the number of finished images and tiles of a job."""
     words = f"{out.images_done} of {out.images} images are written"
     if out.images_done < out.images:
         words += f", {out.tasks_done} of {out.tasks} tiles are rendered"
@@ -99,7 +99,7 @@ def how_far(out: Outcome) -> str:
 
 @contextlib.contextmanager
 def _shown(silent: bool, as_json: bool) -> Any:
-    """Gives what shows how far a job is: a bar on a console, or lines of JSON for programs."""
+    """Yields a function that shows the progress of a job, as a console bar or as lines of JSON."""
     if as_json:
         yield _limited(lambda out: click.echo(json.dumps({"progress": out.as_dict()})))
         return
@@ -131,7 +131,7 @@ def _shown(silent: bool, as_json: bool) -> Any:
 
 
 def _limited(show: Callable[[Outcome], None]) -> Callable[[Outcome], None]:
-    """At most one call in ``_SHOW_S``."""
+    """Limits a progress function to one call in ``_SHOW_S`` seconds."""
     due = [0.0]
 
     def limited(out: Outcome) -> None:

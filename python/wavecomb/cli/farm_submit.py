@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb farm submit``, and the hidden ``farm plan`` that reads the stage for it."""
+"""Command ``wavecomb farm submit``, and the hidden ``farm plan`` that reads the stage for it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from wavecomb.cli.setting_options import Real, SettingCommand
 from wavecomb.errors import WavecombError
 
 _PLAN_S = 4 * 3600.0
-"""For all files of a stage to be read and hashed."""
+"""Time limit, in seconds, for reading and hashing all files of a stage."""
 
 
 @click.command(
@@ -42,13 +42,13 @@ _PLAN_S = 4 * 3600.0
     "--tiles",
     default="auto",
     metavar="auto|NxM",
-    help="Columns and rows of tiles that each image is cut into.  [default: auto: whole images "
-    "where there are two for each worker]",
+    help="Columns and rows of tiles in each image.  [default: auto: whole images if there "
+    "are two for each worker]",
 )
 @click.option("--job", metavar="DIR", help="The job's folder.  [default: NAME.farm beside -o]")
 @click.option(
     "--tries", type=click.IntRange(1, 100), default=3, metavar="N",
-    help="How often a task that fails is tried.  [default: 3]",
+    help="Number of attempts for a task that fails.  [default: 3]",
 )  # fmt: skip
 @click.option(
     "--hang", "hang_s", type=Real(1), default=1800.0, metavar="S",
@@ -57,29 +57,28 @@ _PLAN_S = 4 * 3600.0
 @click.option(
     "--strict/--no-strict",
     default=True,
-    help="Whether a texture or layer that is missing is an error.  [default: strict]",
+    help="Treat a missing texture or layer as an error.  [default: strict]",
 )
 @click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="Folder FROM lies at TO on workers that do not have FROM: the stage, all files that it "
-    "names, and the images.",
+    help="Workers without folder FROM look for the stage, its files and the images at TO.",
 )  # fmt: skip
 @click.option(
     "--isa",
     metavar="NAME",
-    help="Library that all workers load (x86-64-v3 ...), so that older and newer machines can "
+    help="Instruction set for all workers (x86-64-v3 ...), so that older and newer machines "
     "render the same bits.",
 )
 @DASHBOARD
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 @picture_options
 def submit_command(
     on: str, job: str | None, dashboard: int | None, as_json: bool, **options: Any
 ) -> None:
     """Render STAGE on a Dask cluster, or on several processes of this machine.
 
-    Options are those of `wavecomb render`. Images are, bit for bit, those of one process. Ctrl-C
-    keeps what is done, and `wavecomb farm resume` continues. docs/farm.md says more.
+    Takes the options of `wavecomb render`. Images equal those of one process bit for bit. Ctrl-C
+    keeps finished tiles, and `wavecomb farm resume` continues. See docs/farm.md.
     """
     from wavecomb.farm.clusters import parse_where
     from wavecomb.farm.folder import Folder
@@ -115,17 +114,17 @@ def submit_command(
 
 
 def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
-    """Has a child process read the stage, so that a crash in a library is one line.
+    """Reads the stage in a child process, so that a crash in a library becomes a one-line error.
 
     Args:
-        request: Options of ``farm submit``, or {"again": a job as JSON}. It is an argument of the
-            child, which a sandbox starts twice, so it has to be short.
+        request: Options of ``farm submit``, or {"again": a job as JSON}. It is passed to the child
+            as a command-line argument, which a sandbox passes on once more, so it has to be short.
 
     Returns:
-        ``job`` as JSON, and ``learned``: base64 or None.
+        A dictionary with ``job``, as JSON, and ``learned``, the guiding data in base64 or None.
 
     Raises:
-        WavecombError: What the child says.
+        WavecombError: The child reported an error, or did not finish in time.
     """
     words = processes.command("wavecomb", "farm", "plan", json.dumps(request), parent=0)
     process = processes.popen(
@@ -185,7 +184,10 @@ def plan_command(text: str) -> None:
 
 
 def _tuples(value: Any) -> Any:
-    """Lists as tuples, as click gives them, but in jobs, which are JSON."""
+    """Turns lists into tuples, as click gives them.
+
+    Leaves jobs as they are, because they stay JSON.
+    """
     if isinstance(value, dict):
         return {key: v if key == "again" else _tuples(v) for key, v in value.items()}
     return tuple(map(_tuples, value)) if isinstance(value, list) else value

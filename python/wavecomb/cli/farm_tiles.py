@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tiles for sites with their own queue: ``wavecomb render --tile``, and jobs from its options."""
+"""Rendering single tiles with ``wavecomb render --tile``, for sites with their own job queue.
+
+Also converts the options of ``render`` to a farm job.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ _TILE = "tile-{}-of-{}"
 
 
 def tile_name(output: str, index: int, count: int) -> str:
-    """The file of a tile beside its image.
+    """Returns the file name of a tile, beside its image.
 
     >>> tile_name("out/shot.0012.exr", 2, 8)
     'out/shot.0012.tile-3-of-8.exr'
@@ -33,7 +36,7 @@ def tile_name(output: str, index: int, count: int) -> str:
 
 
 def tile_names(output: str) -> list[str]:
-    """The files of tiles beside an image that are there."""
+    """Returns the existing tile files beside an image, sorted."""
     stem, ending = os.path.splitext(output)
     found = glob.glob(f"{glob.escape(stem)}.{_TILE.format('*', '*')}{glob.escape(ending)}")
     end = re.compile(re.escape(f"{stem}.") + r"tile-\d+-of-\d+" + re.escape(ending), re.DOTALL)
@@ -41,11 +44,11 @@ def tile_names(output: str) -> list[str]:
 
 
 def check_options(options: dict[str, Any], what: str = "a farm") -> None:
-    """Raises WavecombError for options of ``render`` that a farm does without.
+    """Raises WavecombError for options of ``render`` that do not apply to a farm.
 
     Args:
-        options: Of the command.
-        what: Does without them, in messages.
+        options: Arguments of the command.
+        what: Name of the feature that lacks them, for the message.
     """
     learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
     for option, given, instead in (
@@ -54,8 +57,8 @@ def check_options(options: dict[str, Any], what: str = "a farm") -> None:
         ("--preview", options["preview"], "`wavecomb farm status` shows how far a job is"),
         ("--learn-from", learn_from, "frames are rendered in any order; give a file"),
         ("--learn-to", options["learn_to"],
-         "a render writes it, of one image, and --learn-from gives it to the job"),
-        ("--deep", options["deep"], "tiles of deep images are not joined; give it to render"),
+         "a render of one image writes it, and --learn-from gives it to the job"),
+        ("--deep", options["deep"], "tiles of deep images cannot be joined; use `wavecomb render`"),
         ("--film-memory", options["film_memory"], "tiles limit the memory of a worker"),
         ("--progress", "json" if options["progress"] == "json" else None, "give --json"),
     ):  # fmt: skip
@@ -64,7 +67,7 @@ def check_options(options: dict[str, Any], what: str = "a farm") -> None:
 
 
 def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
-    """Index and count of --tile. Raises WavecombError where the other options do not allow it."""
+    """Parses --tile to (index, count). Raises WavecombError if other options contradict it."""
     from wavecomb.farm.tiling import parse_tile
 
     if text.isdecimal():
@@ -72,12 +75,12 @@ def check_tile(text: str, options: dict[str, Any]) -> tuple[int, int]:
     found = parse_tile(text)
     check_options(options, "--tile")
     if options["output"] is None:
-        raise WavecombError("--tile: needs -o, beside which the tile is written")
+        raise WavecombError("--tile: needs -o, because the tile is written beside it")
     return found
 
 
 def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
-    """The job of a command's options, still without tiles and files.
+    """Builds a farm job from a command's options, still without tiles and files.
 
     Raises:
         WavecombError: --costs names a file.
@@ -111,10 +114,10 @@ def job_of(prepared: Prepared, asked: Asked, **more: Any) -> Job:
 
 
 def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list[str]:
-    """Renders tile I of N of each frame to a file beside the image; the files.
+    """Renders tile I of N of each frame to a file beside the image, and returns the file names.
 
     Raises:
-        WavecombError: A farm cannot render it.
+        WavecombError: A farm cannot render this stage.
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.machine_class import machine_class
@@ -143,10 +146,13 @@ def render_tile(prepared: Prepared, asked: Asked, tile: tuple[int, int]) -> list
 
 
 def assemble_tiles(output: str) -> list[str]:
-    """Joins the tiles beside an image, writes its files, and removes the tiles; the files.
+    """Joins the tiles beside an image, writes the image's files and removes the tiles.
+
+    Returns:
+        The files that were written.
 
     Raises:
-        WavecombError: Tiles are missing, damaged, or of other settings, files or machines.
+        WavecombError: Tiles are missing or damaged, or differ in settings, files or machines.
     """
     from wavecomb.farm.assemble import NarrowBorder, join, write_image
     from wavecomb.farm.job import Job, Task
@@ -163,7 +169,7 @@ def assemble_tiles(output: str) -> list[str]:
         same = [i for i in range(len(job.images))
                 if job.part_key(Task(i, first.number), first.machine) == first.key]  # fmt: skip
         if not same:
-            raise WavecombError(f"{names[0]}: is of another job than its header says")
+            raise WavecombError(f"{names[0]}: does not belong to the job in its header")
         image, count = same[0], job.tile_count(same[0])
         wanted = [tile_name(output, index, count) for index in range(count)]
         lacking = [name for name in wanted if name not in names]

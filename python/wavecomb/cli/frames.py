@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sequences of ``wavecomb render``: --frames and --skip-existing."""
+"""Frame sequences of ``wavecomb render``, with --frames and --skip-existing."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 frame_options = add_options(
     option(
         "--frames RANGE", "text",
-        "Frames: 1-48, 1-48x2, 1,5,9. Names of files say where the frame goes: "
+        "Frames to render, such as 1-48, 1-48x2 or 1,5,9. File names need a placeholder: "
         "shot.####.exr, shot.%04d.exr, shot.$F4.exr or shot.<frame>.exr.",
     ),
-    option("--skip-existing", "flag", "With --frames: leave frames out whose files are there."),
+    option("--skip-existing", "flag", "With --frames: skip frames whose files exist."),
 )  # fmt: skip
-"""--frames and --skip-existing."""
+"""Options --frames and --skip-existing."""
 
 
 def check_frames(
     text: str | None, skip: bool, source: StageOptions, names: Names, purpose: PurposeOptions
 ) -> tuple[float, ...] | None:
-    """The frames; None where no sequence is asked for. Raises WavecombError."""
+    """Returns the frames of a sequence, or None for a single image. Raises WavecombError."""
     if text is None:
         if skip:
             raise WavecombError("--skip-existing is for sequences: give --frames, too")
@@ -46,7 +46,7 @@ def check_frames(
         raise WavecombError("--frame is one frame and --frames are several; give one of them")
     if purpose.resume is not None:
         raise WavecombError(
-            "--resume goes on with one picture: give its --frame, and then the other --frames "
+            "--resume continues one image: give its --frame, and then all other --frames "
             "with --skip-existing"
         )
     frames = parse_frames(text)
@@ -75,17 +75,20 @@ def render_sequence(
     purpose: PurposeOptions,
     skip: bool,
 ) -> tuple[Done | None, list[str]]:
-    """Renders frames one after another; what came of the last, and all files that were written.
+    """Renders frames one after another.
+
+    Returns:
+        The result of the last frame, and all files that were written.
 
     Raises:
-        WavecombError: A frame failed; it is named, and those before it are written.
-        click.exceptions.Exit: Somebody stopped it; whole frames are written.
+        WavecombError: A frame failed. The message names it; earlier frames are written.
+        click.exceptions.Exit: The user stopped the render; completed frames are written.
     """
     wanted = list(frames)
     if skip:
         wanted = [f for f in frames if not all(map(os.path.exists, names.at(f).all()))]
         if len(wanted) < len(frames):
-            job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames are there")
+            job.reporter.said(f"{len(frames) - len(wanted)} of {len(frames)} frames exist")
     done: Done | None = None
     opened: Frames | None = None
     files: list[str] = []
@@ -102,10 +105,10 @@ def render_sequence(
             )  # fmt: skip
             if done.stopped is not None:
                 so_far = f"{number - 1} of {len(wanted)} frames are written"
-                kept = f"; {here.checkpoint} goes on with it" if here.checkpoint else ""
+                kept = f"; {here.checkpoint} continues it" if here.checkpoint else ""
                 click.echo(
                     f"stopped in {place} {how_far(done)}, which is not written{kept}; {so_far}, "
-                    "and --skip-existing goes on after them",
+                    "and --skip-existing continues after them",
                     err=True,
                 )
                 raise click.exceptions.Exit(128 + done.stopped)
@@ -124,7 +127,7 @@ def render_sequence(
 
 
 def open_frames(job: Job, source: StageOptions) -> Frames:
-    """The stage of a job, to be read at several frames or through several cameras."""
+    """Opens the stage of a job for rendering several frames or cameras."""
     from wavecomb.api import import_usd
 
     import_usd()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors in one line with suggestions for misspelt options, exit codes, version."""
+"""One-line errors with suggestions for misspelt options, exit codes and the version."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ INTERRUPTED = 130
 
 _GREETING = """renders OpenUSD stages on the CPU.
 
-  wavecomb render shot.usd -o shot.exr --png shot.png   a stage of yours
-  wavecomb scene mixed -o mixed.usdc                    none at hand: a stage to try
+  wavecomb render shot.usd -o shot.exr --png shot.png   your stage
+  wavecomb scene mixed -o mixed.usdc                    an example stage
   wavecomb view shot.usd                                look at it in a window
   wavecomb doctor                                       what is installed, and what is missing
   wavecomb --help                                       all commands; COMMAND --help: its options
@@ -35,22 +35,22 @@ NAMES = (
     *("render", "view", "info", "scene", "compare", "sheet", "merge", "farm", "bench"),
     *("doctor", "completion"),
 )
-"""The commands, in the order of the help; ``wavecomb.cli.NAME`` has ``NAME_command``."""
+"""Commands in the order of the help. Module ``wavecomb.cli.NAME`` defines ``NAME_command``."""
 
 
 class Commands(click.Group):
-    """A group that turns every exception into one line on stderr and an exit code.
+    """Command group that turns every exception into one line on stderr and an exit code.
 
-    ``WAVECOMB_DEBUG=1`` shows tracebacks instead. A command's module is imported when it is asked
-    for, so that ``wavecomb render`` does not wait for the others.
+    ``WAVECOMB_DEBUG=1`` shows tracebacks instead. Imports a command's module only when the command
+    is used, so that ``wavecomb render`` does not load all other commands.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """In the order of ``NAMES``."""
+        """Returns the command names in the order of ``NAMES``."""
         return list(NAMES)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of a name; None: there is none."""
+        """Returns the command of a name, or None if there is none."""
         if cmd_name not in NAMES:
             return None
         command: click.Command = getattr(
@@ -59,7 +59,7 @@ class Commands(click.Group):
         return command
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Without any, says what to do."""
+        """Prints a short introduction if there are no arguments."""
         for word in args:
             try:
                 word.encode()
@@ -80,12 +80,12 @@ class Commands(click.Group):
         standalone_mode: bool = True,
         **extra: Any,
     ) -> Any:
-        """Runs the command line and exits."""
+        """Runs the command line and exits the process."""
         if not standalone_mode:
             return super().main(args, prog_name, complete_var, False, **extra)
         terminal.guard_streams()
         if not sys.warnoptions and not os.environ.get("WAVECOMB_DEBUG"):
-            warnings.simplefilter("ignore")  # Python's own are for developers
+            warnings.simplefilter("ignore")  # Python's warnings are for developers
         keep_interrupts()
         supervisor.choices.words = words = tuple(sys.argv[1:] if args is None else args)
         try:
@@ -102,7 +102,7 @@ class Commands(click.Group):
             if os.environ.get("WAVECOMB_DEBUG"):
                 raise
             if was_interrupted() and not isinstance(error, WavecombError):
-                # A library made another exception of the KeyboardInterrupt.
+                # Some libraries turn a KeyboardInterrupt into another exception.
                 click.echo("stopped", err=True)
                 sys.exit(INTERRUPTED)
             _fail(describe(error))
@@ -110,13 +110,13 @@ class Commands(click.Group):
         if lost is not None:
             line = f"standard output: {lost.strerror}"
             if _output_of(words) == "result":
-                _fail(f"{line}; what it was to get is incomplete")
+                _fail(f"{line}; the output is incomplete")
             click.echo(f"warning: {line}; messages were lost", err=True)
         sys.exit(code if isinstance(code, int) else 0)
 
 
 def _output_of(words: Sequence[str]) -> str:
-    """What a command writes to standard output: its "result", or "messages" about files."""
+    """Returns "result" if a command prints its result on standard output, else "messages"."""
     names = [word for word in words if not word.startswith("-")]
     return "messages" if _WRITES_FILES & {tuple(names[:1]), tuple(names[:2])} else "result"
 
@@ -127,7 +127,7 @@ _WRITES_FILES = {
     *(("farm", "resume"), ("farm", "assemble"), ("farm", "cancel"), ("farm", "retry")),
     ("farm", "export"),
 }
-"""Commands whose standard output is only messages."""
+"""Commands that write files and print only messages on standard output."""
 
 
 def print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
@@ -196,11 +196,11 @@ SYNONYMS = {
     "--statistics": "--stats",
     "--silent": "--quiet",
 }
-"""Names that other renderers and tools use, and the option of the same meaning."""
+"""Option names of other renderers and tools, each with Wavecomb's equivalent."""
 
 
 def message_of(error: click.ClickException) -> str:
-    """The message of an error of the command line, with suggestions for a misspelt option."""
+    """Returns the message of a command-line error, with suggestions for a misspelt option."""
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
         return error.format_message()
     wanted = suggestions(error.option_name, options_of(error.ctx))
@@ -210,13 +210,13 @@ def message_of(error: click.ClickException) -> str:
 
 
 def options_of(context: click.Context) -> list[str]:
-    """All options of a command."""
+    """Returns all visible options of a command."""
     shown = [one for one in context.command.get_params(context) if not getattr(one, "hidden", 0)]
     return [name for one in shown for name in (*one.opts, *one.secondary_opts)]
 
 
 def suggestions(name: str, options: list[str]) -> list[str]:
-    """Options that a misspelt one may stand for, the likeliest first; three at most.
+    """Returns at most three options that a misspelt one may stand for, the most likely first.
 
     >>> suggestions("--smaples", ["--spp", "--size", "--shutter"])
     ['--spp']

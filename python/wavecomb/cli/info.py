@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb info``."""
+"""Command ``wavecomb info``."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from wavecomb.cli.options import (
 )
 @optional_stage
 @isolation_options
-@click.option("--machine", is_flag=True, help="Say what this machine has, and lacks; no STAGE.")
-@click.option("--json", "as_json", is_flag=True, help="For programs.")
+@click.option("--machine", is_flag=True, help="Report what this machine supports, without STAGE.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 def info_command(stage: str | None, machine: bool, as_json: bool, **options: Any) -> None:
-    """Say what would be rendered of STAGE, and what would not."""
+    """Report what would be rendered of STAGE, and which parts are not supported."""
     if machine:
         if stage is not None:
-            raise click.UsageError("--machine is of no STAGE")
+            raise click.UsageError("--machine takes no STAGE")
         _say_machine(as_json)
         return
     if stage is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of ``wavecomb render``: a stage is loaded, rendered, watched and written."""
+"""Loading, rendering and writing of one image of ``wavecomb render``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Names:
-    """Files of one picture; with places for the frame in a sequence."""
+    """File names of one image. In a sequence, they hold placeholders for the frame."""
 
     output: str
     png: str | None
@@ -35,20 +35,20 @@ class Names:
     deep: str | None = None
 
     def at(self, frame: float) -> Names:
-        """Those of a frame."""
+        """Returns the file names for a frame."""
         others = (self.png, self.stats, self.deep)
         filled = (None if name is None else fill(name, frame) for name in others)
         return Names(fill(self.output, frame), *filled)
 
     def all(self) -> list[str]:
-        """Those that there are, in the order in which they are written."""
+        """Returns all file names that are not None, in the order in which files are written."""
         names = (self.output, self.png, self.deep, self.stats)
         return [name for name in names if name is not None]
 
 
 @dataclass(frozen=True)
 class Job:
-    """What all pictures of one command share."""
+    """Settings and objects that all images of one command share."""
 
     stage: str
     settings: Any
@@ -71,9 +71,10 @@ class Job:
         *,
         keeps_stopped: bool = True,
     ) -> Done:
-        """Loads and renders. A picture in bands is written, too, to ``names``.
+        """Loads the stage and renders it. An image in bands is also written to ``names``.
 
-        ``keeps_stopped``: also where it was stopped after its first sample.
+        ``keeps_stopped`` says whether an image in bands is still written if the render is stopped
+        after its first sample.
         """
         from wavecomb.picture.rendered import picture_of
         from wavecomb.run.bands import band_rows
@@ -125,7 +126,7 @@ class Job:
     def _caught(
         self, picture: Picture, shot: Shot, settings: Any, is_stopped: Callable[[], bool]
     ) -> Picture:
-        """A picture with the shadows on its catchers; without them where it was stopped."""
+        """Adds the shadows on catchers to an image; leaves them out if the render was stopped."""
         from wavecomb.run import catchers
         from wavecomb.run.watcher import Watcher
 
@@ -143,7 +144,10 @@ class Job:
     def _run_bands(
         self, shot: Shot, loaded: LoadedStage, rows: int, names: Names, keeps_stopped: bool
     ) -> Done:
-        """Renders and writes a picture band by band; of one that was stopped, all are there."""
+        """Renders an image in bands and writes each one.
+
+        If stopped, fills the rest with empty bands.
+        """
         from wavecomb.picture.growing import GrowingFiles
         from wavecomb.picture.rendered import picture_of, window_of
         from wavecomb.run.bands import render_bands, sum_stats, without_samples
@@ -180,7 +184,7 @@ class Job:
 
             def picture_in(result: Any, stats: dict[str, Any]) -> Picture:
                 of_all = {**stats, "settings": settings}
-                del of_all["seconds"]  # nobody knows yet
+                del of_all["seconds"]  # the render time is not known yet
                 return picture_of(result, of_all, scene=loaded.scene, aovs=self.aovs)
 
             def stopped_part(part: Any) -> Picture:
@@ -220,7 +224,11 @@ class Job:
         purpose: PurposeOptions,
         resumed: Checkpoint | None,
     ) -> tuple[list[Any], dict[str, Any] | None, float]:
-        """Who saves checkpoints and previews; the state to go on from, and its seconds."""
+        """Prepares checkpoints and previews.
+
+        Returns:
+            The sinks that save them, the state to resume or None, and its render time in seconds.
+        """
         from wavecomb.run.watcher import CheckpointSink, PreviewSink, Sink
 
         sinks: list[Sink] = []
@@ -253,7 +261,7 @@ class Job:
         return sinks, state, seconds
 
     def write(self, done: Done, names: Names, *, denoise: bool) -> tuple[Done, list[str]]:
-        """Writes all files of a picture, unless they are; gives it as written, and their names."""
+        """Writes the files of an image unless written; returns the image and the file names."""
         if done.picture is None:
             return done, list(done.files)
         from wavecomb.run.stats import write_stats
@@ -276,7 +284,7 @@ class Job:
 
 
 class _NotKept(Exception):
-    """A picture in bands that was stopped and is not to be written."""
+    """Stopped render of an image in bands that is not to be written."""
 
 
 def _broken_pixels(picture: Picture) -> int:
@@ -294,7 +302,7 @@ def _any_samples(parts: list[dict[str, Any]]) -> bool:
 
 
 def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
-    """The names of checkpoint and preview for a frame."""
+    """Returns the options with the frame filled into the names of checkpoint and preview."""
     return replace(
         purpose,
         checkpoint=None if purpose.checkpoint is None else fill(purpose.checkpoint, frame),
@@ -303,7 +311,10 @@ def purpose_at(purpose: PurposeOptions, frame: float) -> PurposeOptions:
 
 
 def how_far(done: Done) -> str:
-    """How much is done, as can be said of a render without and with a fixed end."""
+    """Returns a phrase for the progress of a render.
+
+    This is a percentage, or the samples per pixel if the number of samples is not fixed.
+    """
     from wavecomb.run.stats import rendered_pixels
 
     settings = done.stats["settings"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb merge``."""
+"""Command ``wavecomb merge``."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from wavecomb.cli.setting_options import option
     ),
 )
 @click.argument("pictures", nargs=-1, required=True, type=click.Path(), metavar="A B ...")
-@option("-o --output FILE.exr", "path", "The sum.", required=True)
-@option("--png FILE", "path", "Picture for display, too.")
+@option("-o --output FILE.exr", "path", "Merged image.", required=True)
+@option("--png FILE", "path", "Also write an image for display.")
 @file_options
 @isolate_option
 def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **options: Any) -> None:
-    """Add pictures of one stage that were rendered with different seeds.
+    """Merge images of one stage that were rendered with different seeds.
 
-    Each pixel is the mean of A, B ... weighted by their samples there; sample counts add up, and
-    variances and errors become those of the sum. Pictures that do not fit (another size, stage,
-    setting or layer, or the same seed) are refused.
+    Each pixel is the mean of A, B ... weighted by sample count. Sample counts add up; variances and
+    errors become those of the merged image. Images that do not match in size, stage, settings or
+    layers, or that have the same seed, are refused.
     """
     from wavecomb.errors import WavecombError
     from wavecomb.picture.files import check_writable
@@ -62,7 +62,7 @@ def merge_command(pictures: tuple[str, ...], output: str, png: str | None, **opt
         write_png(png, to_rec709(merged.layers["beauty"], working))
     samples = merged.layers["samples"]
     click.echo(
-        f"{len(pictures)} pictures, seeds {', '.join(map(str, merged.seeds))}: "
+        f"{len(pictures)} images, seeds {', '.join(map(str, merged.seeds))}: "
         f"{samples.mean():.0f} samples per pixel; wrote "
         + ", ".join([*map(str, written), *([png] if png else [])])
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options that more than one command has."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def examples(*lines: str) -> str:
-    """The end of a help text."""
+    """Returns example command lines, formatted for the end of a help text."""
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
 
@@ -58,7 +58,7 @@ def _ask_reads(context: click.Context, parameter: click.Parameter, value: tuple[
 
 
 def isolate_option(command: F) -> F:
-    """--isolate, --sandbox, --sandbox-read and --memory-limit, for commands that read files."""
+    """Adds --isolate, --sandbox, --sandbox-read and --memory-limit to a command."""
     command = click.option(
         "--sandbox-read",
         type=click.Path(exists=True, file_okay=False),
@@ -76,8 +76,8 @@ def isolate_option(command: F) -> F:
         envvar="WAVECOMB_SANDBOX",
         expose_value=False,
         callback=_ask_sandbox,
-        help="Run the child in bubblewrap: no network, nothing can be written but the outputs.  "
-        "[default: auto: where this system can; on: or fail]",
+        help="Run the child in bubblewrap without network, with only the outputs writable; on: "
+        "fail if that is not possible.  [default: auto, if possible]",
     )(command)
     command = click.option(
         "--memory-limit",
@@ -85,7 +85,7 @@ def isolate_option(command: F) -> F:
         metavar="MB",
         expose_value=False,
         callback=_limit_memory,
-        help="Memory that the child process may take.  [default: what the machine has]",
+        help="Memory limit of the child process, in MB.  [default: the memory of the machine]",
     )(command)
     return click.option(
         "--isolate",
@@ -93,26 +93,26 @@ def isolate_option(command: F) -> F:
         default="auto",
         expose_value=False,
         callback=_isolate,
-        help="Work in a child process, so that a crash is one line.  "
-        "[default: auto: unless called from within a program]",
+        help="Work in a child process, which turns a crash into a one-line error.  "
+        "[default: auto, unless called from Python]",
     )(command)
 
 
 def isolation_options(command: F) -> F:
-    """--isolate and --load-limit, for commands that end when their stage is done."""
+    """Adds the options of ``isolate_option`` and --load-limit, for commands that load a stage."""
     return click.option(
         "--load-limit",
         type=Real(0),
         metavar="S",
         expose_value=False,
         callback=_set_load_limit,
-        help="Seconds that USD may compose the stage; 0: any.  "
-        "[default: 6, and 1 for each MB of layers]",
+        help="Time limit for USD to compose the stage, in seconds; 0 means none.  "
+        "[default: 6, plus 1 for each MB of layers]",
     )(isolate_option(command))
 
 
 def stage_options(command: F) -> F:
-    """STAGE, and an option for each row of ``LoadOptions``."""
+    """Adds the argument STAGE and an option for each row of ``LoadOptions``."""
     parameters = command.__dict__.setdefault("__click_params__", [])
     parameters += [_load_option(row) for row in reversed(rows().values())]
     return click.argument("stage", type=click.Path())(command)
@@ -134,7 +134,7 @@ def _load_option(row: Row) -> click.Option:
 
 
 def optional_stage(command: Any) -> Any:
-    """``stage_options`` with a stage that may be left out."""
+    """Adds the same options as ``stage_options``, with STAGE optional."""
     command = stage_options(command)
     for parameter in command.__click_params__:
         if parameter.name == "stage":
@@ -144,13 +144,13 @@ def optional_stage(command: Any) -> Any:
 
 @dataclass(frozen=True)
 class StageOptions:
-    """What ``stage_options`` gave: values by ``Row.key``."""
+    """Values of the options that ``stage_options`` added, by ``Row.key``."""
 
     values: Mapping[str, Any]
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> StageOptions:
-        """Moves them out of a command's arguments."""
+        """Removes these options from a command's arguments."""
         return cls({row.key: options.pop(row.key) for row in rows().values()})
 
     def __getitem__(self, key: str) -> Any:
@@ -158,20 +158,20 @@ class StageOptions:
 
     @property
     def frame(self) -> float | None:
-        """--frame."""
+        """Value of --frame, or None."""
         frame: float | None = self.values["frame"]
         return frame
 
     def changed(self, **values: Any) -> StageOptions:
-        """With other values."""
+        """Returns a copy with some values replaced."""
         return StageOptions({**self.values, **values})
 
     def as_dict(self) -> dict[str, Any]:
-        """For a file: what ``completed`` takes."""
+        """Returns the values as a dictionary for a checkpoint file; ``completed`` reads it back."""
         return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
-        """With what was chosen before in place of what is not chosen here."""
+        """Takes options that were not given from an earlier render."""
         values: dict[str, Any] = {}
         for row in rows().values():
             key, mine, other = row.key, self.values[row.key], before.get(row.key)
@@ -193,26 +193,33 @@ class StageOptions:
         progress: Callable[[int, int], None] | None = None,
         **changes: Any,
     ) -> LoadedStage:
-        """Loads a stage as the options say, on ``threads`` threads (0: all), for a picture.
+        """Loads a stage for a render with these options.
 
-        ``changes``: fields of ``LoadOptions`` in place of theirs.
+        Args:
+            stage: File of the stage.
+            threads: Number of threads; 0 uses all cores.
+            size: Width and height of the image in pixels; None takes them from the stage.
+            progress: Called with the amounts done and total.
+            changes: Fields of ``LoadOptions`` that override the options.
         """
         from wavecomb.api import load
 
         options = {**self.for_load(size), **changes}
-        # The whole command is in a child, or is not to be (--isolate).
+        # --isolate decided for the whole command, so ``load`` must not start another child process.
         return load(stage, frame=self.frame, threads=threads, progress=progress, **options)
 
     def for_load(self, size: tuple[int, int] | None) -> dict[str, Any]:
-        """Arguments of ``wavecomb.load``, but for the frame. Raises WavecombError."""
+        """Returns the arguments of ``wavecomb.load``, except the frame. Raises WavecombError."""
         options = given(self.values)
         options.pop("frame", None)
         return options if size is None else {**options, "size": size}
 
     def peek(self, stage: str) -> tuple[list[RenderChoice], Any]:
-        """What the stage's render settings ask for, a choice for each product.
+        """Reads the stage's render settings.
 
-        Also what is to be kept until the stage is loaded, so that its layers are read once.
+        Returns:
+            One choice for each render product, and an object to hold until the stage is loaded, so
+            that USD reads its layers only once.
         """
         from wavecomb.api import import_usd
 
@@ -226,7 +233,7 @@ class StageOptions:
 
 
 def _check_kept(row: Row, value: Any) -> None:
-    """Raises WavecombError where an option, as a file kept it, is not of its type."""
+    """Raises WavecombError if an option in a checkpoint has the wrong type."""
     from wavecomb.errors import WavecombError
 
     if value is None or value is False:
@@ -242,15 +249,15 @@ def _check_kept(row: Row, value: Any) -> None:
     if row.kind == "pair":
         good = good and len(value) == 2
     if not good:
-        raise WavecombError(f"the checkpoint's {row.key} is no good: it is damaged; start anew")
+        raise WavecombError(f"the checkpoint's {row.key} is invalid: the file is damaged")
 
 
 def warn(lines: list[str]) -> None:
-    """Prints warnings on stderr, each once."""
+    """Prints warnings on stderr, each distinct line once."""
     for line in dict.fromkeys(lines):
         click.echo(f"warning: {' '.join(line.split())}", err=True)
 
 
 def stage_warnings(loaded: LoadedStage) -> list[str]:
-    """Warnings of a loaded stage as lines."""
+    """Returns the warnings of a loaded stage as lines."""
     return [*(finding.line() for finding in loaded.report.warnings), *loaded.scene.warnings]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a command that renders was asked for, checked before anything is rendered."""
+"""Arguments of commands that render, and the checks made before rendering starts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.choice import RenderChoice
 
 Peek = Callable[[StageOptions, str], "tuple[list[RenderChoice], Any]"]
-"""What the stage's render settings ask for, as ``StageOptions.peek`` gives it."""
+"""Type of ``StageOptions.peek``: reads the render settings of a stage."""
 
 
 @dataclass
@@ -34,7 +34,7 @@ class Asked:
     """Arguments of a command that renders.
 
     Attributes:
-        stage: A file.
+        stage: File of the stage.
         output: -o.
         output_dir: --output-dir.
         png: --png.
@@ -51,10 +51,10 @@ class Asked:
         frames: --frames.
         skip_existing: --skip-existing.
         film_memory: --film-memory.
-        source: Options of the stage.
+        source: Options that load the stage.
         purpose: Options of ``purpose_options``.
         layers: Options of ``aov_options``.
-        chosen: Settings that were given.
+        chosen: Values of the render settings that were given.
     """
 
     stage: str
@@ -81,7 +81,7 @@ class Asked:
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> Asked:
-        """Of a command's arguments, all of them."""
+        """Builds an object from all arguments of a command, removing those with a field here."""
         source = StageOptions.take(options)
         purpose = PurposeOptions.take(options)
         layers = AovOptions.take(options)
@@ -91,23 +91,23 @@ class Asked:
         return cls(source=source, purpose=purpose, layers=layers, chosen=chosen, **own)
 
     def named(self) -> list[str]:
-        """Files that options name, but for the stage."""
+        """Returns all file names in the options, except the stage."""
         names = (*self.written(), self.learn_from, self.purpose.resume)
         return [name for name in names if name is not None]
 
     @property
     def costs_file(self) -> str | None:
-        """A file of costs that is read and written; None: there is none."""
+        """File of scheduling costs that is read and written, or None."""
         sources = known_settings()["costs"].choices
         return self.costs if self.costs is not None and self.costs not in sources else None
 
     def written(self) -> tuple[str | None, ...]:
-        """Files that are written, with places for the frame."""
+        """Returns the files that the command writes, with placeholders for the frame."""
         own = (self.output, self.png, self.deep, self.stats_file, self.costs_file, self.learn_to)
         return (*own, self.purpose.preview, self.purpose.checkpoint_file)
 
     def at(self, frame: float) -> Asked:
-        """The same with the frame in all names of files that have a place for it."""
+        """Returns a copy with the frame filled into all file names that have a placeholder."""
 
         def filled(name: str | None) -> str | None:
             return None if name is None else fill(name, frame)
@@ -120,11 +120,14 @@ class Asked:
 
     @property
     def whole(self) -> str:
-        """An option that needs all of the picture at once; empty: there is none."""
+        """An option that needs the whole image in memory, or "" if there is none."""
         return self.purpose.whole or ("" if self.deep is None else "--deep")
 
     def learning(self) -> Learning:
-        """What the pictures start from. Raises WavecombError where that cannot be read."""
+        """Returns the initial guiding data of the images.
+
+        Raises WavecombError if it cannot be read.
+        """
         if self.learn_from != BEFORE:
             return Learning(learned_of(self.learn_from))
         if self.frames is None:
@@ -132,21 +135,21 @@ class Asked:
         return Learning(follows=True)
 
     def check_learning(self, settings: Any) -> None:
-        """Raises WavecombError where nothing is learned with such settings."""
+        """Raises WavecombError if path guiding learns nothing with such settings."""
         for option, given in (("--learn-from", self.learn_from), ("--learn-to", self.learn_to)):
             if given is not None:
                 check_taught(settings, f"{option} {given}")
 
     def check_deep(self) -> None:
-        """Raises WavecombError where a deep picture is asked for as a layer."""
+        """Raises WavecombError if --aov requests deep samples, which are not a layer."""
         if aov_names.DEEP in self.layers.aovs:
-            raise WavecombError("--aov deep: is no layer; give --deep FILE.exr")
+            raise WavecombError("--aov deep: is not a layer; give --deep FILE.exr")
 
     def check_deep_resumed(self, kept: Iterable[str]) -> None:
-        """Raises WavecombError unless --deep is given as it was before.
+        """Raises WavecombError unless --deep is used as in the render that is resumed.
 
         Args:
-            kept: AOVs of the render that goes on.
+            kept: AOVs of the resumed render.
         """
         had = aov_names.DEEP in kept
         if had and self.deep is None:
@@ -163,16 +166,16 @@ class Asked:
 
 @dataclass
 class Prepared:
-    """What is to be rendered.
+    """Render jobs that passed all checks.
 
     Attributes:
-        asked: What was asked for, with the frame of a single image in the names of its files.
-        source: Options of the stage, those of a checkpoint included.
-        resumed: The checkpoint to go on from.
-        jobs: A plan, its frames and its job for each product.
-        learning: What all jobs start from.
-        opened: Held until the stage is loaded, so that its layers are read once.
-        reporter: Of all jobs.
+        asked: Arguments, with the frame of a single image filled into the file names.
+        source: Options that load the stage, completed from the checkpoint.
+        resumed: Checkpoint that the render continues, or None.
+        jobs: Plan, frames (None for a single image) and job of each render product.
+        learning: Initial guiding data of all jobs.
+        opened: Held until the stage is loaded, so that USD reads its layers only once.
+        reporter: Progress display of all jobs.
     """
 
     asked: Asked
@@ -185,10 +188,10 @@ class Prepared:
 
 
 def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
-    """Checks all that can be known to fail.
+    """Checks everything that can fail before rendering, and builds the jobs.
 
     Raises:
-        WavecombError: Something is no good; one line says what.
+        WavecombError: An option, a file or a setting is invalid.
     """
     from wavecomb.run.bands import band_rows
     from wavecomb.run.settings import keeps_error
@@ -197,7 +200,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
     purpose, layers, source = asked.purpose, asked.layers, asked.source
 
     def checked(names: Names, plan: Plan | None = None) -> tuple[float, ...] | None:
-        """The frames of a sequence; what can be known to fail fails here."""
+        """Returns the frames of a sequence, after checking all output files of the plan."""
         numbers = check_frames(asked.frames, asked.skip_existing, source, names, purpose)
         for frame in (None,) if numbers is None else numbers:
             here = names if frame is None else names.at(frame)
@@ -261,7 +264,7 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
             asked.tone_map, asked.film_memory, learning,
         )  # fmt: skip
 
-    # All is checked before the first is rendered.
+    # Check all products before rendering the first.
     all_numbers = [checked(plan.names, plan) for plan in plans]
     jobs = [
         (plan, numbers, job_of(plan, numbers))
@@ -271,9 +274,9 @@ def prepare(asked: Asked, peek: Peek = StageOptions.peek) -> Prepared:
 
 
 def _check_settings(chosen: dict[str, Any]) -> None:
-    """Raises an error for settings that are wrong whatever the stage asks for.
+    """Raises WavecombError for settings that are invalid for any stage.
 
-    A region, and memory, are checked when the size is known for certain.
+    The region and the memory are checked later, when the image size is known.
     """
     from wavecomb.run.settings import check_options
 
@@ -284,10 +287,9 @@ def _check_settings(chosen: dict[str, Any]) -> None:
 
 
 def _with_frame(asked: Asked, peek: Peek) -> Asked:
-    """Fills places for the frame in the names of a single image's files.
+    """Fills the frame into the file names of a single image.
 
-    The frame is that of --frame, else that of the checkpoint that is resumed, else the one at which
-    the stage begins.
+    The frame is the one of --frame, else of the resumed checkpoint, else the first of the stage.
     """
     if asked.frames is not None or not any(map(has_place, asked.named())):
         return asked
@@ -302,7 +304,7 @@ def _with_frame(asked: Asked, peek: Peek) -> Asked:
 
 
 def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
-    """Settings with the size of the picture that is shown, as ``make_settings`` takes it."""
+    """Returns settings with the displayed image size, without overscan, for ``make_settings``."""
     beyond = 2 * settings.get("overscan", 0)
     out = dict(settings)
     for name in ("width", "height"):
@@ -312,7 +314,7 @@ def _without_overscan(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
-    """Everything that can be known to fail before the work begins."""
+    """Raises WavecombError if an output file cannot be written or is named twice."""
     from wavecomb.picture.files import check_writable
 
     outputs = [
@@ -345,7 +347,7 @@ def _check_outputs(asked: Asked, names: Names, purpose: PurposeOptions) -> None:
 
 
 def _read_costs(costs_file: str | None) -> dict[str, dict[str, float]] | None:
-    """The profile to start from, if there is one yet."""
+    """Returns the cost profile in a file, or None if the file does not exist yet."""
     if costs_file is None or not os.path.exists(costs_file):
         return None
     from wavecomb.run.costs import load_costs

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Products of ``wavecomb render``: what the stage's render settings ask for, under options."""
+"""Render products of ``wavecomb render``, from the stage's render settings and the options."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan:
-    """One product: what the stage asks for, and its files."""
+    """One render product, with the choices of the stage and its output files."""
 
     choice: RenderChoice
     names: Names
     folder: str | None = None
-    """Where the picture has to be, as the stage named it; None: the user did."""
+    """Folder that the image must stay in if the stage chose its name; None if the user did."""
 
     def check_place(self, names: Names) -> None:
-        """Raises WavecombError where the picture would leave ``folder``, through links too.
+        """Raises WavecombError if the image would leave ``folder``, also through symbolic links.
 
         Args:
-            names: Those of the plan at a frame.
+            names: File names of the plan, at a frame.
         """
         if self.folder is None:
             return
@@ -45,11 +45,11 @@ class Plan:
             name = self.choice.output or names.output
             raise WavecombError(
                 f"{self.choice.product}: productName {name} leaves the folder {within}: give "
-                "-o FILE.exr, or --output-dir with the folder that pictures may go to"
+                "-o FILE.exr, or --output-dir with the folder for images"
             )
 
     def check_split(self, aovs: Sequence[str], frames: Sequence[float] | None) -> None:
-        """As ``check_place``, for a file of each layer and frame."""
+        """Does ``check_place`` for the files of --split-aovs, one for each layer and frame."""
         from wavecomb.picture.output import split_names
 
         for names in [self.names] if frames is None else map(self.names.at, frames):
@@ -57,7 +57,10 @@ class Plan:
                 self.check_place(replace(names, output=str(file)))
 
     def aovs(self, layers: AovOptions, before: Sequence[str] | None) -> tuple[str, ...]:
-        """Layers: those of options, else of the render that goes on, else of the product."""
+        """Returns the AOVs to render.
+
+        They come from the options, else from the resumed render, else from the render product.
+        """
         if layers.aovs:
             return layers.names
         if before is not None:
@@ -67,12 +70,12 @@ class Plan:
     def settings(
         self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool, fits: Any = None
     ) -> Any:
-        """Checked settings.
+        """Builds checked render settings.
 
         Args:
-            chosen: By options, and by the render that goes on.
-            aovs: Layers that are kept.
-            resumed: Whether a render goes on: it has a size and a region.
+            chosen: Settings from the options and from the resumed render.
+            aovs: AOVs to keep.
+            resumed: Whether a render is resumed, which fixes size and region.
             fits: As in ``make_settings``.
         """
         from wavecomb.run.settings import DEFAULT_SIZE, make_settings
@@ -82,21 +85,21 @@ class Plan:
         size = chosen.pop("width", width), chosen.pop("height", height)
         if "region" not in chosen and not resumed and (region := self.choice.region(*size)):
             chosen["region"] = region
-            chosen["crop"] = True  # the data window of files is that of the stage
+            chosen["crop"] = True  # the data window of the files is the one that the stage defines
         try:
             return make_settings(size, chosen.pop("spp"), aovs=aovs, fits=fits, **chosen)
         except WavecombError as error:
             if size != self.choice.resolution:
                 raise
             prim = self.choice.product or self.choice.settings
-            raise WavecombError(f"{prim}: {error}; --size goes before it") from None
+            raise WavecombError(f"{prim}: {error}; --size overrides it") from None
 
     def source(self, source: StageOptions) -> StageOptions:
-        """Options that load the stage for this product."""
+        """Returns the options that load the stage for this product."""
         return source.changed(product=self.choice.product or source["product"])
 
     def shot(self, frames: Frames, frame: float | None, settings: Any) -> FrameShot:
-        """For a stage that is open."""
+        """Returns this product at a frame of an open stage."""
         size = settings.width, settings.height
         return FrameShot(frames, frame, product=self.choice.product, size=size)
 
@@ -109,13 +112,19 @@ def plan_products(
     frames: str | None,
     folder: str | None = None,
 ) -> list[Plan]:
-    """What is to be rendered: with ``-o`` the first product, without it all.
+    """Plans the images to render: the first render product with ``-o``, else all.
 
-    ``beside`` has the files that options name beside it. ``folder`` is where names that the stage
-    gives count from, and must stay below; None: the working folder.
+    Args:
+        choices: Choices of the stage, one for each render product.
+        output: File of -o, or None.
+        beside: Other output files, from the options.
+        purpose: Options of ``purpose_options``.
+        frames: --frames, or None.
+        folder: Folder for images that the stage names, which they must not leave; None means the
+            working folder.
 
     Raises:
-        WavecombError: Nothing says where a picture goes.
+        WavecombError: An image has no file name, or an option applies to one image only.
     """
     if output is not None:
         if folder is not None:
@@ -152,7 +161,7 @@ def plan_products(
             target = os.path.realpath(plan.names.output)
             if target in seen:
                 raise WavecombError(
-                    f"productName {plan.choice.output} is that of several render products; "
+                    f"productName {plan.choice.output} is used by several render products; "
                     "choose one by --product"
                 )
             seen.add(target)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of ``wavecomb render``: when to end, what to keep on the way, how to show it."""
+"""Options of ``wavecomb render`` for stopping criteria, checkpoints, previews and progress."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ UNLIMITED_SPP = 1 << 20
 purpose_options = add_options(
     option(
         "--adaptive X", "positive",
-        "Samples go where the error of pixels is above X; 0.02 is fine.",
+        "Sample pixels until their relative error is below X (0.02 is a good value).",
     ),
     option(
         "--noise X", "positive",
-        "Likewise, until the mean relative error of the picture is X: 0.02 is 2 %.",
+        "Sample adaptively until the mean relative error of the image is X (0.02 is 2 %).",
     ),
     option(
         "--min-spp N", "count",
-        "With these: samples before the first look at errors.  [default: 16]",
+        "Samples per pixel before the first error estimate of adaptive renders.  [default: 16]",
     ),
-    option("--max-spp N", "count", "With these: the most samples a pixel.  [default: 1024]"),
+    option("--max-spp N", "count", "Most samples per pixel in adaptive renders.  [default: 1024]"),
     option(
         "--time-limit S", "positive",
-        "Seconds of rendering. Without --spp as many samples as fit.",
+        "Stop after S seconds of rendering, or earlier at --spp if given.",
     ),
     option(
         "--checkpoint FILE", "path",
-        "Saves the state of the render, also on Ctrl-C and SIGTERM.",
+        "Save the state of the render regularly, and on Ctrl-C and SIGTERM.",
     ),
     option("--every S", "positive", "Seconds between checkpoints.  [default: 120]"),
     option(
         "--resume FILE", "path",
-        "Goes on from a checkpoint, and saves to it unless --checkpoint is given.",
+        "Continue from a checkpoint, and save to it unless --checkpoint is given.",
     ),
-    option("--preview FILE.png", "path", "The picture as it grows."),
+    option("--preview FILE.png", "path", "Write an image of the render in progress."),
     option("--preview-every S", "positive", "Seconds between previews.  [default: 10]"),
     option(
-        "--denoise", "flag", "Adds the layer denoised, which PNGs then show (extra 'denoise')."
+        "--denoise", "flag", "Add a denoised layer, which PNGs then show (extra 'denoise')."
     ),
     option(
         "--progress", click.Choice(["bar", "json", "off"]),
-        "json: a line a second on stdout, for programs.  [default: bar]",
+        "Progress display; json prints a line per second on standard output.  [default: bar]",
     ),
 )  # fmt: skip
 """--adaptive, --noise, --time-limit, --checkpoint, --resume, --preview, --denoise ..."""
@@ -60,7 +60,7 @@ purpose_options = add_options(
 
 @dataclass(frozen=True)
 class PurposeOptions:
-    """What ``purpose_options`` gave."""
+    """Values of the options that ``purpose_options`` added to a command."""
 
     adaptive: float | None
     noise: float | None
@@ -77,7 +77,7 @@ class PurposeOptions:
 
     @classmethod
     def take(cls, options: dict[str, Any]) -> PurposeOptions:
-        """Moves them out of a command's arguments."""
+        """Removes these options from a command's arguments."""
         every, preview_every = options["every"], options["preview_every"]
         if every is not None and options["checkpoint"] is None and options["resume"] is None:
             raise WavecombError("--every is for checkpoints: give --checkpoint or --resume, too")
@@ -89,7 +89,7 @@ class PurposeOptions:
 
     @property
     def whole(self) -> str:
-        """An option that needs all of the picture at once; empty: there is none."""
+        """An option that needs the whole image in memory, or "" if there is none."""
         for name in ("denoise", "checkpoint", "resume", "preview"):
             if getattr(self, name):
                 return f"--{name}"
@@ -97,11 +97,14 @@ class PurposeOptions:
 
     @property
     def checkpoint_file(self) -> str | None:
-        """Where checkpoints go."""
+        """File that checkpoints are saved to, or None."""
         return self.checkpoint if self.checkpoint is not None else self.resume
 
     def load(self) -> Checkpoint | None:
-        """The checkpoint to resume from. Checks that no other file would be replaced by one."""
+        """Loads the checkpoint to resume, or None.
+
+        Raises WavecombError if --checkpoint would overwrite another kind of file.
+        """
         from wavecomb.run.checkpoint import check_replaceable, load_checkpoint
 
         if self.checkpoint is not None:
@@ -109,7 +112,7 @@ class PurposeOptions:
         return load_checkpoint(self.resume) if self.resume is not None else None
 
     def settings(self, spp: int | None, resumed: Checkpoint | None) -> dict[str, Any]:
-        """Settings that were asked for, and the samples a pixel, as ``spp``."""
+        """Returns the render settings of these options, with ``spp``, in samples per pixel."""
         before = resumed.settings if resumed is not None else {}
         chosen = {
             name: value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb render``."""
+"""Command ``wavecomb render``."""
 
 from __future__ import annotations
 
@@ -23,57 +23,61 @@ from wavecomb.run.learned import save_learned
 picture_options = add_options(
     option(
         "-o --output FILE.exr", "path",
-        "Picture, all layers.  [default: the productName of each render product]",
+        "Image with all layers.  [default: the productName of each render product]",
     ),
     option(
         "--output-dir DIR", "path",
-        "Without -o: the folder that the stage's pictures go to, and may not leave.  "
+        "Folder that relative productNames start from and must stay in.  "
         "[default: the working folder]",
     ),
     aov_options,
-    option("--png FILE", "path", "Picture for display, too."),
+    option("--png FILE", "path", "Also write an image for display."),
     option(
-        "--deep FILE.exr", "path", "Deep picture, too: colour and alpha by depth (docs/deep.md)."
+        "--deep FILE.exr", "path", "Also write colour and alpha by depth (docs/deep.md)."
     ),
-    option("--stats FILE.json", "path", "Statistics (docs/statistics.md).", name="stats_file"),
     option(
-        "--size W H", click.INT, "Pixels.  [default: of the render settings, else 600 600]", nargs=2
+        "--stats FILE.json", "path", "Also write statistics (docs/statistics.md).",
+        name="stats_file",
+    ),
+    option(
+        "--size W H", click.INT,
+        "Image size in pixels.  [default: of the render settings, else 600 600]", nargs=2,
     ),
     option(
         "--region X0 Y0 X1 Y1", click.INT,
-        "Pixels to render, the end excluded; others have no samples.  "
+        "Rectangle of pixels to render; X1 and Y1 are exclusive.  "
         "[default: the render settings' data window, else all]", nargs=4,
     ),
     option(
         "--spp N", click.INT,
-        "Samples per pixel; with --adaptive and --noise the most of them.  [default: 64]",
+        "Samples per pixel; the most of them with --adaptive or --noise.  [default: 64]",
     ),
     purpose_options,
     setting_options(),
     option(
         "--costs auto|measured|model|FILE.json", "text",
-        "Costs of materials. A file is read if it is there, and written at the end.  "
+        "Source of scheduling costs. A file is read if it exists, and written at the end.  "
         "[default: auto]",
     ),
     option(
         "--learn-from FILE|before", "text",
-        "With --guiding: what another render has learned, in place of learning it; before: each "
-        "of --frames starts from the one before it.",
+        "Use the guiding data of another render instead of training; before: each of --frames "
+        "uses the data of the previous frame.",
     ),
     option(
-        "--learn-to FILE.learned", "path", "Keeps what guided this render, for --learn-from."
+        "--learn-to FILE.learned", "path", "Save the guiding data of this render for --learn-from."
     ),
     option(
         "--film-memory MB", "positive",
-        "A picture that takes more is rendered and written in bands of rows.  "
+        "Memory for an image, in MB; a larger one is rendered in bands of rows.  "
         "[default: half of the machine's memory]",
     ),
-    option("--exposure EV", "number", "Of the PNG, in stops.", default=0.0),
+    option("--exposure EV", "number", "Exposure of the PNG, in stops.  [default: 0]", default=0.0),
     option(
         "--tone-map", click.Choice(["clamp", "neutral"]),
-        "Of the PNG: cut at 1, or roll highlights off.  [default: clamp]", default="clamp",
+        "Tone mapping of the PNG: clip, or roll off highlights.  [default: clamp]", default="clamp",
     ),
-    option("--quiet", "flag", "Only warnings and errors."),
+    option("--quiet", "flag", "Print only warnings and errors."),
 )  # fmt: skip
 """Image, duration and files: options of all commands that render images."""
 
@@ -100,12 +104,12 @@ picture_options = add_options(
 @TILE
 @picture_options
 def render_command(part: str | None, **options: Any) -> None:
-    """Render STAGE to an OpenEXR file, or its frames to one each.
+    """Render STAGE to an OpenEXR file, or several frames to one file each.
 
     The file has the layers beauty (R, G, B), albedo, normal, depth and samples, or those that --aov
-    asks for; error and variance where the render is adaptive; denoised with --denoise. Ctrl-C and
-    SIGTERM stop and write what is done (exit codes 130 and 143). Files are written whole or not at
-    all. docs/render.md and docs/aovs.md say more.
+    selects. Adaptive renders add error and variance, --denoise adds denoised. Ctrl-C and SIGTERM
+    stop the render and write the samples so far (exit codes 130 and 143). Files are never written
+    partially. See docs/render.md and docs/aovs.md.
     """
     chosen_tile = None if part is None else check_tile(part, options)
     asked = Asked.take(options)
@@ -122,7 +126,7 @@ def render_command(part: str | None, **options: Any) -> None:
     if chosen_tile is not None:
         files = render_tile(prepared, asked, chosen_tile)
         if not asked.quiet:
-            click.echo(f"wrote {', '.join(files)}" if files else "all images are there")
+            click.echo(f"wrote {', '.join(files)}" if files else "all images exist")
         return
     jobs, source, resumed, reporter = (
         prepared.jobs, prepared.source, prepared.resumed, prepared.reporter,
@@ -145,7 +149,7 @@ def render_command(part: str | None, **options: Any) -> None:
             shot = plan.shot(shared, source.frame, job.settings)
         opened = None
         done = job.run(shot, here, purpose, plan.names, resumed)
-        del shot  # the scene: nothing needs it while files are written
+        del shot  # frees the scene, which writing files does not need
         if done.stopped is not None and not done.samples:
             click.echo("stopped before the first sample; nothing was written", err=True)
             raise click.exceptions.Exit(128 + done.stopped)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How ``wavecomb render`` shows what it does and what came of it: a bar, JSON lines, nothing."""
+"""Progress and results of ``wavecomb render``, as a bar, as lines of JSON or not at all."""
 
 from __future__ import annotations
 
@@ -28,59 +28,59 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadReport
 
 TIMES = ("load", "build", "render")
-"""Seconds that are said of a frame."""
+"""Timings of a frame that are printed, by name in the statistics."""
 
 
 class Reporter:
-    """Says nothing, but for warnings and errors."""
+    """Base class of reporters. Prints nothing; warnings and errors do not pass through it."""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
-        """Shows that the stage is being read; gives what to tell of it."""
+        """Shows that the stage is loading; yields a callback for its progress, or None."""
         return contextlib.nullcontext()
 
     def begins(self, frame: str, number: int, count: int) -> None:
-        """A frame of a sequence begins, the number-th of so many."""
+        """Reports the start of a frame of a sequence, number ``number`` of ``count``."""
 
     def ended(self, done: Done, files: Sequence[str]) -> None:
-        """A frame of a sequence is written."""
+        """Reports that a frame of a sequence is written."""
 
     def said(self, line: str) -> None:
-        """Something about a sequence."""
+        """Reports a remark about a sequence."""
 
     def rendering(self) -> Silent:
-        """What shows the progress of the render, as a context manager."""
+        """Returns the progress display of the render, a context manager."""
         return Silent()
 
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
-        """All files are written."""
+        """Reports that all files are written."""
 
 
 class Summary(Reporter):
-    """A summary at the end; before it a bar, where there is a console."""
+    """Reporter that shows a progress bar on a console and prints a summary at the end."""
 
     def __init__(self, console: Console | None) -> None:
         self._console = console
         self._frame = self._place = ""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
-        """The name of the file, and a bar where there is much to read."""
+        """Shows the file name, with a bar for large stages."""
         if self._console is None:
             return super().loading(stage)
         return loading_bar(self._console, f"{self._place}loading {os.path.basename(stage)}")
 
     def rendering(self) -> Silent:
-        """The bar."""
+        """Returns the progress bar."""
         if self._console is None:
             return Silent()
         return ProgressBar(self._console, f"{self._place}rendering")
 
     def begins(self, frame: str, number: int, count: int) -> None:
-        """Makes bars name the frame."""
+        """Makes progress bars name the frame."""
         self._frame = f"frame {frame} ({number} of {count})"
         self._place = f"{self._frame}: "
 
     def ended(self, done: Done, files: Sequence[str]) -> None:
-        """A line."""
+        """Prints a line with timings and files of a frame."""
         from wavecomb.run.progress import time_text
 
         seconds = done.stats["seconds"]
@@ -88,11 +88,11 @@ class Summary(Reporter):
         click.echo(f"{self._frame}: {times}; wrote {', '.join(files)}")
 
     def said(self, line: str) -> None:
-        """The line."""
+        """Prints the line."""
         click.echo(line)
 
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
-        """The summary; of a sequence, that of its last frame."""
+        """Prints the summary. For a sequence, its figures are those of the last frame."""
         if self._frame:
             click.echo(f"{self._frame}:")
             files = [f"{len(files)} files"]
@@ -100,26 +100,29 @@ class Summary(Reporter):
 
 
 class Lines(Reporter):
-    """Lines of JSON on stdout."""
+    """Reporter that prints lines of JSON on standard output."""
 
     def __init__(self) -> None:
         self._lines = ProgressLines(click.echo)
 
     def rendering(self) -> Silent:
-        """A line about once a second."""
+        """Returns a progress display that prints a line about once a second."""
         return self._lines
 
     def begins(self, frame: str, number: int, count: int) -> None:
-        """A line {"event": "frame", ...}."""
+        """Prints a line {"event": "frame", ...}."""
         self._lines.event("frame", frame=float(frame), number=number, count=count)
 
     def ended(self, done: Done, files: Sequence[str]) -> None:
-        """A line {"event": "wrote", ...} for each file."""
+        """Prints a line {"event": "wrote", ...} for each file."""
         for name in files:
             self._lines.wrote(name)
 
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
-        """A line {"event": "done", ...}; the figures of a sequence are those of its last frame."""
+        """Prints a line {"event": "done", ...}.
+
+        For a sequence, its figures are those of the last frame.
+        """
         stats = done.stats
         self._lines.event(
             "done",
@@ -132,7 +135,7 @@ class Lines(Reporter):
 
 
 def make_reporter(progress: str | None, quiet: bool) -> Reporter:
-    """What ``--progress`` and ``--quiet`` ask for."""
+    """Returns the reporter for ``--progress`` and ``--quiet``."""
     if progress == "json":
         return Lines()
     if quiet:
@@ -142,15 +145,15 @@ def make_reporter(progress: str | None, quiet: bool) -> Reporter:
 
 @dataclass(frozen=True)
 class Done:
-    """What came of a render.
+    """Result of a render.
 
     Attributes:
-        stats: As ``make_stats`` gives them.
-        costs: A profile for other renders.
-        report: What to say of the stage.
-        stopped: Number of the signal that stopped it; None: it went to its end.
-        picture: To be written; None: it was written band by band.
-        files: Those that were written so.
+        stats: Statistics from ``make_stats``.
+        costs: Cost profile for later renders.
+        report: Loading report of the stage.
+        stopped: Number of the signal that stopped the render; None if it ran to its end.
+        picture: Image to write; None if it was written band by band.
+        files: Files that were written band by band.
     """
 
     stats: dict[str, Any]
@@ -162,5 +165,5 @@ class Done:
 
     @property
     def samples(self) -> int:
-        """All, with those of a checkpoint."""
+        """Number of samples, including those of the resumed checkpoint."""
         return int(self.stats["counts"]["samples"] + self.stats["resumed_samples"])

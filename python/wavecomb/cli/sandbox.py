@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a command is going to write, said before anything is read."""
+"""Entering the sandbox of a command, with the files that the command will write."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from collections.abc import Iterable
 from wavecomb.run.frame_names import fill, has_place, parse_frames
 
 MOST_NAMES = 100_000
-"""Beyond that the folder of a sequence is allowed, not each name."""
+"""Largest number of file names given to the sandbox. Longer sequences allow their folder
+instead."""
 
 
 def enter_to_render(
@@ -22,16 +23,16 @@ def enter_to_render(
     split: bool,
     gpu: bool,
 ) -> None:
-    """Puts ``wavecomb render`` into the sandbox.
+    """Restarts ``wavecomb render`` in the sandbox.
 
     Args:
-        names: Files that are written, with places for the frame.
-        output: The picture among them; None: the stage says.
-        folder: Where pictures go that the stage names; None: the working folder.
-        frames: As ``--frames`` takes them.
-        frame: The frame of a single image; None: the stage says.
-        split: Whether there is a picture for each layer.
-        gpu: Whether denoising may use devices.
+        names: Files to write, with placeholders for the frame.
+        output: The image among them; None if the stage names it.
+        folder: Folder of images that the stage names; None means the working folder.
+        frames: Text of ``--frames``.
+        frame: Frame of a single image; None if the stage decides.
+        split: Whether each layer gets a separate file.
+        gpu: Whether denoising may use GPU devices.
     """
     from wavecomb.run.isolate.outputs import Outputs
     from wavecomb.run.isolate.supervisor import enter
@@ -45,7 +46,7 @@ def enter_to_render(
         trees = [(os.path.dirname(os.path.abspath(n)), os.path.splitext(n)[1]) for n in given]
         filled = []
     elif numbers:
-        # That a name with a place for the frame could be written is checked as it is.
+        # The unfilled names stay in the list: a later check tests whether they can be written.
         filled = [*given, *(fill(name, frame) for name in given for frame in numbers)]
     else:
         filled = given
@@ -61,11 +62,11 @@ def enter_to_render(
 
 
 def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:
-    """Puts a command into the sandbox whose files are all known.
+    """Restarts a command in the sandbox whose output files are all known.
 
     Args:
-        outputs: That it writes.
-        split: One of these, of which there may be one for each layer.
+        outputs: Files to write.
+        split: One of these that may become a file for each layer.
     """
     from wavecomb.run.isolate.outputs import Outputs
     from wavecomb.run.isolate.supervisor import enter

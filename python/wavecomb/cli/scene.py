@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb scene``."""
+"""Command ``wavecomb scene``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wavecomb.cli.setting_options import Real, add_options, option
 
 
 def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """For the shell: the scenes whose names begin so."""
+    """Returns the scene names that begin with ``begun``, for shell completion."""
     from wavecomb.scenes import SCENES
 
     return [name for name in SCENES if name.startswith(begun)]
@@ -36,34 +36,35 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 )
 @click.argument("name", required=False, shell_complete=_names)
 @add_options(
-    option("-o --output FILE", "path", ".usda, .usdc or .usd."),
+    option("-o --output FILE", "path", "Stage to write: .usda, .usdc or .usd."),
     option("--list", "flag", "List the scenes.", name="list_"),
-    option("--dragon FILE", "path", "OBJ, PLY or USD mesh to use."),
-    option("--triangles N", "count", "Of our own dragon, or of the field."),
-    option("--seed N", click.IntRange(min=0), "Of layout and patterns."),
-    option("--texture-size N", click.IntRange(min=16), "Largest, texels."),
-    option("--aspect X", "positive", "Width / height."),
+    option("--dragon FILE", "path", "OBJ, PLY or USD mesh that replaces the built-in dragon."),
+    option("--triangles N", "count", "Triangles of the built-in dragon, or of the stone field."),
+    option("--seed N", click.IntRange(min=0), "Random seed of layout and patterns."),
+    option("--texture-size N", click.IntRange(min=16), "Largest texture size, in texels."),
+    option("--aspect X", "positive", "Aspect ratio of the camera, width / height."),
     option("--material NAME", "text", "cornell-dragon: gold, copper, glass, jade."),
-    option("--materials N", "count", "spread, heavy: how many."),
+    option("--materials N", "count", "spread, heavy: number of materials."),
     option("--programs N", click.IntRange(1, 5), "spread: kinds of materials, 1 to 5."),
-    option("--lights N", "count", "lights: how many."),
-    option("--lamps", "flag", "mixed, dragon: a key, a fill and a dim dome."),
-    option("--strands N", "count", "fur, head: how many."),
-    option("--splats N", "count", "splats: how many."),
-    option("--capture FILE", "path", "splats: a PLY of 3D Gaussian splats instead."),
-    option("--capture-linear", "flag", "Colours of the capture are linear light, not sRGB."),
-    option("--voxels N", click.IntRange(min=16), "smoke, clouds: along the longest edge."),
-    option("--texture-mb X", Real(0), "spread, heavy: memory of textures."),
+    option("--lights N", "count", "lights: number of lights."),
+    option("--lamps", "flag", "mixed, dragon: light with a key, a fill and a dim dome."),
+    option("--strands N", "count", "fur, head: number of strands."),
+    option("--splats N", "count", "splats: number of Gaussian splats."),
+    option("--capture FILE", "path", "splats: use a PLY file of 3D Gaussian splats instead."),
+    option("--capture-linear", "flag", "Read colours of the capture as linear light, not as sRGB."),
+    option("--voxels N", click.IntRange(min=16), "smoke, clouds: voxels along the longest edge."),
+    option("--texture-mb X", Real(0), "spread, heavy: memory of all textures, in MB."),
     option(
-        "--shader-cost X", Real(1), "spread: octaves of noise on the dearest material; 1: none."
+        "--shader-cost X", Real(1),
+        "spread: octaves of noise on the most expensive material; 1 means none.",
     ),
     option(
         "--plain", "flag",
-        "UsdPreviewSurface as others export it: no program, metallic workflow. Not of heavy.",
+        "Export UsdPreviewSurface with the metallic workflow only. Not for heavy.",
     ),
 )  # fmt: skip
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:
-    """Write one of our own test stages, and its textures and grids beside it."""
+    """Write a procedural test stage, with its textures and volumes beside it."""
     from wavecomb.errors import WavecombError
     from wavecomb.scenes import SCENES, write_scene
 

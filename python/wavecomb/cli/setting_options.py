@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands: one for each setting of a render, and others from one line each."""
+"""Options of commands: one for each render setting, and a short way to declare others."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ ASKED_FOR_ELSEWHERE = (
     *("width", "height", "spp", "min_spp", "adaptive", "noise", "time_limit", "error"),
     *("progressive", "costs"),
 )
-"""Settings whose options say more than the setting: --size, --adaptive, --costs FILE ..."""
+"""Settings that have a hand-written option with more features, such as --size or --costs FILE."""
 
 _METAVARS = {"integer": "N", "number": "X", "text": "TEXT"}
 
 
 class SettingCommand(click.Command):
-    """A command with ``setting_options``. The core is loaded when its options are needed."""
+    """Command with ``setting_options``. Loads the core only when its options are needed."""
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Its parameters; the settings where ``setting_options`` stands."""
+        """Returns the parameters, with the settings at the position of ``setting_options``."""
         params: list[click.Parameter] = []
         for one in super().get_params(ctx):
             params += one.options() if isinstance(one, _Settings) else [one]
@@ -34,7 +34,7 @@ class SettingCommand(click.Command):
 
 
 class _Settings(click.Option):
-    """Where the options of settings come."""
+    """Placeholder for the options of settings in a command's list of parameters."""
 
     def __init__(self, only: Iterable[str] | None) -> None:
         super().__init__(["--settings"], hidden=True)
@@ -42,7 +42,7 @@ class _Settings(click.Option):
         self._options: list[click.Parameter] | None = None
 
     def options(self) -> list[click.Parameter]:
-        """One for each setting."""
+        """Returns one option for each setting."""
         if self._options is None:
             rows = settings()
             names = self._only
@@ -53,9 +53,9 @@ class _Settings(click.Option):
 
 
 def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
-    """An option for each setting, by default of all that no other option stands for.
+    """Adds an option for each setting in ``only``, by default all without a hand-written option.
 
-    For a ``SettingCommand``. Where an option is not given, its value is None.
+    For a ``SettingCommand``. The value of an option that is not given is None.
     """
 
     def decorate(command: F) -> F:
@@ -66,8 +66,9 @@ def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
 
 
 def _option(row: Setting) -> click.Option:
-    """The option of a setting."""
-    # The core says what is out of range; only signs are told here.
+    """Returns the option of a setting."""
+    # The core checks ranges. The command line only rejects negative numbers, and 0 if it is
+    # invalid.
     return row_option(
         [row.option, row.name],
         _Steps(row, _offered(row)) if row.steps else row.kind,
@@ -81,14 +82,14 @@ def _option(row: Setting) -> click.Option:
 
 
 def _offered(row: Setting) -> Iterable[float]:
-    """The steps of a setting that this build has."""
+    """Returns the steps of a setting that this build supports."""
     from wavecomb import _core
 
     return _core.lane_widths() if row.name == "lanes" else row.steps
 
 
 class _Steps(click.Choice):
-    """The few numbers of a setting, of which help shows those in ``offered``; a word for 0."""
+    """Choice of a few numbers, or a word for 0. Help shows only the numbers in ``offered``."""
 
     def __init__(self, row: Setting, offered: Iterable[float]) -> None:
         super().__init__([row.zero, *(f"{step:g}" for step in row.steps)])
@@ -96,11 +97,11 @@ class _Steps(click.Choice):
         self._offered = [row.zero, *(f"{step:g}" for step in offered)]
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """The choices that help shows: those that this build has."""
+        """Returns the choices that help shows, which are those this build supports."""
         return f"[{'|'.join(self._offered)}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Text to the number."""
+        """Converts text to a number."""
         if isinstance(value, int):
             return value
         text = super().convert(value, param, ctx)
@@ -108,7 +109,7 @@ class _Steps(click.Choice):
 
 
 class Real(click.ParamType):
-    """A finite number, perhaps with a lower bound."""
+    """A finite number, optionally with a lower bound."""
 
     name = "number"
 
@@ -119,7 +120,7 @@ class Real(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Text to a float; fails with what it must be."""
+        """Converts text to a float. Fails with a message that states the bound."""
         try:
             number = float(value)
         except ValueError:
@@ -149,20 +150,22 @@ def row_option(
     metavar: str | None = None,
     many: bool = False,
 ) -> click.Option:
-    """The option of a row; its value is None where it is not given, or () of ``many``.
+    """Returns the option of a table row.
+
+    Its value is None, or () with ``many``, if it is not given.
 
     Args:
         names: "--option", and the name of the argument.
         kind: "flag", "text", "file", "number", "integer", "pair" (of numbers), "choice" or "switch"
-            (on or off); or a type.
-        text: What it is.
-        default: What holds where it is not given, for people.
-        choices: Of a choice.
+            (on or off); or a type of click.
+        text: Help text.
+        default: Description of the default, for help.
+        choices: Values of a "choice".
         least: Smallest number.
         most: Largest integer.
-        above: Whether ``least`` itself is too little.
-        metavar: Of its value.
-        many: May be given again.
+        above: Whether ``least`` itself is excluded.
+        metavar: Placeholder of the value in help.
+        many: Whether the option may be repeated.
     """
     if default:
         text = f"{text}  [default: {default}]"
@@ -198,14 +201,14 @@ _TYPES: dict[str, Any] = {
 
 
 def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> Callable[[F], F]:
-    """Makes an option of a command.
+    """Returns a decorator that adds an option to a command.
 
     Args:
-        usage: Names and metavar as help shows them: "-o --output FILE.exr".
-        kind: A type, or one of "count" (a positive integer), "flag", "path", "positive" (a
+        usage: Names and metavar as help shows them, such as "-o --output FILE.exr".
+        kind: A type of click, or one of "count" (a positive integer), "flag", "path", "positive" (a
             positive number), "number", "text".
-        text: Help.
-        more: Further arguments of ``click.option``; ``name`` is that of the argument.
+        text: Help text.
+        more: Further arguments of ``click.option``; ``name`` is the name of the argument.
     """
     words = usage.split()
     names = [word for word in words if word.startswith("-")]
@@ -219,7 +222,7 @@ def option(usage: str, kind: str | click.ParamType, text: str, **more: Any) -> C
 
 
 def add_options(*options: Callable[[F], F]) -> Callable[[F], F]:
-    """Makes a decorator that adds options to a command, in the order of help."""
+    """Returns a decorator that adds options to a command, in the order of the help."""
 
     def add(command: F) -> F:
         for one in reversed(options):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb sheet``."""
+"""Command ``wavecomb sheet``."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from wavecomb.cli.setting_options import Real
 @click.argument("pictures", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o", "--output", required=True, type=click.Path(), metavar="FILE",
-    help=".png: a contact sheet; .html: a page that plays them.",
+    help="Contact sheet (.png), or page that plays the images (.html).",
 )  # fmt: skip
-@click.option("--layer", default="", metavar="NAME", help="Of EXR files.  [default: denoised "
-              "where it is there, else beauty]")  # fmt: skip
+@click.option("--layer", default="", metavar="NAME", help="Layer of EXR files.  [default: denoised "
+              "if present, else beauty]")  # fmt: skip
 @click.option(
     "--width", type=click.IntRange(16, 8192), metavar="PX",
-    help="Of each picture at most.  [default: 240; .html: 960]",
+    help="Largest width of each image, in pixels.  [default: 240; .html: 960]",
 )  # fmt: skip
 @click.option("--columns", type=click.IntRange(1), metavar="N",
-              help="Of the contact sheet.  [default: as many as make it wide]")  # fmt: skip
+              help="Columns of the contact sheet.  [default: a landscape layout]")  # fmt: skip
 @click.option("--fps", type=Real(0, above=True), default=24.0, metavar="X",
-              help="Frames a second of the page.  [default: 24]")  # fmt: skip
-@click.option("--title", metavar="TEXT", help="Of the page.  [default: the first name]")
-@click.option("--lossless", is_flag=True, help="Pictures of the page as PNG, not as JPEG.")
-@click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="In stops, of light.")
+              help="Frames per second of the page.  [default: 24]")  # fmt: skip
+@click.option("--title", metavar="TEXT", help="Title of the page.  [default: the first name]")
+@click.option("--lossless", is_flag=True, help="Embed images of the page as PNG, not as JPEG.")
+@click.option("--exposure", type=Real(), default=0.0, metavar="EV", help="Exposure of HDR images.")
 @click.option(
     "--tone-map", type=click.Choice(["clamp", "neutral"]), default="clamp",
-    help="Of light: cut at 1, or roll highlights off.  [default: clamp]",
+    help="Tone mapping of HDR images: clip at 1, or roll off highlights.  [default: clamp]",
 )  # fmt: skip
 @isolate_option
 def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> None:
-    """Put PICTURES side by side: files, folders, or names with a place for the frame.
+    """Show PICTURES side by side: files, folders, or names with a placeholder for the frame.
 
-    A page (.html) has all pictures in itself and plays them; it needs no other file.
+    A page (.html) embeds all images and plays them; it needs no other file.
     """
     enter_to_read((output,))
     from wavecomb.errors import WavecombError
@@ -69,7 +69,7 @@ def sheet_command(pictures: tuple[str, ...], output: str, **options: Any) -> Non
     else:
         title = options["title"] or os.path.basename(os.path.normpath(pictures[0]))
         _write_page(found, output, look, title, options)
-    click.echo(f"{len(found)} pictures; wrote {output}")
+    click.echo(f"{len(found)} images; wrote {output}")
 
 
 def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[str, Any]) -> None:
@@ -78,7 +78,7 @@ def _write_sheet(found: dict[str, str], output: str, look: Any, options: dict[st
     from wavecomb.picture.thumbnails import MOST, contact_sheet
 
     if len(found) > MOST:
-        raise WavecombError(f"{len(found)} pictures: a sheet has {MOST} at most")
+        raise WavecombError(f"{len(found)} images: a sheet holds at most {MOST}")
     columns, width = options["columns"] or 0, options["width"] or 240
     write_png_codes(output, contact_sheet(found, look, width=width, columns=columns))
 
@@ -91,7 +91,7 @@ def _write_page(
     from wavecomb.picture.pages import MOST_FRAMES, sequence_page
 
     if len(found) > MOST_FRAMES:
-        raise WavecombError(f"{len(found)} pictures: a page has {MOST_FRAMES} at most")
+        raise WavecombError(f"{len(found)} images: a page holds at most {MOST_FRAMES}")
     text = sequence_page(
         found, look, title=title, fps=options["fps"], width=options["width"] or 960,
         kind="png" if options["lossless"] else "jpeg",

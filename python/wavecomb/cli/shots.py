@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where ``wavecomb render`` has a scene from: a stage at one frame, or one that stays open."""
+"""Sources of scenes for ``wavecomb render``: a stage at one frame, or a stage that stays open."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ if TYPE_CHECKING:
 
 
 class Shot(Protocol):
-    """Where a scene comes from, and what renders it."""
+    """Source of a scene, with the methods that render it."""
 
     def load(
         self, progress: Callable[[int, int], None] | None = None, **changes: Any
     ) -> LoadedStage:
-        """Reads the stage; ``changes``: fields of ``LoadOptions`` in place of its own."""
+        """Loads the stage. ``changes`` are fields of ``LoadOptions`` that override the options."""
 
     def render(self, *arguments: Any, **named: Any) -> Any:
-        """Renders it; the arguments are those of ``_core.render`` after the scene."""
+        """Renders the scene. Takes the arguments of ``_core.render`` after the scene."""
 
     def render_part(self, *arguments: Any, **named: Any) -> Any:
-        """The same for one of several parts of a picture."""
+        """Renders one of several bands of an image, with the arguments of ``render``."""
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """``make_stats`` of that."""
+        """Returns ``make_stats`` for a result, after ``resumed_s`` seconds of an earlier render."""
 
 
 class Still:
     """A stage at one frame."""
 
     def __init__(self, source: StageOptions, stage: str, settings: Any, kept: Any = None) -> None:
-        """``kept``: held until the stage is loaded."""
+        """Creates the source. Holds ``kept`` until the stage is loaded."""
         self._renderer: Any = None
         self._kept = kept
         self._source = source
@@ -46,7 +46,7 @@ class Still:
     def load(
         self, progress: Callable[[int, int], None] | None = None, **changes: Any
     ) -> LoadedStage:
-        """Reads the stage."""
+        """Loads the stage."""
         chosen = self._settings
         size = chosen.width, chosen.height
         self._loaded = self._source.load(self._stage, chosen.threads, size, progress, **changes)
@@ -55,14 +55,14 @@ class Still:
         return self._loaded
 
     def render(self, *arguments: Any, **named: Any) -> Any:
-        """Renders it, and frees what only that needed."""
+        """Renders the scene, and frees the renderer's data afterwards."""
         from wavecomb import _core
 
         assert self._loaded is not None
         return _core.render(self._loaded.scene, *arguments, **named)
 
     def render_part(self, settings: Any, *arguments: Any, **named: Any) -> Any:
-        """Renders a part of it, and keeps what the next one needs, too."""
+        """Renders a band of the image, and keeps the renderer for the next one."""
         from wavecomb import _core
 
         assert self._loaded is not None
@@ -71,7 +71,7 @@ class Still:
         return self._renderer.render(settings, *arguments, **named)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Those of the picture."""
+        """Returns the statistics of the image."""
         from wavecomb.run.stats import make_stats
 
         return make_stats(result, stage=self._stage, loaded=self._loaded, resumed_s=resumed_s)
@@ -81,7 +81,7 @@ class FrameShot:
     """One frame of a stage that stays open."""
 
     def __init__(self, frames: Frames, frame: float | None, **options: Any) -> None:
-        """``options``: of ``Frames.load``."""
+        """Creates the source. ``options`` are arguments of ``Frames.load``."""
         self._frames = frames
         self._frame = frame
         self._options = options
@@ -89,15 +89,15 @@ class FrameShot:
     def load(
         self, progress: Callable[[int, int], None] | None = None, **changes: Any
     ) -> LoadedStage:
-        """Reads what is other in this frame."""
+        """Loads what changed since the previous frame."""
         return self._frames.load(self._frame, progress=progress, **self._options, **changes)
 
     def render(self, *arguments: Any, **named: Any) -> Any:
-        """Renders it."""
+        """Renders the scene."""
         return self._frames.render(*arguments, **named)
 
     render_part = render
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Those of the picture."""
+        """Returns the statistics of the image."""
         return self._frames.stats(result, resumed_s=resumed_s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ``wavecomb render`` says at the end."""
+"""Summary that ``wavecomb render`` prints at the end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadReport
 
 MOST_MATERIALS = 6
-"""Rows of the table of materials; the statistics file has all."""
+"""Rows of the table of materials. The statistics file has all materials."""
 
 MOST_DEPTHS = 8
 MOST_LIGHTS = 5
@@ -45,7 +45,7 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
     _phases(console, stats)
     _programs_and_materials(console, stats)
     if report.unsupported:
-        console.print("not supported, and left out:")
+        console.print("not supported, left out:")
         for finding in report.unsupported:
             console.print(f"  {escape(finding.line())}")
     for finding in report.notes:
@@ -54,7 +54,7 @@ def print_summary(stats: Mapping[str, Any], report: LoadReport, files: Sequence[
 
 
 def _memory(parts: Mapping[str, int]) -> str:
-    """What the peak holds: arrays of the render, and Embree's hierarchy."""
+    """Returns the sizes of the render's arrays and of Embree's BVH, in MB, or ""."""
     arrays = sum(parts.values()) - parts["accelerator"]
     if not arrays:
         return ""
@@ -62,7 +62,7 @@ def _memory(parts: Mapping[str, int]) -> str:
 
 
 def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
-    """Lines about adaptive, timed and resumed renders."""
+    """Returns lines about adaptive, timed, resumed and guided renders."""
     from wavecomb.run.progress import count_text, time_text
     from wavecomb.run.stats import rendered_pixels
 
@@ -75,26 +75,26 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
         )
     if allotted := stats.get("allotment"):
         line = (
-            f"samples by {settings['allocate']}: {allotted['least']} to {allotted['most']} a pixel "
-            f"after {allotted['pilot']} of each"
+            f"samples by {settings['allocate']}: {allotted['least']} to {allotted['most']} per "
+            f"pixel after {allotted['pilot']} in each"
         )
         if allotted["gain"] is not None:
-            line += f"; expected efficiency {allotted['gain']:.2f} of even"
+            line += f"; expected efficiency {allotted['gain']:.2f} times the even one"
         lines.append(line)
     if learned := stats.get("guiding"):
         took = "before" if learned["kept"] else f"in {time_text(learned['seconds'])}"
         line = f"learned from {count_text(learned['paths'])} paths {took}"
         if learned["gain"]:
-            line += f", expected efficiency {learned['gain']:.2f} of without"
+            line += f", expected efficiency {learned['gain']:.2f} times the unguided one"
         if not learned["used"]:
             line += "; not used"
         elif learned["guided_share"] > 0:
             line += f"; {_percent(learned['guided_share'])} of bounced light is guided"
         if learned["used"] and settings["roulette"] in ("auto", "efficient"):
-            line += f"; {_percent(learned['survival'])} of bounces go on"
+            line += f"; {_percent(learned['survival'])} of paths continue after a bounce"
         lines.append(line)
     elif settings.get("guiding") == "auto":
-        lines.append("not guided: too few samples to find out whether that pays")
+        lines.append("not guided: too few samples to predict the gain")
     if transport := stats.get("transport"):
         lines.append(_transport_line(transport))
     if aiming := stats.get("light_aiming"):
@@ -113,22 +113,24 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
 
 
 def _transport_line(chosen: Mapping[str, Any]) -> str:
-    """What ``--transport auto`` chose, and why."""
+    """Returns a line with the choice of ``--transport auto`` and its reason."""
     line = f"transport {chosen['chosen']}"
     if chosen["chosen"] == "light":
         line += f", {chosen['light_paths']:g} light paths for each camera path"
     line += f": {chosen['why']}"
     if chosen["gain"] is not None:
-        line += f" in {chosen['seconds']:.2f} s, light paths promise "
+        line += f" in {chosen['seconds']:.2f} s, light paths are predicted to have "
         line += f"{chosen['gain']:.2f} times the efficiency"
     return line
 
 
 def _aiming_line(aiming: Mapping[str, Any]) -> str:
-    """Where paths from lights went."""
+    """Returns a line about the targets of light paths."""
     from wavecomb.run.progress import count_text, time_text
 
-    found = f"{aiming['targets']} places" if aiming["targets"] else "nothing, which brought light"
+    found = (
+        f"{aiming['targets']} places" if aiming["targets"] else "nothing, since none contributed"
+    )
     return (
         f"light paths aim at {found}: learned from {count_text(aiming['paths'])} paths "
         f"in {time_text(aiming['seconds'])}"
@@ -136,7 +138,7 @@ def _aiming_line(aiming: Mapping[str, Any]) -> str:
 
 
 def light_line(calibration: Mapping[str, Any]) -> str | None:
-    """The lights that are chosen most often, by ``light_calibration`` of the statistics."""
+    """Returns a line with the most frequently sampled lights, from ``light_calibration``."""
     from wavecomb.run.progress import count_text
 
     if not calibration["paths"]:
@@ -163,14 +165,14 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
             ways = counts["rays"] + counts["shadow_rays"]
             steps = counts["volume_steps"]
             lines.append(
-                f"volumes: {steps / ways:.3g} steps a ray, "
+                f"volumes: {steps / ways:.3g} steps per ray, "
                 f"{_percent(counts['volume_collisions'] / steps)} of them collisions, "
                 f"lanes {_percent(steps / counts['volume_lanes'])} full"
             )
         if counts.get("walks"):
             steps = counts["walk_steps"]
             lines.append(
-                f"below surfaces: {steps / counts['walks']:.3g} collisions a walk, "
+                f"subsurface: {steps / counts['walks']:.3g} collisions per random walk, "
                 f"lanes {_percent(steps / counts['walk_lanes'])} full"
             )
         lines.append(
@@ -248,7 +250,7 @@ def _programs_and_materials(console: Console, stats: Mapping[str, Any]) -> None:
 
 
 def _table(console: Console, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A plain table, numbers to the right; nothing where there are no rows."""
+    """Prints a plain table with right-aligned numbers, or nothing if there are no rows."""
     from rich.markup import escape
     from rich.table import Table
 

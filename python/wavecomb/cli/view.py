@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb view``."""
+"""Command ``wavecomb view``."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from wavecomb.cli.setting_options import SettingCommand, setting_options
     type=int,
     default=(960, 540),
     metavar="W H",
-    help="Pixels.  [default: 960 540]",
+    help="Image size in pixels.  [default: 960 540]",
 )
 @click.option("--spp", type=int, metavar="N", help="Samples per pixel.  [default: 64]")
 @setting_options(("max_depth", "seed", "threads", "policy", "ray_order", "roulette"))
-@click.option("--denoise", is_flag=True, help="Show the picture without its noise.")
+@click.option("--denoise", is_flag=True, help="Denoise the image.")
 def view_command(stage: str | None, size: tuple[int, int], denoise: bool, **options: Any) -> None:
-    """Open a window on STAGE: look, steer and compare.
+    """Open STAGE in a window to navigate, edit and compare.
 
-    Without STAGE the window opens empty. docs/window.md says more.
+    Without STAGE the window opens empty. See docs/window.md.
     """
     from wavecomb.errors import WavecombError
     from wavecomb.extras import needed

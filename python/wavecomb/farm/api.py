@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs from Python."""
+"""Python functions that submit, run and assemble farm jobs."""
 
 from __future__ import annotations
 
@@ -38,30 +38,30 @@ def submit(
     hang_s: float = 1800.0,
     **options: Any,
 ) -> Folder:
-    """Writes the folder of a job, which ``run`` or `wavecomb farm resume` renders.
+    """Creates the folder of a job, which ``run`` or `wavecomb farm resume` renders.
 
     Args:
-        stage: A file.
-        output: The image's file, for frames with a place for them: shot.####.exr.
-        frames: As of ``render_frames``; None means: one image.
+        stage: File of the stage.
+        output: File of the image. For several frames, with a placeholder such as shot.####.exr.
+        frames: Frames, as in ``render_frames``; None renders a single image.
         tiles: "auto", or columns and rows such as "4x3".
-        job: The folder; None means: beside the output.
-        workers: How many are expected; 0 means: nobody knows.
-        size: As of ``render``.
-        spp: As of ``render``.
-        aovs: As of ``render``.
-        png: A PNG for display.
-        stats: Statistics as JSON.
+        job: Folder to create; None puts it beside the output.
+        workers: Expected number of workers; 0 means unknown.
+        size: As in ``render``.
+        spp: As in ``render``.
+        aovs: As in ``render``.
+        png: File of a PNG for display.
+        stats: File of the statistics, as JSON.
         denoise: Whether images get the layer ``denoised``.
         file: half, compression, tile and split of ``Picture.save``.
         strict: Whether a missing file is an error.
-        maps: "FROM=TO": folders that lie elsewhere for workers that do not have them.
-        tries: How often a task is tried.
-        hang_s: A worker without progress for so many seconds is restarted.
+        maps: "FROM=TO": workers without the folder FROM look for its files in TO.
+        tries: Number of attempts for each task.
+        hang_s: Time in seconds without progress after which a worker is restarted.
         **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
 
     Raises:
-        WavecombError: An option is invalid, or a farm cannot render it.
+        WavecombError: An option is invalid, or a farm cannot render the stage with it.
     """
     from wavecomb.api import _asked_for
     from wavecomb.run import aovs as aov_names
@@ -76,7 +76,7 @@ def submit(
     loading, settings = split(options, without=("size", "threads"))
     frame = loading.pop("frame", None)
     if frame is not None and frames is not None:
-        raise WavecombError("frame is one frame and frames are several; give one of them")
+        raise WavecombError("frame and frames exclude each other; give one of them")
     size, aovs = _asked_for(stage, size, aovs, settings, loading)
     policy, costs = settings.pop("policy", None), settings.pop("costs", None)
     guides = aov_names.GUIDES if denoise else ()
@@ -85,7 +85,7 @@ def submit(
         aov_names.with_others(tuple(aovs or aov_names.DEFAULT), guides), settings,
     )  # fmt: skip
     if own is not None:
-        raise WavecombError("policy: a farm takes the name of one, not an object of this process")
+        raise WavecombError("policy: a farm needs a name, not an object of this process")
     LoadOptions.of(None, loading).check()
     kept = names if not denoise else aov_names.expand(tuple(aovs or aov_names.DEFAULT))
     done = Job(
@@ -107,21 +107,21 @@ def run(
     threads: int = 0,
     progress: Callable[[], bool | None] = lambda: None,
 ) -> list[Path]:
-    """Renders what is missing of a job.
+    """Renders the missing tiles and images of a job.
 
     Args:
-        job: Of ``submit``, or a folder.
-        workers: How many processes of this machine.
-        on: What `--on` says, in place of ``workers``: "dask:tls://HOST:8786".
-        threads: Of each process; 0 means: as the job says, else its share of the cores.
-        progress: Called now and then; True means: stop.
+        job: Result of ``submit``, or the job's folder.
+        workers: Number of worker processes on this machine.
+        on: Cluster to use instead of ``workers``, as for `--on`, such as "dask:tls://HOST:8786".
+        threads: Threads of each process; 0 uses the job's value, else an equal share of the cores.
+        progress: Called regularly; stops the run if it returns True.
 
     Returns:
-        The images' files.
+        Files of the images.
 
     Raises:
-        WavecombError: Tasks failed; the others are done.
-        KeyboardInterrupt: ``progress`` stopped it; what was done is kept.
+        WavecombError: Some tasks failed. All other tasks are done.
+        KeyboardInterrupt: ``progress`` stopped the run. Finished tiles are kept.
     """
     from wavecomb.farm.client import run as run_job
     from wavecomb.farm.clusters import parse_where
@@ -145,12 +145,12 @@ def run(
 
 
 def render_task(folder: Folder, image: int, tile: str) -> list[str]:
-    """Renders one tile of a job in this process, unless it is there.
+    """Renders one tile of a job in this process, unless it is finished.
 
     Args:
-        folder: The job's.
-        image: From 1.
-        tile: "3/8", the third of eight.
+        folder: Folder of the job.
+        image: Number of the image, from 1.
+        tile: Number and count, such as "3/8" for the third of eight tiles.
 
     Returns:
         Warnings about the stage.
@@ -184,10 +184,10 @@ def render_task(folder: Folder, image: int, tile: str) -> list[str]:
 
 
 def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
-    """Joins the tiles of all images that are not finished, in this process.
+    """Joins the tiles of all unfinished images in this process.
 
     Returns:
-        Files that were written, and a line for each image that lacks tiles.
+        Files that were written, and a line for each image with missing tiles.
     """
     from wavecomb.farm.assemble import finish_image, is_finished, machine_of
 
@@ -201,12 +201,12 @@ def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
             lacking.append(
-                f"{job.title(image, missing[0])}{more}: not rendered, or damaged, or of another "
+                f"{job.title(image, missing[0])}{more}: not rendered, damaged, or of another "
                 "class of machines"
             )
             continue
         found = finish_image(folder, image, best)
         if found.get("again"):
-            lacking.append(f"{job.title(image)}: tiles must be rendered again: give it to resume")
+            lacking.append(f"{job.title(image)}: tiles must be rendered again: resume the job")
         written += found.get("files", [])
     return written, lacking

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joins tiles to the image that one process would have rendered, bit for bit; how far a job is."""
+"""Joins tiles to the image that one process would have rendered, bit for bit.
+
+Also determines how much of a job is done.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +28,15 @@ from wavecomb.run.bands import sum_stats
 from wavecomb.run.stats import write_stats
 
 _MORE_LOOKS = 4
-"""Looks at errors beyond those that were seen, where a border was too narrow."""
+"""Error checks that new borders allow for beyond the largest number seen, after some were too
+narrow."""
 
 
 class NarrowBorder(WavecombError):
-    """Borders of adaptive tiles were too narrow: the tiles must be rendered again.
+    """Error that adaptive tiles had too narrow borders and must be rendered again.
 
     Attributes:
-        passes: The most passes that a tile took.
+        passes: Largest number of passes that a tile took.
     """
 
     def __init__(self, message: str, passes: int) -> None:
@@ -41,12 +45,13 @@ class NarrowBorder(WavecombError):
 
 
 def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
-    """Joins tiles, which are read one at a time, without what denoising adds.
+    """Joins tiles, reading one at a time, into an image without denoising.
 
     Raises:
         DamagedPart: A tile is missing or damaged.
         NarrowBorder: Borders of adaptive tiles were too narrow.
-        WavecombError: The tiles do not cover the image, each pixel once, or do not fit together.
+        WavecombError: The tiles do not cover each pixel of the image exactly once, or differ in
+            their layers.
     """
     shot, rectangles = job.shot(image), job.rectangles(image)
     check_cover(shot.region, rectangles)
@@ -76,7 +81,7 @@ def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
         stats=_stats(job, shot, kept),
         costs=kept[-1].costs,
         aovs={n[len(AOV) :]: array for n, array in whole.items() if n.startswith(AOV)},
-        # In the order of bytes, as the core sorts names.
+        # The core sorts names by their UTF-8 bytes.
         manifests={
             level: dict(sorted(names.items(), key=lambda one: one[0].encode()))
             for level, names in manifests.items()
@@ -87,7 +92,7 @@ def join(job: Job, image: int, parts: Iterable[Part]) -> Picture:
 
 
 def check_cover(region: Rectangle, tiles: Sequence[Rectangle]) -> None:
-    """Raises WavecombError unless tiles cover a region, each pixel once, and nothing else.
+    """Raises WavecombError unless tiles cover each pixel of a region exactly once.
 
     >>> check_cover((0, 0, 4, 4), [(0, 0, 4, 2), (0, 2, 4, 4)])
     """
@@ -106,14 +111,14 @@ def check_cover(region: Rectangle, tiles: Sequence[Rectangle]) -> None:
 
 
 def _window(shot: Shot) -> Rectangle:
-    """The pixels that the image's file holds."""
+    """Returns the rectangle of pixels that the image file holds."""
     if shot.settings.get("crop") and shot.settings.get("region") is not None:
         return shot.region
     return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
 def _room(part: Part, name: str, window: Rectangle) -> NDArray[Any]:
-    """An array for a whole image; pixels outside the region hold the value without samples."""
+    """Allocates an array for the whole image, filled with the value of pixels without samples."""
     layer, empty = part.layers[name], part.empty.get(name)
     x0, y0, x1, y1 = window
     room: NDArray[Any] = np.empty((y1 - y0, x1 - x0, *layer.shape[2:]), layer.dtype)
@@ -123,23 +128,24 @@ def _room(part: Part, name: str, window: Rectangle) -> NDArray[Any]:
 
 
 def _check_looks(parts: Sequence[Part]) -> None:
-    """Raises NarrowBorder where a border was too narrow for what happened in another tile.
+    """Raises NarrowBorder if a tile took more passes than some border allows for.
 
-    If no tile took more passes than each border allows for, all decisions are those of the whole
-    image: each is right within its tile as long as the pixels that it depends on were rendered.
+    An adaptive tile decides about each of its pixels as the whole image would, as long as all
+    pixels that the decision depends on were rendered. That holds if no tile took more passes than
+    each border allows for.
     """
     most = max(part.passes for part in parts)
     for part in parts:
         if 0 < part.looks < most:
             raise NarrowBorder(
-                f"{part.name}: its border is wide enough for {part.looks} looks at errors, and a "
+                f"{part.name}: its border is wide enough for {part.looks} error checks, and a "
                 f"tile took {most}: all tiles must be rendered again with wider borders",
                 most,
             )
 
 
 def _stats(job: Job, shot: Shot, parts: Sequence[Part]) -> dict[str, Any]:
-    """The statistics of tiles as those of one render."""
+    """Merges the statistics of tiles into statistics of one render."""
     out = sum_stats([part.stats for part in parts], shot.settings)
     del out["bands"]
     out["tiles"] = len(parts)
@@ -151,20 +157,20 @@ def _stats(job: Job, shot: Shot, parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def write_image(job: Job, image: int, picture: Picture, threads: int) -> list[str]:
-    """Writes PNG, statistics and at last the EXR, each whole or not at all.
+    """Writes the PNG, the statistics and finally the EXR. No file is ever partially written.
 
     Args:
         job: The job.
         image: Index of the image.
-        picture: Of ``join``.
-        threads: For denoising.
+        picture: Result of ``join``.
+        threads: Number of threads for denoising.
 
     Returns:
-        The files.
+        Names of the files.
     """
     if job.denoise:
         picture = picture.with_denoised(threads=threads)
-    # The header says the settings of the whole image.
+    # The file header states the settings of the whole image, not of a tile.
     settings = dict(job.shot(image).settings)
     picture = replace(picture, stats={**picture.stats, "settings": settings})
     names = {kind: job.place(name) for kind, name in job.names(image).items()}
@@ -180,7 +186,7 @@ def write_image(job: Job, image: int, picture: Picture, threads: int) -> list[st
 
 
 def write_record(folder: Folder, image: int, files: Sequence[str]) -> None:
-    """Notes the bytes with which an image was written, for ``is_finished``."""
+    """Records the hashes of an image's files for ``is_finished``."""
     file = folder.record(image)
     file.parent.mkdir(exist_ok=True)
     sums = {os.path.basename(name): file_hash(name) for name in files}
@@ -188,12 +194,12 @@ def write_record(folder: Folder, image: int, files: Sequence[str]) -> None:
 
 
 def is_finished(folder: Folder, image: int, *, quick: bool = False) -> bool:
-    """Whether all files of an image are there, of this job, with the bytes that were written.
+    """Returns whether all files of an image exist, belong to this job and are unchanged.
 
     Args:
-        folder: The job's.
+        folder: Folder of the job.
         image: Index of the image.
-        quick: Whether it is enough that the files are there.
+        quick: Checks only that the files exist, not their hashes.
     """
     job = folder.job
     try:
@@ -214,7 +220,7 @@ def is_finished(folder: Folder, image: int, *, quick: bool = False) -> bool:
 
 
 def file_hash(path: str | os.PathLike[str]) -> str:
-    """SHA-256 of a file."""
+    """Returns the SHA-256 of a file."""
     found = hashlib.sha256()
     with Path(path).open("rb") as file:
         while block := file.read(1 << 20):
@@ -226,7 +232,7 @@ def file_hash(path: str | os.PathLike[str]) -> str:
 
 
 def machine_of(folder: Folder, task: Task) -> str:
-    """Class of the machine that rendered a tile; empty: there is no such part of this job."""
+    """Returns the machine class that rendered a tile, or "" if no such tile of this job exists."""
     file = folder.part(task)
     if not file.exists():
         return ""
@@ -238,17 +244,18 @@ def machine_of(folder: Folder, task: Task) -> str:
 
 
 def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> dict[str, Any]:
-    """Joins the tiles of an image, writes its files, and removes the tiles.
+    """Joins the tiles of an image, writes its files and removes the tiles.
 
     Args:
-        folder: The job's.
+        folder: Folder of the job.
         image: Index of the image.
         machine: Class of the machines that rendered the tiles.
-        threads: For denoising.
+        threads: Number of threads for denoising.
 
     Returns:
-        ``files``; or ``again``, tiles that must be rendered first, and ``looks``, the looks at
-        errors that their borders must allow for, or 0.
+        A dictionary with ``files``, the files written. If tiles must be rendered first, it has
+        ``again``, their indices, and ``looks``, the number of error checks that their borders must
+        allow for, or 0.
     """
     job = folder.job
     tasks = list(zip(job.tasks_of(image), job.rectangles(image), strict=True))
@@ -275,16 +282,16 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
 
 @dataclass
 class Outcome:
-    """How far a job is.
+    """Progress of a job.
 
     Attributes:
-        tasks: How many tiles there are.
-        tasks_done: How many are rendered.
-        images: How many images there are.
-        images_done: How many are written.
-        failed: A title and a line for each tile or image that failed.
-        stopped: Whether ``is_stopped`` ended it.
-        others: Workers that were not used, since they are of another class.
+        tasks: Number of tiles.
+        tasks_done: Number of rendered tiles.
+        images: Number of images.
+        images_done: Number of written images.
+        failed: Title and error line of each tile or image that failed.
+        stopped: Whether ``is_stopped`` ended the run.
+        others: Number of workers that were not used because their machine class differs.
     """
 
     tasks: int
@@ -303,7 +310,7 @@ class Outcome:
         return "failed" if self.failed else "unfinished"
 
     def as_dict(self) -> dict[str, Any]:
-        """For programs."""
+        """Returns the progress as a dictionary for JSON output."""
         return {
             "state": self.state, "tasks": {"all": self.tasks, "done": self.tasks_done},
             "images": {"all": self.images, "done": self.images_done},
@@ -312,7 +319,7 @@ class Outcome:
 
 
 def status(folder: Folder) -> Outcome:
-    """How far a job is, by the files that are there; each is read and compared."""
+    """Returns the progress of a job. Reads and verifies each file."""
     job = folder.job
     out = Outcome(job.task_count(), len(job.images))
     for image in range(len(job.images)):

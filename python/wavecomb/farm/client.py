@@ -21,21 +21,21 @@ from wavecomb.farm.part import has_part
 
 _TURN_S = 0.2
 _LOOK_S = 1.0
-"""Between two looks at the workers."""
+"""Time between queries of the list of workers, in seconds."""
 _BATCH_S = 0.5
-"""Small tiles are sent together, as many as take about this long."""
+"""Time that a batch of small tiles should take, in seconds."""
 _LEAST_BATCHES = 4
-"""For each worker, so that workers end at about the same time."""
+"""Smallest number of batches for each worker, so that workers end at about the same time."""
 _RETRY_S = 5.0
-"""Time between looks for tasks that wait for a worker."""
+"""Time between rescheduling of tasks that wait for a worker, in seconds."""
 _NOBODY_S = 60.0
-"""For workers to come back when all are gone."""
+"""Time to wait for new workers when all are gone, in seconds."""
 _ASSEMBLY_PRIORITY = 1
 
 
 @dataclass
 class _Batch:
-    """Tiles that are sent together; or, without tiles, the assembly of an image."""
+    """Batch of tiles that one Dask task renders; without tiles, the assembly of an image."""
 
     tiles: list[Task]
     image: int = -1
@@ -43,7 +43,7 @@ class _Batch:
 
 
 class Run:
-    """A client's work on one job."""
+    """Run of a job by one client."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Run:
         warn: Callable[[str], None],
         is_stopped: Callable[[], bool],
     ) -> None:
-        """Arguments are those of ``run``."""
+        """Takes the arguments of ``run``."""
         self._folder, self._job, self._cluster = folder, folder.job, cluster
         self._out = outcome
         self._show, self._warn, self._is_stopped = show, warn, is_stopped
@@ -80,7 +80,7 @@ class Run:
     # ---- begin -----------------------------------------------------------------------------------
 
     def work(self, images: list[int]) -> None:
-        """Renders what is missing of these images, and writes them."""
+        """Renders the missing tiles of these images and writes the images."""
         from wavecomb.farm.rendering import looks_for
         from wavecomb.farm.tasks import FarmPlugin, restart_stale
 
@@ -108,7 +108,10 @@ class Run:
         self._loop()
 
     def _wait_for_workers(self) -> bool:
-        """Waits until a worker announced its class; False: somebody wants to stop."""
+        """Waits until a worker has announced its machine class.
+
+        Returns False if the user stops the run.
+        """
         limit = self._cluster.wait_s
         until = None if limit is None else time.monotonic() + limit
         while not self._capacity():
@@ -122,7 +125,7 @@ class Run:
         return True
 
     def _look(self, every: float = _LOOK_S) -> None:
-        """Asks the scheduler for its workers, now and then."""
+        """Queries the scheduler for its workers, at most every ``every`` seconds."""
         if time.monotonic() < self._next_look:
             return
         self._next_look = time.monotonic() + every
@@ -130,7 +133,7 @@ class Run:
         self._workers = {} if info is None else dict(info.get("workers", {}))
 
     def _classes(self) -> dict[str, int]:
-        """How many workers each class of machines has."""
+        """Returns the number of workers of each machine class."""
         found: dict[str, int] = {}
         for facts in self._workers.values():
             for name, amount in facts["resources"].items():
@@ -139,13 +142,14 @@ class Run:
         return found
 
     def _capacity(self) -> int:
-        """How many workers may work on the job."""
+        """Returns the number of workers that may work on the job."""
         found = self._classes()
         return found.get(self._machine, 0) if self._machine else sum(found.values())
 
     def _choose_machine(self, images: list[int]) -> str:
-        """The class of all workers of this run: the one with most parts, then most workers."""
-        time.sleep(_TURN_S if self._cluster.wait_s else 0.0)  # for those that come together
+        """Chooses the machine class of this run: most finished tiles first, then most workers."""
+        # lets workers that start together all register
+        time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
         self._look(0.0)
         found = self._classes()
         parts = dict.fromkeys(found, 0)
@@ -197,10 +201,10 @@ class Run:
             raise WavecombError(f"{self._cluster.what}: all workers are gone")
 
     def _retry_waiting(self) -> None:
-        """Has the scheduler look for workers again, for tasks that it found none for.
+        """Makes the scheduler look again for workers for tasks that had none.
 
-        Dask does so when a worker comes. At that moment the worker has no resource yet: it
-        announces its class of machines a little later.
+        Dask does this when a worker joins. At that moment the worker has no resource yet, because
+        it announces its machine class a little later.
         """
         from wavecomb.farm.tasks import retry_unrunnable
 
@@ -209,7 +213,7 @@ class Run:
             self._cluster.client.run_on_scheduler(retry_unrunnable)
 
     def _submit(self) -> bool:
-        """Sends the next batch; False: there is none."""
+        """Submits the next batch. Returns False if there is none."""
         from wavecomb.farm.tasks import assemble_image, render_tiles
 
         if self._ready:
@@ -219,7 +223,7 @@ class Run:
             batch = _Batch([self._tiles.popleft() for _ in range(count)])
         else:
             return False
-        # Two clients of one scheduler give the same name to the same work.
+        # Two clients of one scheduler must use the same key for the same work.
         tiles = [(task.image, task.tile, self._looks[task.image]) for task in batch.tiles]
         name = hashed([self._common[0], self._job.id, self._machine, tiles, batch.image,
                        batch.attempt, self._looks.get(batch.image)])  # fmt: skip
@@ -240,12 +244,12 @@ class Run:
         return max(1, int(min(wanted, most)))
 
     def _again(self, tiles: list[Task]) -> None:
-        """Has tiles rendered anew, each alone, before the others."""
+        """Queues tiles to be rendered again, one per batch, before all others."""
         self._attempts += 1
         self._ready.extendleft(_Batch([task], attempt=self._attempts) for task in reversed(tiles))
 
     def _take(self, future: Any, result: dict[str, Any] | None) -> None:
-        """Notes how a batch ended."""
+        """Handles the result or the failure of a batch."""
         batch = self._flying.pop(future, None)
         if batch is None:
             return
@@ -258,21 +262,21 @@ class Run:
                 self._take_image(batch.image, result)
         elif future.status == "error":
             self._take_error(batch, future.exception())
-        else:  # lost or cancelled, not by this client, or its worker ended with the result
+        else:  # lost or cancelled by another client, or its worker ended before sending the result
             self._cluster.client.cancel([future])
             self._cluster.check(False)
             self._put_back(batch)
 
     def _fetch(self, future: Any) -> None:
-        """Gets the result of a finished task; runs in a thread of Dask's.
+        """Fetches the result of a finished task. Runs in a thread of Dask.
 
-        Results stay with workers until the client asks for them. Where the worker ends in between,
-        Dask computes the task again, perhaps on a worker that only ``Cluster.check`` will start. So
-        nobody waits for results but this thread.
+        Workers hold results until the client requests them. If a worker ends before that, Dask
+        computes the task again, perhaps on a worker that only ``Cluster.check`` will start. For
+        this reason only this thread may wait for results.
         """
         result = None
         if future.status == "finished":
-            with contextlib.suppress(Exception):  # _take looks at the status
+            with contextlib.suppress(Exception):  # _take handles the error by the status
                 result = future.result()
         self._ended.put((future, result))
 
@@ -289,7 +293,7 @@ class Run:
             self._out.failed.append((self._job.title(image, tile), line))
         self._again([t for t in batch.tiles if t not in done and (t.image, t.tile) not in bad])
         if done:
-            # Of the last batch: the first ones open the stage, too.
+            # Uses the last batch, because the first ones include the time to open the stage.
             self._seconds = result["seconds"] / len(done)
 
     def _note_done(self, task: Task) -> None:
@@ -322,7 +326,7 @@ class Run:
             line = f"its worker ended {self._job.tries} times: a crash, or too little memory"
         else:
             line = " ".join(str(error).split()) or type(error).__name__
-        if len(batch.tiles) > 1:  # others of the batch may be good
+        if len(batch.tiles) > 1:  # other tiles of the batch may succeed
             self._again(batch.tiles)
         elif batch.tiles:
             one = batch.tiles[0]
@@ -338,7 +342,7 @@ class Run:
             self._ready.appendleft(_Batch([], batch.image, self._attempts))
 
     def _leave_out(self, worker: str, why: str) -> None:
-        """Takes back from a worker whose disk is full what it has not begun."""
+        """Withdraws queued tasks from a worker whose disk is full."""
         self._full = why
         self._next_look = 0.0
         client = self._cluster.client
@@ -360,22 +364,23 @@ def run(
     say: Callable[[str], None] = lambda line: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> Outcome:
-    """Works on a job until all is done, has failed, or somebody stops it.
+    """Runs a job until all tasks are done or have failed, or the user stops it.
 
-    Only tiles whose part is missing, damaged or of another key are rendered.
+    Renders only tiles whose file is missing, damaged or made with other inputs.
 
     Args:
-        folder: The job's.
+        folder: Folder of the job.
         where: The cluster.
-        threads: Of each local worker; 0 means: as the job says, else its share of the cores.
-        dashboard: Port of Dask's dashboard; None means: there is none.
-        show: Called with how far the job is.
-        warn: Gets each warning about the stage once.
-        say: Gets the address of the dashboard.
-        is_stopped: Whether somebody wants to stop; what is done is kept.
+        threads: Threads of each local worker; 0 uses the job's value, else an equal share of the
+            cores.
+        dashboard: Port of Dask's dashboard; None starts no dashboard.
+        show: Called with the progress of the job.
+        warn: Called once with each distinct warning about the stage.
+        say: Called with the address of the dashboard.
+        is_stopped: Returns whether to stop the run. Finished tiles are kept.
 
     Raises:
-        WavecombError: The settings are invalid, or there are no workers, or no more.
+        WavecombError: The settings are invalid, or no workers came, or all are gone.
     """
     from wavecomb import _core
 
@@ -403,7 +408,7 @@ def run(
         try:
             at_work.work(left)
         except (OSError, RuntimeError, TimeoutError) as error:
-            cluster.check(False)  # says that the scheduler is gone, if it is
+            cluster.check(False)  # raises a clearer error if the scheduler is gone
             raise WavecombError(f"{cluster.what}: {' '.join(str(error).split())}") from error
         outcome.stopped = outcome.stopped or is_stopped()
     return outcome

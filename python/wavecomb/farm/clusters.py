@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dask clusters that work on a job: what ``--on`` says.
+"""Dask clusters that render a job, as chosen by ``--on``.
 
-A scheduler that this process starts, and its workers, talk by TLS with a certificate that nobody
-else has: whoever reaches a Dask scheduler runs code on its workers. Workers are started isolated:
-nothing in the working folder is imported.
+Anyone who can reach a Dask scheduler can run code on its workers. A scheduler started by this
+process therefore uses TLS with a private certificate. Workers run in Python's isolated mode, so
+that they import nothing from the working folder.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ from wavecomb.machine import usable_cores
 
 MOST_WORKERS = 1024
 DASK_WAIT_S = 60.0
-"""For a first worker of a cluster to come."""
+"""Time to wait for the first worker of an existing Dask cluster, in seconds."""
 _SLURM_WORKERS = 4
 _CONNECT_S = 10.0
 _ANSWER_S = 60.0
-"""For sbatch, squeue and scancel."""
+"""Time limit for sbatch, squeue and scancel, in seconds."""
 _ASK_S = 10.0
-"""Between two questions to squeue."""
+"""Time between calls of squeue, in seconds."""
 _MOST_STARTS = 5
-"""Of workers one after another without any progress."""
+"""Largest number of worker starts in a row without any progress."""
 _END_S = 5.0
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 
 
 @dataclass(frozen=True)
 class Where:
-    """What ``--on`` says.
+    """Cluster that ``--on`` names.
 
     Attributes:
-        kind: "local", "dask", "slurm", or "none": the job is only written.
-        workers: How many, of "local" and "slurm".
-        address: Of the scheduler of "dask".
+        kind: "local", "dask", "slurm", or "none", which only writes the job.
+        workers: Number of workers for "local" and "slurm".
+        address: Address of the scheduler for "dask".
     """
 
     kind: str
@@ -59,7 +59,7 @@ class Where:
 
 
 def parse_where(text: str) -> Where:
-    """What ``--on`` says. Raises WavecombError.
+    """Parses the value of ``--on``. Raises WavecombError if it is invalid.
 
     >>> parse_where("local:4")
     Where(kind='local', workers=4, address='')
@@ -80,13 +80,13 @@ def parse_where(text: str) -> Where:
 
 
 def parse_address(text: str) -> str:
-    """The address of a scheduler with its protocol.
+    """Returns the address of a scheduler with its protocol.
 
     >>> parse_address("127.0.0.1:8786"), parse_address("tls://farm:8786")
     ('tcp://127.0.0.1:8786', 'tls://farm:8786')
 
     Raises:
-        WavecombError: It is none, or others could reach it without a certificate.
+        WavecombError: The address is invalid, or is on another machine without TLS.
     """
     kind, found, rest = text.partition("://")
     kind, rest = (kind, rest) if found else ("tcp", text)
@@ -99,35 +99,35 @@ def parse_address(text: str) -> str:
         is_loopback = is_loopback or ipaddress.ip_address(host.strip("[]")).is_loopback
     if int(port) > 65535 or (kind == "tcp" and not is_loopback):
         raise WavecombError(
-            f"--on dask:{text}: is neither an address of this machine nor tls://: whoever reaches "
-            "a Dask scheduler runs code, so set up Dask's TLS (docs/farm.md)"
+            f"--on dask:{text}: is neither an address of this machine nor tls://: anyone who "
+            "reaches a Dask scheduler can run code, so set up Dask's TLS (docs/farm.md)"
         )
     return f"{kind}://{rest}"
 
 
 class Cluster:
-    """A connection to a scheduler, and the workers that this process started.
+    """Connection to a scheduler, with the workers that this process started.
 
     Attributes:
-        client: Dask's client.
+        client: Dask client.
     """
 
     wait_s: float | None = 120.0
-    """For a first worker; None means any time."""
+    """Time to wait for the first worker, in seconds; None means no limit."""
 
     def __init__(self, client: Any, what: str) -> None:
-        """``what``: the cluster in messages."""
+        """Creates the connection. ``what`` names the cluster in messages."""
         self.client = client
         self.what = what
 
     def check(self, progressed: bool) -> None:
-        """Starts workers that are no more; called now and then.
+        """Replaces workers that have ended. Called regularly.
 
         Args:
-            progressed: Whether anything was finished since the last call.
+            progressed: Whether any task finished since the last call.
 
         Raises:
-            WavecombError: They end again and again, or the scheduler is gone.
+            WavecombError: Workers end repeatedly without progress, or the scheduler is gone.
         """
         if self.client.status != "running":
             raise WavecombError(
@@ -139,7 +139,7 @@ class Cluster:
 
 
 class _Started(Cluster):
-    """Workers of a process that starts them, which is started again when it ends."""
+    """Local workers in a process that is restarted when it ends."""
 
     def __init__(self, client: Any, what: str, words: list[str], log: Path) -> None:
         super().__init__(client, what)
@@ -156,7 +156,7 @@ class _Started(Cluster):
             )
 
     def check(self, progressed: bool) -> None:
-        """Starts the workers again where they ended."""
+        """Restarts the worker process if it has ended."""
         super().check(progressed)
         assert self._process is not None
         self._starts = 1 if progressed else self._starts
@@ -168,7 +168,7 @@ class _Started(Cluster):
         self._start()
 
     def close(self) -> None:
-        """Kills them: parts are written whole or not at all."""
+        """Kills the worker process. Tile files are never written partially."""
         assert self._process is not None
         self._process.kill()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -176,7 +176,7 @@ class _Started(Cluster):
 
 
 class _Slurm(Cluster):
-    """An array of workers in Slurm's queue; those that end are replaced."""
+    """Array of Slurm jobs, one for each worker. Replaces workers that end."""
 
     wait_s = None
 
@@ -201,7 +201,7 @@ class _Slurm(Cluster):
         self._next = time.monotonic() + _ASK_S
 
     def check(self, progressed: bool) -> None:
-        """Replaces workers whose time in the queue is over."""
+        """Submits new workers for those whose time in the queue is over."""
         super().check(progressed)
         self._starts = 0 if progressed else self._starts
         if time.monotonic() < self._next:
@@ -212,7 +212,7 @@ class _Slurm(Cluster):
             there = len(_ask("squeue", "--noheader", "--array", "--jobs", ids).split("\n")) - 1
         except WavecombError as error:
             if "Invalid job id" not in str(error):
-                return  # it is asked again
+                return  # the next call of check asks again
             there = 0
         if there >= self._count:
             return
@@ -221,7 +221,7 @@ class _Slurm(Cluster):
         self._submit(self._count - there)
 
     def close(self) -> None:
-        """Takes them out of the queue."""
+        """Removes the workers from the queue."""
         for number in self._ids:
             with contextlib.suppress(WavecombError):
                 _ask("scancel", number)
@@ -232,18 +232,20 @@ def connected(
     where: Where, folder: Path, *, threads: int = 0, tries: int, hang_s: float,
     dashboard: int | None = None,
 ) -> Iterator[Cluster]:  # fmt: skip
-    """A cluster, as long as the block lasts.
+    """Connects to a cluster, or starts one, for the duration of a ``with`` block.
 
     Args:
-        where: Which one.
-        folder: The job's, for certificates that workers on other machines must see.
-        threads: Of each local worker; 0 means: its share of the cores.
-        tries: How many workers may die with a task, in clusters that are started here.
-        hang_s: A worker without a sign of life for so many seconds is restarted, likewise.
-        dashboard: Port of Dask's dashboard on this machine; None means: there is none.
+        where: The cluster.
+        folder: Folder of the job. Workers on other machines read certificates from it.
+        threads: Threads of each local worker; 0 means an equal share of the cores.
+        tries: Number of workers that may crash during a task before it fails. Does not apply to an
+            existing Dask cluster.
+        hang_s: Time in seconds without a heartbeat after which a worker is replaced. Does not apply
+            to an existing Dask cluster.
+        dashboard: Port of Dask's dashboard on this machine; None starts no dashboard.
 
     Raises:
-        WavecombError: There is no such cluster.
+        WavecombError: The cluster cannot be reached or started.
     """
     distributed = needed("distributed", "wavecomb farm", "farm")
     needed("cryptography", "wavecomb farm", "farm")
@@ -271,7 +273,7 @@ def connected(
                 )
             )
         )
-        # Dask imports from its temporary folder, so that must not be one of all users.
+        # Dask imports modules from its temporary directory, so other users must not write to it.
         settings["temporary-directory"] = str(place)
         stack.enter_context(dask.config.set(settings))
         security = distributed.Security.temporary()
@@ -323,14 +325,14 @@ def _client(distributed: Any, address: str, security: Any) -> Iterator[Any]:
 
 
 def _silence() -> None:
-    """Has Dask's loggers say nothing: what matters becomes one line."""
+    """Turns off Dask's log messages, because relevant errors are reported in one line."""
     for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
         if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def _ask(*words: str) -> str:
-    """What a command of Slurm says. Raises WavecombError."""
+    """Runs a Slurm command and returns its output. Raises WavecombError."""
     try:
         done = subprocess.run(
             words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_ANSWER_S

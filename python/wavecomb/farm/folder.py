@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The folder of a job.
+"""Folder of a farm job.
 
 It holds ``job.json``, ``parts/IMAGE/TILE.exr`` for each rendered tile of an unfinished image, and
-``images/IMAGE.json`` for each finished one. Nothing else records progress.
+``images/IMAGE.json`` for each finished image. These files are the only record of progress.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ LEARNED_FILE = "guide.learned"
 
 
 class Folder:
-    """A job's folder.
+    """Folder of a farm job.
 
     Attributes:
-        path: Absolute.
-        job: What it holds.
+        path: Absolute path.
+        job: Job described by the folder.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Reads the job. Raises WavecombError where there is none."""
+        """Reads the job. Raises WavecombError if the folder holds none."""
         self.path = Path(os.path.abspath(path))
         file = self.path / JOB_FILE
         try:
@@ -46,7 +46,7 @@ class Folder:
 
     @classmethod
     def create(cls, path: str | os.PathLike[str], job: Job, learned: bytes | None = None) -> Folder:
-        """Makes the folder of a job. Raises WavecombError where something has that name."""
+        """Creates the folder of a job. Raises WavecombError if the path exists."""
         folder = Path(path)
         try:
             folder.mkdir(parents=True)
@@ -63,24 +63,27 @@ class Folder:
         return cls(folder)
 
     def replace(self, job: Job) -> None:
-        """Writes another description of the job in place of the present one."""
+        """Replaces the description of the job."""
         write_json(self.path / JOB_FILE, job.as_json())
         self.job = job
 
     def part(self, task: Task) -> Path:
-        """The file of a rendered tile."""
+        """Returns the file of a rendered tile."""
         return self.parts(task.image) / f"{task.tile:06d}.exr"
 
     def parts(self, image: int) -> Path:
-        """The folder of an image's rendered tiles."""
+        """Returns the folder of an image's rendered tiles."""
         return self.path / "parts" / f"{image:06d}"
 
     def record(self, image: int) -> Path:
-        """The file that says with which bytes a finished image was written."""
+        """Returns the file with the hashes of a finished image's files."""
         return self.path / "images" / f"{image:06d}.json"
 
     def learned(self) -> bytes | None:
-        """The guiding field that all images are given. Raises WavecombError: it is damaged."""
+        """Returns the guiding field for all images, or None.
+
+        Raises WavecombError if it is damaged.
+        """
         if self.job.learned is None:
             return None
         from wavecomb.run.learned import load_learned
@@ -89,6 +92,6 @@ class Folder:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Writes a small file, whole or not at all."""
+    """Writes a small JSON file, never partially."""
     with replacing(path) as part:
         part.write_text(json.dumps(value, allow_nan=False) + "\n", encoding="utf-8")

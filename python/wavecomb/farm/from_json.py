@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a job that another program describes: JSON on standard input, JSON on standard output.
+"""Submits a farm job for another program, with JSON on standard input and output.
 
-{"stage": FILE, "output": FILE, "options": {...}}: arguments of ``wavecomb.farm.submit``. The answer
-is {"job": FOLDER} or {"error": LINE}.
+The input {"stage": FILE, "output": FILE, "options": {...}} holds arguments of
+``wavecomb.farm.submit``. The output is {"job": FOLDER} or {"error": LINE}.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 
 
 def answer(text: str) -> str:
-    """Writes the job that ``text`` describes; the answer."""
+    """Submits the job that ``text`` describes and returns the output as JSON."""
     from wavecomb.farm.api import submit
     from wavecomb.run.faults import describe
 
@@ -23,7 +23,7 @@ def answer(text: str) -> str:
             if options.get(name) is not None:
                 options[name] = tuple(options[name])
         folder = submit(told["stage"], told["output"], **options)
-    except Exception as error:  # the caller shows it
+    except Exception as error:  # the calling program shows the error
         return json.dumps({"error": describe(error)})
     return json.dumps({"job": str(folder.path)})
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A farm job: images, their tiles and how they are rendered."""
+"""Farm jobs: images, their tiles and render settings."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Shot:
     """Images of one camera or render product.
 
     Attributes:
-        settings: Of the whole image, as ``Settings.to_dict`` gives them.
-        aovs: As ``aovs.expand`` gives them.
+        settings: Settings of the whole image, from ``Settings.to_dict``.
+        aovs: AOVs, from ``aovs.expand``.
         loading: Fields of ``LoadOptions`` except the frame.
-        output: The image's file, with a place for the frame.
-        png: The PNG's file, or None.
-        stats: The statistics' file, or None.
+        output: File of the image, with a placeholder for the frame.
+        png: File of the PNG, or None.
+        stats: File of the statistics, or None.
     """
 
     settings: dict[str, Any]
@@ -45,7 +45,7 @@ class Shot:
 
     @property
     def region(self) -> Rectangle:
-        """The pixels that are rendered."""
+        """Rectangle of pixels to render."""
         found = self.settings.get("region")
         if found is None:
             return 0, 0, int(self.settings["width"]), int(self.settings["height"])
@@ -54,15 +54,15 @@ class Shot:
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether the error of a pixel decides how many samples it gets."""
+        """Whether the number of samples of a pixel depends on its error."""
         return bool(self.settings.get("adaptive"))
 
 
 @dataclass(frozen=True)
 class StageFile:
-    """A file that the stage needs: a layer, a texture, a profile.
+    """A file that the stage needs, such as a layer, texture or IES profile.
 
-    ``bytes`` and ``mtime_ns`` let a machine that sees the same file skip reading it.
+    A machine that sees the same ``bytes`` and ``mtime_ns`` need not read the file to verify it.
     """
 
     path: str
@@ -73,7 +73,7 @@ class StageFile:
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """One tile of one image, by their indices in the job."""
+    """One tile of one image, by indices into the job."""
 
     image: int
     tile: int
@@ -81,27 +81,27 @@ class Task:
 
 @dataclass(frozen=True)
 class Job:
-    """What is rendered; every field is JSON.
+    """A farm job. Every field can be stored as JSON.
 
     Attributes:
-        stage: As it was given; a relative name counts from ``folder``.
-        folder: The working folder of ``farm submit``.
+        stage: Name as given; a relative name is relative to ``folder``.
+        folder: Working folder of ``farm submit``.
         shots: See ``Shot``.
-        images: Index of the shot, and frame or None, of each image.
+        images: For each image, the index of its shot, and its frame or None.
         files: Files of the stage with their hashes.
         tiles: Columns and rows of each image.
         file: half, compression, tile and split of ``Picture.save``.
-        exposure: Of PNGs, in stops.
-        tone_map: Of PNGs.
+        exposure: Exposure of PNGs, in stops.
+        tone_map: Tone mapping of PNGs.
         denoise: Whether images get the layer ``denoised``.
-        costs: A profile of shading costs to start from.
-        learned: SHA-256 of the guiding field that all images are given, or None.
-        tries: How often a task is tried.
-        hang_s: A worker that reports no progress for so many seconds is restarted.
+        costs: Initial profile of scheduling costs.
+        learned: SHA-256 of the guiding field for all images, or None.
+        tries: Number of attempts for each task.
+        hang_s: Time in seconds without progress after which a worker is restarted.
         strict: Whether a missing file is an error.
-        maps: Folders that lie elsewhere on machines that do not have them under the first name.
-        isa: Library that workers must use; None means: any, but one for all.
-        version: Of Wavecomb.
+        maps: Pairs of folders. Machines without the first look for its files in the second.
+        isa: Instruction set that all workers must use; None allows any, but the same for all.
+        version: Version of Wavecomb.
     """
 
     stage: str
@@ -124,25 +124,25 @@ class Job:
     version: str = field(default_factory=version)
 
     def __post_init__(self) -> None:
-        """Makes room for what is computed once for each image."""
+        """Creates the caches of values that are computed once for each image."""
         object.__setattr__(self, "_rectangles", {})
         object.__setattr__(self, "_image_keys", {})
 
     @property
     def id(self) -> str:
-        """A hash of all that the job says."""
+        """Hash of the whole job description."""
         return hashed(self.as_json())
 
     def shot(self, image: int) -> Shot:
-        """The shot of an image."""
+        """Returns the shot of an image."""
         return self.shots[self.images[image][0]]
 
     def frame(self, image: int) -> float | None:
-        """The frame of an image."""
+        """Returns the frame of an image, or None."""
         return self.images[image][1]
 
     def rectangles(self, image: int) -> list[Rectangle]:
-        """The tiles of an image, row by row."""
+        """Returns the tiles of an image, row by row."""
         known: dict[Rectangle, list[Rectangle]] = self._rectangles  # type: ignore[attr-defined]
         region = self.shot(image).region
         if region not in known:
@@ -150,25 +150,28 @@ class Job:
         return known[region]
 
     def tile_count(self, image: int) -> int:
-        """How many tiles an image has; never more columns or rows than pixels."""
+        """Returns the number of tiles of an image.
+
+        There are never more columns or rows than pixels.
+        """
         x0, y0, x1, y1 = self.shot(image).region
         return min(self.tiles[0], x1 - x0) * min(self.tiles[1], y1 - y0)
 
     def tasks_of(self, image: int) -> list[Task]:
-        """The tasks of an image."""
+        """Returns the tasks of an image."""
         return [Task(image, tile) for tile in range(self.tile_count(image))]
 
     def tasks(self) -> Iterator[Task]:
-        """All tasks, in the order in which they are rendered."""
+        """Iterates over all tasks, in render order."""
         for image in range(len(self.images)):
             yield from self.tasks_of(image)
 
     def task_count(self) -> int:
-        """How many tasks there are."""
+        """Returns the number of tasks."""
         return sum(self.tile_count(image) for image in range(len(self.images)))
 
     def names(self, image: int) -> dict[str, str]:
-        """Files of an image by kind: output, png, stats."""
+        """Returns the files of an image by kind: output, png, stats."""
         shot, frame = self.shot(image), self.frame(image)
         found = {"output": shot.output, "png": shot.png, "stats": shot.stats}
         return {
@@ -178,11 +181,11 @@ class Job:
         }
 
     def place(self, name: str) -> str:
-        """Where a file of the job lies on this machine."""
+        """Returns the path of a file of the job on this machine, after path mapping."""
         return mapped(os.path.join(self.folder, name), here(self.maps))
 
     def title(self, image: int, tile: int | None = None) -> str:
-        """An image, or a tile of it, in messages: "frame 12, tile 3 of 8"."""
+        """Returns a name of an image or tile for messages, such as "frame 12, tile 3 of 8"."""
         frame = self.frame(image)
         words = [] if frame is None else [f"frame {frame_text(frame)}"]
         if len(self.shots) > 1:
@@ -194,11 +197,11 @@ class Job:
     # ---- keys ------------------------------------------------------------------------------------
 
     def image_key(self, image: int, machine: str) -> str:
-        """A hash of all that decides the pixels of an image.
+        """Returns a hash of all inputs that determine the pixels of an image.
 
         Args:
-            image: Its index.
-            machine: Class of the machines, as ``machine_class`` gives it.
+            image: Index of the image.
+            machine: Machine class, from ``machine_class``.
         """
         known: dict[tuple[int, str], str] = self._image_keys  # type: ignore[attr-defined]
         if (image, machine) in known:
@@ -215,12 +218,12 @@ class Job:
         return found
 
     def part_key(self, task: Task, machine: str) -> str:
-        """A hash of all that decides the pixels of a tile."""
+        """Returns a hash of all inputs that determine the pixels of a tile."""
         tile = self.rectangles(task.image)[task.tile]
         return hashed({"image": self.image_key(task.image, machine), "tile": tile})
 
     def output_key(self, image: int) -> str:
-        """A hash of all that decides the files of an image, whatever machines rendered it."""
+        """Returns a hash of all inputs of an image's files, except the machine class."""
         return hashed(
             {
                 "image": self.image_key(image, ""), "names": self.names(image), "file": self.file,
@@ -231,15 +234,16 @@ class Job:
     # ---- JSON ------------------------------------------------------------------------------------
 
     def as_json(self) -> dict[str, Any]:
-        """For a file."""
+        """Returns the job as a dictionary for ``job.json``."""
         return {"kind": KIND, "format": FORMAT, **asdict(self)}
 
     @classmethod
     def of(cls, value: Any, name: str) -> Job:
-        """What a file says.
+        """Reads a job from parsed JSON.
 
         Raises:
-            WavecombError: It is no job, of another format, or damaged; begins with ``name``.
+            WavecombError: It is not a job, has another format, or is damaged. The message begins
+                with ``name``.
         """
         if not isinstance(value, Mapping) or value.get("kind") != KIND:
             raise WavecombError(f"{name}: is no job of `wavecomb farm submit`")
@@ -256,7 +260,7 @@ class Job:
 
 
 def hashed(value: Any) -> str:
-    """SHA-256 of what JSON makes of a value."""
+    """Returns the SHA-256 of a value's JSON text."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=list)
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Classes of machines that render the same bits.
 
-Two machines are of one class if they have the same version, instruction set and native libraries,
-and render the same bits in a small probe image: Embree chooses its instructions by itself, and its
-last bits differ between them (docs/decisions/isa.md).
+Two machines are in one class if they have the same version of Wavecomb, instruction set and native
+libraries, and render the same bits in a small probe image. The probe is needed because Embree
+selects instructions by CPU, which changes the last bits (docs/decisions/isa.md).
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ _OTHERS = re.compile(r"/(?!wavecomb\.)[^/]+\.libs/[^/]*$")
 
 @functools.cache
 def machine_class() -> str:
-    """The class of this machine: its instruction set, and a hash of all that makes its bits.
+    """Returns the class of this machine.
 
-    It is the name of a Dask resource.
+    It consists of the instruction set and a hash of everything that affects results, and is also
+    the name of a Dask resource.
     """
     from wavecomb import _core
 
@@ -38,14 +39,14 @@ def machine_class() -> str:
 
 
 def library_hash() -> str:
-    """A hash of the native libraries that render: ours, Embree, oneTBB."""
+    """Returns a hash of the native libraries used for rendering: Wavecomb, Embree and oneTBB."""
     from wavecomb import _core
 
     files = {os.path.realpath(str(_core.__file__))}
     with contextlib.suppress(OSError):
         lines = Path("/proc/self/maps").read_text(errors="replace").splitlines()
         mapped = {line.split(maxsplit=5)[-1] for line in lines if " /" in line}
-        # Wheels of other packages bring their own copies, which Wavecomb does not use.
+        # Wheels of other packages contain copies that Wavecomb does not use.
         mapped = {path for path in mapped if not _OTHERS.search(path)}
         files |= {path for path in mapped if _LIBRARIES.match(os.path.basename(path))}
     told = hashlib.sha256()
@@ -55,9 +56,9 @@ def library_hash() -> str:
 
 
 def probe_hash() -> str:
-    """A hash of a small image: rough metal and glass over a floor, an area light, a sky.
+    """Renders a small image of rough metal and glass above a floor, and returns its hash.
 
-    It needs every library: hierarchies, lanes, lights and BSDFs.
+    The image depends on all libraries: BVH, SIMD lanes, lights and BSDFs.
     """
     from wavecomb import _core
 

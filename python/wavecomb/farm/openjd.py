@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs as templates of Open Job Description, made through its data model.
+"""Export of jobs as templates of Open Job Description, built with its data model.
 
-Names of the job are values of template parameters, which are never expanded, so braces and line
-breaks in them change nothing.
+File names of the job become values of template parameters. The scheduler never expands them, so
+braces and line breaks in file names are safe.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ _NOTICE_S = 30
 
 
 def template(folder: Folder) -> dict[str, Any]:
-    """A template of two steps: a task for each tile, then the assembly of all images.
+    """Returns a template with two steps: a task for each tile, then the assembly of all images.
 
     Raises:
-        WavecombError: The data model refuses a name of the job; or images have other tiles.
+        WavecombError: The data model rejects a name of the job, or images differ in tile count.
     """
     model = needed("openjd.model", "farm export", "farm")
     job = folder.job
     counts = {job.tile_count(image) for image in range(len(job.images))}
     if len(counts) > 1:
-        raise WavecombError(f"{folder.path}: images of several sizes have other tiles each")
+        raise WavecombError(f"{folder.path}: images of different sizes have different tiles")
     count = counts.pop()
     cancel = {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": _NOTICE_S}
 
@@ -43,7 +43,7 @@ def template(folder: Folder) -> dict[str, Any]:
         "specificationVersion": "jobtemplate-2023-09",
         "name": "Wavecomb render",
         "parameterDefinitions": [
-            # A PATH would have to lie in the folder of the template.
+            # A parameter of type PATH would have to be inside the folder of the template.
             {"name": "Job", "type": "STRING", "default": str(folder.path)},
             {"name": "Python", "type": "STRING", "default": processes.interpreter()},
         ],
@@ -84,7 +84,7 @@ def template(folder: Folder) -> dict[str, Any]:
 
 
 def write_template(path: str | os.PathLike[str], folder: Folder) -> None:
-    """Writes ``template`` as JSON, which `openjd run` takes."""
+    """Writes the template as JSON for `openjd run`."""
     text = json.dumps(template(folder), indent=2)
     with replacing(path) as part:
         part.write_text(text + "\n", encoding="utf-8")

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendered tiles on disk: an OpenEXR file whose header has a key and a checksum.
+"""Rendered tiles as OpenEXR files whose header has a key and a checksum.
 
-The channels are all layers of the tile as floats, without loss. Attributes of the header:
+The channels hold all layers of the tile as floats, without loss. Attributes of the header:
 
-- ``wavecomb:part_key``: hash of all that decides the pixels (``Job.part_key``);
-- ``wavecomb:part_facts``: JSON; which layers the channels are, and what else the image needs;
+- ``wavecomb:part_key``: hash of all inputs that determine the pixels (``Job.part_key``);
+- ``wavecomb:part_facts``: JSON with the layers of the channels and other data of the image;
 - ``wavecomb:part_checksum``: SHA-256 of the facts and the pixels.
 
-A part counts only if its key is the expected one and its checksum is right.
+A tile file is valid only if its key is the expected one and its checksum is right.
 """
 
 from __future__ import annotations
@@ -35,11 +35,15 @@ _LAYERS = ("beauty", "albedo", "normal", "depth", "samples", "error", "variance"
 AOV = "aov."
 _KEY, _FACTS, _CHECKSUM = (f"wavecomb:part_{name}" for name in ("key", "facts", "checksum"))
 _EXACT = 1 << 24
-"""Whole numbers up to here are exact as floats; ``MAX_SPP`` is no more."""
+"""Largest integer up to which all integers are exact as 32-bit floats. ``MAX_SPP`` does not exceed
+it."""
 
 
 class DamagedPart(WavecombError):
-    """A tile's file is missing, damaged or of another key: the tile must be rendered again."""
+    """Error that a tile's file is missing, damaged or has another key.
+
+    The tile must be rendered again.
+    """
 
 
 @dataclass(frozen=True)
@@ -47,19 +51,20 @@ class Part:
     """A rendered tile.
 
     Attributes:
-        name: Its file.
-        key: As in the header.
-        tile: Its pixels in the image.
-        layers: Arrays of the image by name; AOVs begin with "aov.".
-        empty: For each layer the value of a pixel without samples, where the image has such.
-        stats: As ``make_stats`` gave them.
-        metadata: As ``Picture.metadata``.
-        manifests: As ``Picture.manifests``.
-        costs: As ``Picture.costs``.
-        passes: Passes over the pixels; each is a look at errors in an adaptive render.
-        looks: Looks at errors that the border around the tile allows for.
-        machine: Class of the machine that rendered it.
-        job: The job as JSON, in parts that belong to no job's folder.
+        name: File of the tile.
+        key: Key from the header.
+        tile: Rectangle of the tile in the image, in pixels.
+        layers: Arrays of the image by name, of shape (height, width) or (height, width, channels);
+            names of AOVs begin with "aov.".
+        empty: For each layer, the value of a pixel without samples, if the image has such pixels.
+        stats: Statistics from ``make_stats``.
+        metadata: As in ``Picture.metadata``.
+        manifests: As in ``Picture.manifests``.
+        costs: As in ``Picture.costs``.
+        passes: Number of passes over the pixels; an adaptive render checks errors after each.
+        looks: Number of error checks that the border around the tile allows for.
+        machine: Class of the machine that rendered the tile.
+        job: The job as JSON, for tiles outside of a job's folder.
         number: Index of the tile.
     """
 
@@ -80,7 +85,7 @@ class Part:
 
 
 def layers_of(picture: Picture) -> dict[str, NDArray[Any]]:
-    """All arrays of an image under the names of a part."""
+    """Returns all arrays of an image by their names in a tile file."""
     found = {name: getattr(picture, name) for name in _LAYERS}
     found |= {AOV + name: array for name, array in picture.aovs.items()}
     return {name: array for name, array in found.items() if array is not None}
@@ -88,10 +93,11 @@ def layers_of(picture: Picture) -> dict[str, NDArray[Any]]:
 
 @contextlib.contextmanager
 def replacing_quickly(path: Path) -> Iterator[Path]:
-    """Gives a temporary name beside ``path`` and renames it, for folders of many files.
+    """Yields a temporary name beside ``path``, and renames it to ``path`` at the end.
 
     Unlike ``picture.files.replacing`` it does not search the folder for leftovers of killed
-    processes: the whole folder goes when its image is finished.
+    processes, which is slow in folders with many files. The whole folder is removed when its image
+    is finished.
     """
     if not path.parent.is_dir():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -122,20 +128,20 @@ def save_part(
     job: Mapping[str, Any] | None = None,
     replacing: Any = replacing_quickly,
 ) -> None:
-    """Writes a tile, whole or not at all.
+    """Writes a tile, never partially.
 
     Args:
-        path: The file.
-        picture: What was rendered.
-        key: Of ``Job.part_key``.
+        path: File to write.
+        picture: Rendered pixels.
+        key: Key from ``Job.part_key``.
         number: Index of the tile.
-        tile: Its pixels in the image.
-        rendered: The pixels that ``picture`` has: the tile, perhaps with a border.
+        tile: Rectangle of the tile in the image, in pixels.
+        rendered: Rectangle of ``picture`` in the image: the tile, perhaps with a border.
         machine: Class of this machine.
-        looks: Looks at errors that the border allows for.
-        empty: A picture whose last pixel has no samples.
-        job: The job as JSON, for a part without a job's folder.
-        replacing: Gives the temporary name.
+        looks: Number of error checks that the border allows for.
+        empty: An image whose last pixel has no samples.
+        job: The job as JSON, for a tile outside of a job's folder.
+        replacing: Context manager that yields the temporary name.
     """
     x, y = tile[0] - rendered[0], tile[1] - rendered[1]
     width, height = tile[2] - tile[0], tile[3] - tile[1]
@@ -165,7 +171,7 @@ def _as_floats(array: NDArray[Any]) -> NDArray[np.float32]:
     if array.dtype == np.float32:
         return np.ascontiguousarray(array)
     if array.dtype != np.uint32 or (array.size and int(array.max()) > _EXACT):
-        raise WavecombError(f"a layer of {array.dtype.name} has no exact place in a part")
+        raise WavecombError(f"a layer of {array.dtype.name} cannot be stored exactly in a tile")
     return array.astype(np.float32)
 
 
@@ -192,21 +198,22 @@ def _write(
     good = output.open(str(file), spec) and output.write_image(pixels)
     why = "" if good else problem_of(output)
     if not (output.close() and good):
-        file.write_bytes(bytes(pixels.nbytes))  # fails with a number that says why, if it can
+        # raises an OSError that states the reason, if writing fails again
+        file.write_bytes(bytes(pixels.nbytes))
         raise OSError(
             f"{called}: cannot be written: {one_line(why or problem_of(output), str(file))}"
         )
 
 
 def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None) -> Part:
-    """Reads a tile and compares its checksum.
+    """Reads a tile and verifies its checksum.
 
     Args:
-        path: The file.
-        size: The width and height that it must have; None means any.
+        path: File to read.
+        size: Required width and height in pixels; None allows any.
 
     Raises:
-        DamagedPart: It is not there or damaged.
+        DamagedPart: The file is missing or damaged.
     """
     name = os.fspath(path)
     try:
@@ -235,34 +242,34 @@ def read_part(path: str | os.PathLike[str], size: tuple[int, int] | None = None)
             number=facts["number"],
         )  # fmt: skip
     except FileNotFoundError:
-        raise DamagedPart(f"{name}: is not there; the tile must be rendered again") from None
+        raise DamagedPart(f"{name}: is missing; the tile must be rendered again") from None
     except (OSError, KeyError, TypeError, ValueError) as error:
         why = error.args[0] if error.args else type(error).__name__
         raise DamagedPart(f"{name}: is damaged: {why}; the tile must be rendered again") from None
 
 
 def load_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> Part:
-    """Reads a tile that must have a key.
+    """Reads a tile that must have a given key.
 
     Args:
-        path: The file.
-        key: Of ``Job.part_key``.
-        tile: Its pixels in the image.
-        looks: Looks at errors that its border must allow for.
+        path: File to read.
+        key: Key from ``Job.part_key``.
+        tile: Rectangle of the tile in the image, in pixels.
+        looks: Number of error checks that its border must allow for.
 
     Raises:
-        DamagedPart: It is missing, damaged, of another key, or its border is too narrow.
+        DamagedPart: The tile is missing or damaged, has another key, or its border is too narrow.
     """
     part = read_part(path, (tile[2] - tile[0], tile[3] - tile[1]))
     if part.key != key or part.tile != tile:
         raise DamagedPart(f"{path}: is of other settings, files or machines than the job")
     if part.looks < looks:
-        raise DamagedPart(f"{path}: its border is too narrow for {looks} looks at errors")
+        raise DamagedPart(f"{path}: its border is too narrow for {looks} error checks")
     return part
 
 
 def has_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> bool:
-    """Whether ``load_part`` would give a tile."""
+    """Returns whether ``load_part`` would succeed."""
     if not path.exists():
         return False
     try:
@@ -275,7 +282,7 @@ def has_part(path: Path, key: str, tile: Rectangle, looks: int = 0) -> bool:
 def _read(name: str, size: tuple[int, int] | None) -> tuple[dict[str, Any], NDArray[np.float32]]:
     import OpenImageIO as oiio
 
-    with open(name, "rb") as file:  # its errors have numbers, which those of OpenImageIO lack
+    with open(name, "rb") as file:  # errors of open have an errno, which errors of OpenImageIO lack
         if file.read(4) != b"\x76\x2f\x31\x01":
             raise ValueError("it is no OpenEXR file")
     source = oiio.ImageInput.open(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a job: its tiles, its files with their hashes, and its folder."""
+"""Completes a job before submission: its tiles, and its files with their hashes."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from wavecomb.farm.tiling import (
 )
 
 _UNKNOWN_WORKERS = 4
-"""How many are expected where nobody says."""
+"""Number of workers assumed if it is unknown."""
 
 
 def default_folder(output: str | None, stage: str, output_dir: str | None = None) -> str:
-    """The folder of a job without --job: beside its images.
+    """Returns the folder of a job without --job, which is beside its images.
 
     >>> default_folder("out/shot.####.exr", "shot.usd")
     'out/shot.farm'
@@ -42,19 +42,19 @@ def default_folder(output: str | None, stage: str, output_dir: str | None = None
 def complete(
     job: Job, *, tiles: tuple[int, int] | None, workers: int = 0, learned: bytes | None = None
 ) -> Job:
-    """A job with its tiles and its files.
+    """Returns a job with its tiles and files filled in.
 
     Args:
         job: The job.
-        tiles: Columns and rows; None means: chosen here.
-        workers: How many are expected; 0 means: nobody knows.
-        learned: The guiding field that all images are given.
+        tiles: Columns and rows; None chooses them here.
+        workers: Expected number of workers; 0 means unknown.
+        learned: Guiding field for all images, or None.
 
     Raises:
-        WavecombError: A farm cannot render it, or files are missing.
+        WavecombError: A farm cannot render the job, or files are missing.
     """
     if not job.images:
-        raise WavecombError("all images are there; nothing is left to render")
+        raise WavecombError("all images exist; nothing is left to render")
     for shot in job.shots:
         check_reproducible(shot.settings)
         if tiles is not None:
@@ -77,7 +77,7 @@ def complete(
 
 
 def with_files(job: Job) -> Job:
-    """A job with the files that its stage needs now, and their hashes.
+    """Returns a job with the files that its stage needs now, and their hashes.
 
     Raises:
         WavecombError: The stage cannot be opened, or a file is missing.
@@ -112,14 +112,14 @@ def shot_of(
     png: str | None = None,
     stats: str | None = None,
 ) -> Shot:
-    """A shot from what ``Settings.to_dict`` and ``LoadOptions`` have, as JSON has it."""
+    """Builds a shot of plain JSON values from ``Settings.to_dict`` and ``LoadOptions`` fields."""
     from wavecomb.run.stats import plain
 
     return Shot(plain(settings), tuple(aovs), plain(loading), output, png, stats)
 
 
 def refresh(folder: Folder, job: Job) -> int:
-    """Writes a job whose stage's files may have changed; how many have."""
+    """Rewrites a job if files of its stage have changed. Returns the number of changed files."""
     before = {one.path: one.sha256 for one in folder.job.files}
     after = {one.path: one.sha256 for one in job.files}
     changed = sum(before.get(path) != after.get(path) for path in before.keys() | after.keys())

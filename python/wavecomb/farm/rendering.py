@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders tiles of a job; the stage and the renderer stay loaded from tile to tile."""
+"""Renders tiles of a job. The stage and the renderer stay loaded between tiles."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 _ABSENT = re.compile(r"(texture|MaterialX file|IES profile) .* cannot be read|cannot open layer")
-"""Warnings about a file that the image lacks."""
+"""Warnings about missing files of the stage."""
 _MOST_NAMED = 3
 
 
 class Stopped(Exception):
-    """The render was cancelled."""
+    """Exception that the render was cancelled."""
 
 
 class Renderer:
-    """Renders tiles of one job, one after another."""
+    """Renderer for the tiles of one job."""
 
     def __init__(
         self,
@@ -47,15 +47,15 @@ class Renderer:
         loading: Callable[[int, int], None] | None = None,
         is_stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Opens nothing yet.
+        """Creates a renderer without opening the stage yet.
 
         Args:
             job: The job.
-            threads: 0 means: as the job says.
-            learned: The guiding field that all images are given.
-            reporter: Shows progress.
-            loading: Called while a stage is read.
-            is_stopped: Whether the render is to end early.
+            threads: Number of threads; 0 uses the job's value.
+            learned: Guiding field for all images, or None.
+            reporter: Progress display of the render.
+            loading: Called while a stage is loading.
+            is_stopped: Returns whether to cancel the render.
         """
         self.job = job
         self.warnings: dict[str, None] = {}
@@ -68,7 +68,7 @@ class Renderer:
         self._loaded: tuple[tuple[int, float | None], LoadedStage] | None = None
 
     def close(self) -> None:
-        """Lets the stage go."""
+        """Releases the stage."""
         self._open = self._loaded = None
 
     def render(
@@ -81,21 +81,21 @@ class Renderer:
         with_job: bool = False,
         replacing: Any = None,
     ) -> dict[str, Any]:
-        """Renders a tile to a part file.
+        """Renders a tile to a file.
 
         Args:
             task: The tile.
-            path: The part's file.
+            path: File of the tile.
             machine: Class of this machine.
-            looks: Looks at errors that a border must allow for; 0 means: as many as is likely.
-            with_job: Whether the part is to say what job it belongs to.
-            replacing: As of ``save_part``.
+            looks: Number of error checks that a border must allow for; 0 chooses a likely number.
+            with_job: Whether the file also stores the job.
+            replacing: As in ``save_part``.
 
         Returns:
-            Counts for progress.
+            Counts for the progress display.
 
         Raises:
-            Stopped: ``is_stopped`` wanted that.
+            Stopped: ``is_stopped`` cancelled the render.
             WavecombError: The stage or the settings cannot be rendered.
         """
         from wavecomb.farm.part import replacing_quickly, save_part
@@ -116,7 +116,7 @@ class Renderer:
     def _settings(
         self, image: int, shot: Shot, tile: Rectangle, looks: int
     ) -> tuple[Settings, Rectangle, int]:
-        """Settings of a tile, the pixels that are rendered, and the looks that these allow for."""
+        """Returns a tile's settings, the rectangle to render and the error checks it allows for."""
         from wavecomb import _core
 
         chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
@@ -149,7 +149,7 @@ class Renderer:
         return picture_of(result, stats, scene=loaded.scene, aovs=shot.aovs), frames
 
     def _load(self, frames: Frames, task: Task, shot: Shot) -> LoadedStage:
-        """The stage for a task; tiles of one image share it."""
+        """Returns the loaded stage for a task. Tiles of one image share it."""
         key = self.job.images[task.image]
         if self._loaded is None or self._loaded[0] != key:
             self._loaded = None
@@ -165,7 +165,7 @@ class Renderer:
         return self._loaded[1]
 
     def _frames(self, task: Task, threads: int) -> Frames:
-        """The stage, open, for the shot of a task."""
+        """Returns the open stage for the shot of a task."""
         index = self.job.images[task.image][0]
         if self._open is None or self._open[0] != index:
             self.close()
@@ -180,7 +180,10 @@ class Renderer:
         return self._open[1]
 
     def _empty(self, task: Task, shot: Shot, frames: Frames, picture: Picture) -> Picture | None:
-        """A picture whose last pixel has no samples, where the whole image has such pixels."""
+        """Renders an image whose last pixel has no samples.
+
+        Returns None if the whole image has no such pixels, or for all tiles but the first.
+        """
         cropped = shot.settings.get("region") is None or shot.settings.get("crop")
         if cropped or task.tile != 0:
             return None
@@ -193,14 +196,17 @@ class Renderer:
 
 
 def _whole(shot: Shot) -> Rectangle:
-    """The pixels that a render of the whole image gives."""
+    """Returns the rectangle of pixels in a render of the whole image."""
     if shot.settings.get("crop") and shot.settings.get("region") is not None:
         return shot.region
     return 0, 0, int(shot.settings["width"]), int(shot.settings["height"])
 
 
 def looks_for(shot: Shot, looks: int = 0) -> int:
-    """Looks at errors that borders allow for: those asked for, else as many as is likely."""
+    """Returns the number of error checks that borders allow for.
+
+    This is ``looks`` or, if that is 0, a likely number. Renders that are not adaptive need 0.
+    """
     if not shot.is_adaptive:
         return 0
     return looks or most_looks(shot.settings)
@@ -209,7 +215,10 @@ def looks_for(shot: Shot, looks: int = 0) -> int:
 def list_files(
     stage: str, variants: Mapping[str, str] | None, session_layer: str | None
 ) -> tuple[tuple[StageFile, ...], tuple[str, ...]]:
-    """All files that a stage needs, with hashes, and a line for each that is missing.
+    """Lists all files that a stage needs, with hashes.
+
+    Returns:
+        The files, and a line for each missing one.
 
     Raises:
         WavecombError: The stage cannot be opened.
@@ -231,12 +240,12 @@ def list_files(
 
 
 def use_job_maps(job: Job) -> None:
-    """Has this process find the files of a job."""
+    """Applies the path maps of a job to this process."""
     use_maps(here(job.maps))
 
 
 def check_files(job: Job) -> None:
-    """Raises WavecombError unless this machine has the files that the job's keys are made of."""
+    """Raises WavecombError unless files of the job on this machine have the expected hashes."""
     lines = []
     for one in job.files:
         path = job.place(one.path)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a Dask worker runs: renders tiles, joins images, and keeps the stage between tasks.
+"""Functions that Dask workers run: rendering tiles and joining images.
 
-Dask sends these functions by name; their arguments and results are plain values. A worker has one
-unit of the resource ``machine_class()``, and each task needs it, so tasks run one at a time.
+A worker keeps the stage loaded between tasks. Dask sends these functions by name; their arguments
+and results are plain values. A worker has one unit of the resource ``machine_class()``, and each
+task needs it, so tasks run one at a time.
 """
 
 from __future__ import annotations
@@ -24,34 +25,35 @@ from wavecomb.path_maps import VARIABLE, Pair, here, mapped, use_maps
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LEAST_FREE = 1 << 16
-"""Bytes; libraries do not say why they cannot write, and a disk with less room is full."""
+"""Free bytes below which a disk counts as full, because libraries do not report why a write
+failed."""
 _LOOK_S = 1.0
 _own_maps = os.environ.get(VARIABLE)
 _kept: Any = None
-"""The ``Renderer`` of the job that this process worked on last, and the job's id."""
+"""Id, ``Renderer`` and folder of the job that this process worked on last."""
 _current: Any = None
-"""Dask's worker and the key of the task at hand; other threads than the task's ask for them."""
+"""Dask's worker and the key of the current task. Other threads than the task's read them."""
 _read: dict[str, str] = {}
-"""SHA-256 of each stage file that this process has read, which USD may still hold."""
+"""SHA-256 of each stage file that this process has read and USD may have cached."""
 
 
 class Progress:
-    """When this process last made progress; the watchdog looks at it."""
+    """Time of the last progress in this process, which the watchdog reads."""
 
     def __init__(self) -> None:
         self.at = time.monotonic()
         self.is_busy = False
 
     def note(self, *values: object) -> None:
-        """Notes that the task at hand made progress."""
+        """Records that the current task made progress."""
         self.at = time.monotonic()
 
     def show(self, status: object) -> None:
-        """As a ``Reporter``: a render made progress."""
+        """Records progress of a render (method of ``Reporter``)."""
         self.note()
 
     def wrote(self, path: str) -> None:
-        """As a ``Reporter``: nothing is written meanwhile."""
+        """Does nothing; tiles write no intermediate files (method of ``Reporter``)."""
 
     def __enter__(self) -> Progress:
         self.note()
@@ -66,12 +68,15 @@ progress = Progress()
 
 
 class FarmPlugin(WorkerPlugin):
-    """Has a worker announce its machine class as a resource, and restart when a render hangs."""
+    """Dask plugin that announces a worker's machine class.
+
+    It also restarts the worker if a render hangs.
+    """
 
     name = "wavecomb-farm"
 
     def __init__(self, isa: str | None, hang_s: float) -> None:
-        """Arguments are those fields of ``Job``."""
+        """Takes the fields ``isa`` and ``hang_s`` of ``Job``."""
         self._isa = isa
         self._hang_s = hang_s
         self._ended = threading.Event()
@@ -100,14 +105,14 @@ class FarmPlugin(WorkerPlugin):
     def _watch(self) -> None:
         while not self._ended.wait(_LOOK_S):
             if progress.is_busy and time.monotonic() - progress.at > self._hang_s:
-                os._exit(1)  # the nanny starts another worker, and Dask gives it the task
+                os._exit(1)  # Dask's nanny starts another worker, which gets the task
 
 
 def retry_unrunnable(dask_scheduler: Any) -> None:
-    """Has a scheduler look for workers again for tasks that it found none for.
+    """Makes a scheduler look again for workers for tasks that had none.
 
     Args:
-        dask_scheduler: The scheduler, in whose process this runs.
+        dask_scheduler: The scheduler. This function runs in its process.
     """
     waiting = {task.key: "waiting" for task in dask_scheduler.unrunnable}
     if waiting:
@@ -117,19 +122,19 @@ def retry_unrunnable(dask_scheduler: Any) -> None:
 def render_tiles(
     folder: str, maps: list[Pair], job: str, machine: str, tiles: list[tuple[int, int, int]]
 ) -> dict[str, Any]:
-    """Renders tiles of a job that are not there yet.
+    """Renders the given tiles of a job, except finished ones.
 
     Args:
-        folder: The job's, as the client sees it.
-        maps: Of the job.
-        job: ``Job.id``: another job in the folder is an error.
-        machine: Class of machines; this worker's.
-        tiles: Image, tile and looks at errors of each.
+        folder: Folder of the job, on the client's machine.
+        maps: Path maps of the job.
+        job: Expected ``Job.id``; a changed job in the folder is an error.
+        machine: Machine class of this worker.
+        tiles: For each tile, the index of its image, its index and the number of error checks.
 
     Returns:
-        ``done``: image and tile of each that is there now; ``failed``: image, tile and a line of
-        each that cannot be rendered; ``full``: why nothing can be written here, or empty;
-        ``warnings``: lines; ``seconds``; ``worker``: its address.
+        A dictionary: ``done``, image and tile of each finished tile; ``failed``, image, tile and an
+        error line of each tile that cannot be rendered; ``full``, why nothing can be written here,
+        or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, its address.
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.part import has_part
@@ -169,11 +174,12 @@ def render_tiles(
 def assemble_image(
     folder: str, maps: list[Pair], job: str, machine: str, image: int
 ) -> dict[str, Any]:
-    """Joins the tiles of an image and writes its files; arguments are those of ``render_tiles``.
+    """Joins the tiles of an image and writes its files; takes the arguments of ``render_tiles``.
 
     Returns:
-        ``again``: tiles that must be rendered first; ``looks``: looks at errors that their borders
-        must allow for, or 0; ``full``: why nothing can be written here, or empty; ``worker``.
+        A dictionary: ``again``, tiles that must be rendered first; ``looks``, the number of error
+        checks that their borders must allow for, or 0; ``full``, why nothing can be written here,
+        or ""; ``worker``, its address.
     """
     from wavecomb.farm.assemble import finish_image
 
@@ -192,16 +198,16 @@ def assemble_image(
 
 
 def has_stale_files(files: Iterable[tuple[str, str]], maps: list[Pair]) -> bool:
-    """Whether this process read other bytes of a file: USD may hold them, so it must restart."""
+    """Returns whether this process read another version of a file, which USD may still cache."""
     return any(_read.get(mapped(path, here(maps)), sha256) != sha256 for path, sha256 in files)
 
 
 def restart_stale(client: Any, cluster: str, job: Any) -> None:
-    """Restarts workers that have read other bytes of a job's files before.
+    """Restarts workers that have read other versions of a job's files.
 
     Args:
-        client: Dask's.
-        cluster: Its name, for messages.
+        client: Dask client.
+        cluster: Name of the cluster, for messages.
         job: The job.
 
     Raises:
@@ -223,11 +229,11 @@ def restart_stale(client: Any, cluster: str, job: Any) -> None:
 
 
 def is_full(error: OSError, path: Path) -> bool:
-    """Whether an error comes of a disk that is full, or of a quota.
+    """Returns whether a full disk or an exceeded quota caused an error.
 
     Args:
-        error: With its causes.
-        path: The file that could not be written.
+        error: The error, with its chain of causes.
+        path: File that could not be written.
     """
     cause: BaseException | None = error
     while cause is not None:
@@ -242,7 +248,7 @@ def is_full(error: OSError, path: Path) -> bool:
 
 
 def _begin() -> str:
-    """Notes the task at hand; the address of this worker."""
+    """Records the current task and returns the address of this worker."""
     global _current
     worker = get_worker()
     _current = worker, worker.get_current_task()
@@ -263,7 +269,7 @@ def _folder(folder: str, maps: list[Pair], job: str) -> Any:
 
 
 def _renderer(folder: str, maps: list[Pair], job: str) -> Any:
-    """The renderer of a job and its folder; the last ones as long as the job is the same."""
+    """Returns the renderer and folder of a job. Reuses the last ones for the same job."""
     global _kept
     if _kept is not None and _kept[0] == job:
         return _kept[1:]
@@ -287,13 +293,16 @@ def _renderer(folder: str, maps: list[Pair], job: str) -> Any:
 
 
 def _is_cancelled() -> bool:
-    """Whether nobody wants the task at hand any more: Dask does not stop threads."""
+    """Returns whether the current task was cancelled.
+
+    Dask does not stop threads of cancelled tasks.
+    """
     worker, key = _current
     task = worker.state.tasks.get(key)
     return task is None or task.state == "cancelled" or worker.status.name != "running"
 
 
 def _withdraw(machine: str) -> None:
-    """Has Dask give this worker no more tasks of the farm."""
+    """Makes Dask assign no further farm tasks to this worker."""
     worker = get_worker()
     sync(worker.loop, worker.set_resources, **{machine: 0})

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cuts images into tiles: pixels, never samples. Refuses what a farm cannot render or cut."""
+"""Divides images into tiles of pixels (samples are never divided).
+
+Also rejects settings that a farm cannot render or cannot divide into tiles.
+"""
 
 from __future__ import annotations
 
@@ -11,25 +14,25 @@ from typing import Any
 from wavecomb.errors import WavecombError
 
 Rectangle = tuple[int, int, int, int]
-"""x0, y0, x1, y1 in pixels of the whole picture, the end excluded."""
+"""Rectangle (x0, y0, x1, y1) in pixels of the whole image, without column x1 and row y1."""
 
 MOST_TILES = 9999
-"""Columns or rows of an image."""
+"""Largest number of columns or rows of an image."""
 LEAST_EDGE = 64
-"""Pixels of the edges of tiles that ``choose_tiles`` chooses."""
+"""Smallest edge of tiles that ``choose_tiles`` chooses, in pixels."""
 TILES_OF_A_WORKER = 4
-"""Tiles of an image for each worker, so that workers end at about the same time."""
+"""Number of tiles of an image for each worker, so that workers end at about the same time."""
 _CHECK_SAMPLES = 16
-"""Samples between two looks of the core at errors (render/passes/pass_plan.cpp)."""
+"""Samples per pixel between two error checks of the core (render/passes/pass_plan.cpp)."""
 _REACH = 4
-"""Pixels that one look at errors reaches: a mean over two to each side, and marks that spread by
-two more."""
+"""Distance in pixels over which one error check has an effect: 2 for the mean of errors over
+neighbouring pixels, and 2 for spreading the marks of unfinished pixels."""
 _WINDOW = 2
-"""Pixels to each side over which the layer of errors is a mean."""
+"""Radius in pixels of the mean in the layer of errors."""
 
 
 def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
-    """A region cut into columns and rows, row by row; as even as whole pixels are.
+    """Divides a region into columns and rows of almost equal size; returns the tiles row by row.
 
     >>> tiles_of((0, 0, 10, 4), (3, 1))
     [(0, 0, 3, 4), (3, 0, 6, 4), (6, 0, 10, 4)]
@@ -42,10 +45,10 @@ def tiles_of(region: Rectangle, tiles: tuple[int, int]) -> list[Rectangle]:
 
 
 def parse_tiles(text: str) -> tuple[int, int] | None:
-    """Columns and rows of "4x3"; None for "auto".
+    """Parses columns and rows such as "4x3"; returns None for "auto".
 
     Raises:
-        WavecombError: It is neither.
+        WavecombError: The text is neither.
     """
     if text == "auto":
         return None
@@ -56,13 +59,13 @@ def parse_tiles(text: str) -> tuple[int, int] | None:
 
 
 def parse_tile(text: str) -> tuple[int, int]:
-    """Index from 0 and count of "3/8", the third of eight tiles.
+    """Parses a tile such as "3/8", the third of eight; returns its index from 0 and the count.
 
     >>> parse_tile("3/8")
     (2, 8)
 
     Raises:
-        WavecombError: It is no such pair.
+        WavecombError: The text is not a tile and a count.
     """
     match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
     if match is None or not 1 <= int(match[1]) <= int(match[2]):
@@ -71,13 +74,13 @@ def parse_tile(text: str) -> tuple[int, int]:
 
 
 def layout(count: int, region: Rectangle) -> tuple[int, int]:
-    """Columns and rows of exactly ``count`` tiles, as near to squares as whole numbers allow.
+    """Returns columns and rows of exactly ``count`` tiles that are as square as possible.
 
     >>> layout(8, (0, 0, 1920, 1080))
     (4, 2)
 
     Raises:
-        WavecombError: The region has too few pixels for them.
+        WavecombError: The region has too few pixels for that many tiles.
     """
     width, height = region[2] - region[0], region[3] - region[1]
     fits = [
@@ -95,14 +98,16 @@ def layout(count: int, region: Rectangle) -> tuple[int, int]:
 def choose_tiles(
     regions: list[Rectangle], pictures: int, workers: int, whole: bool
 ) -> tuple[int, int]:
-    """Columns and rows for ``--tiles auto``: whole images where there are two for each worker.
+    """Returns columns and rows for ``--tiles auto``.
+
+    Images stay whole if there are at least two for each worker.
 
     Args:
-        regions: Of the images, each size once.
-        pictures: How many images there are.
-        workers: How many are expected.
-        whole: Whether tiles cost more than they gain: each would need a wide border, or would
-            learn a guiding field.
+        regions: Regions of the images, each size once.
+        pictures: Number of images.
+        workers: Expected number of workers.
+        whole: Whether tiles cost more than they gain, because each would need a wide border or
+            would train a guiding field.
     """
     if workers < 2 or whole or pictures >= 2 * workers:
         return 1, 1
@@ -115,7 +120,7 @@ def choose_tiles(
 
 
 def looks(settings: Mapping[str, Any]) -> int:
-    """How often an adaptive render looks at errors before its pixels have all samples.
+    """Returns the number of error checks before all pixels of an adaptive render have all samples.
 
     >>> looks({"spp": 64, "min_spp": 16})
     3
@@ -131,19 +136,19 @@ def looks(settings: Mapping[str, Any]) -> int:
 
 
 def most_looks(settings: Mapping[str, Any]) -> int:
-    """Looks that the border of an adaptive tile allows for.
+    """Returns the number of error checks that the border of an adaptive tile allows for.
 
-    Four more than there are before the last samples: pixels that go on late take further ones.
+    It is 4 more than ``looks``, because pixels that resume late take further checks.
     """
     return looks(settings) + 4
 
 
 def border(settings: Mapping[str, Any], count: int) -> int:
-    """Pixels that are rendered around an adaptive tile, so that ``count`` looks see the picture.
+    """Returns the width, in pixels, of the border to render around a tile.
 
-    What a look at errors decides of a pixel depends on pixels up to 4 away, so what is beyond a
-    border of 4 pixels for each look cannot have reached the tile; the layer of errors is a mean
-    over two pixels more. Renders without errors need none.
+    An error check decides about a pixel from pixels up to 4 away. With a border of 4 pixels for
+    each of ``count`` checks, pixels beyond the border cannot affect an adaptive tile. The layer of
+    errors needs 2 more pixels for its mean. Renders without errors need no border.
     """
     if settings.get("adaptive"):
         return _REACH * count + _WINDOW
@@ -151,7 +156,7 @@ def border(settings: Mapping[str, Any], count: int) -> int:
 
 
 def grown(tile: Rectangle, border: int, region: Rectangle) -> Rectangle:
-    """A tile with a border, as far as there is a picture."""
+    """Returns a tile extended by a border, clipped to the region."""
     x0, y0, x1, y1 = tile
     return (
         max(region[0], x0 - border), max(region[1], y0 - border),
@@ -160,15 +165,15 @@ def grown(tile: Rectangle, border: int, region: Rectangle) -> Rectangle:
 
 
 def check_reproducible(settings: Mapping[str, Any]) -> None:
-    """Raises WavecombError for settings whose pictures are never the same twice."""
+    """Raises WavecombError for settings whose images differ from render to render."""
     if settings.get("time_limit"):
         raise WavecombError(
-            "--time-limit: how many samples fit depends on the machine, so a farm's pictures would "
-            "differ from one machine's: give --spp, --adaptive or --noise"
+            "--time-limit: the sample count would depend on the machine, so a farm's images would "
+            "differ from those of one machine: give --spp, --adaptive or --noise"
         )
     if settings.get("costs") == "measured" and _costs_matter(settings):
         raise WavecombError(
-            "--costs measured: times of one machine decide over the picture here, and a farm has "
+            "--costs measured: the image would depend on times of one machine, and a farm has "
             "several: give --costs model"
         )
 
@@ -178,20 +183,21 @@ def _costs_matter(settings: Mapping[str, Any]) -> bool:
 
 
 def needs_whole(settings: Mapping[str, Any]) -> str:
-    """Why pictures cannot be cut into tiles; empty: they can."""
+    """Returns why images cannot be divided into tiles, or "" if they can."""
     if settings.get("noise"):
         return f"--noise {settings['noise']:g}: is of the whole picture"
     if settings.get("allocate", "even") != "even":
         return f"--allocate {settings['allocate']}: shares samples out over the whole picture"
     if settings.get("firefly", "keep") != "keep":
-        return f"--firefly {settings['firefly']}: looks at the pixels around each"
+        return f"--firefly {settings['firefly']}: depends on neighbouring pixels"
     return ""
 
 
 def is_better_whole(settings: Mapping[str, Any], is_taught: bool = False) -> bool:
-    """Whether each tile costs much beside its own pixels: a border, a field, all light paths.
+    """Returns whether each tile has a high cost in addition to its pixels.
 
-    ``is_taught``: the field is given.
+    This is the case for a border, for training a guiding field, and for tracing all light paths.
+    ``is_taught`` says that the guiding field is already trained.
     """
     learns = settings.get("guiding", "off") != "off" or settings.get("roulette") == "efficient"
     return (
@@ -202,7 +208,7 @@ def is_better_whole(settings: Mapping[str, Any], is_taught: bool = False) -> boo
 
 
 def check_tiles(settings: Mapping[str, Any], tiles: tuple[int, int]) -> None:
-    """Raises WavecombError where pictures cannot be cut so."""
+    """Raises WavecombError if images cannot be divided into these tiles."""
     why = needs_whole(settings)
     if why and tiles != (1, 1):
-        raise WavecombError(f"{why}, which tiles do not see: give --tiles 1x1")
+        raise WavecombError(f"{why}, which a tile lacks: give --tiles 1x1")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A process that hosts Dask workers: ``dask worker`` with certificates from a private file.
+"""Process that hosts Dask workers, like ``dask worker`` with certificates from a private file.
 
-Dask's own command would import modules of the working folder, and reads a name with a line break as
-a certificate.
+Dask's command would import modules from the working folder, and would read a file name with a line
+break as a certificate.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TLS_FILE = "tls.json"
 
 
 def write_certificates(place: Path, security: Any) -> None:
-    """Writes the certificates of a ``Security`` for ``main``; their owner alone can read them."""
+    """Writes the certificates of a ``Security`` for ``main``, readable only by their owner."""
     values = {
         "ca-file": security.tls_ca_file,
         "worker": {"cert": security.tls_worker_cert, "key": security.tls_worker_key},

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The window, `wavecomb view`. Nothing outside this package and cli/view.py imports Qt."""
+"""The window of `wavecomb view`. Only this package and cli/view.py import Qt."""

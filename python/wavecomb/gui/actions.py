@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All actions of the window in one table: text, shortcuts, what they do, where they stand."""
+"""Actions of the window: their texts, shortcuts, callbacks and places in menus."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QWidget
 
 TITLE = "title"
-"""Property: the text of an action as it was made, where it says more meanwhile."""
+"""Property of an action with its original text, for actions whose text changes."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One action.
+    """An action of the window.
 
     Attributes:
-        name: Object name, "action.NAME".
-        text: In the menu, with a mnemonic.
-        call: What it does; gets the new state where the action can be checked.
-        keys: Shortcuts; the first is shown in the menu.
-        tip: What it does in a sentence.
-        checkable: It is on or off.
-        local: Works while the viewport has the focus; single keys would disturb typing elsewhere.
+        name: Object name without the prefix "action.".
+        text: Text in the menu, with a mnemonic.
+        call: Callback. A checkable action passes its new state.
+        keys: Shortcuts; the menu shows the first.
+        tip: Description in a sentence.
+        checkable: Whether the action can be on or off.
+        local: Whether the shortcut works only while the viewport has the focus. Single keys need
+            this, because they would otherwise interfere with typing.
     """
 
     name: str
@@ -39,7 +40,7 @@ class Entry:
 
 
 def make_action(entry: Entry, window: QWidget, viewport: QWidget) -> QAction:
-    """The action, at home in the window or in the viewport."""
+    """Creates the action, owned by the window or, if it is local, by the viewport."""
     home = viewport if entry.local else window
     action = QAction(entry.text, home)
     action.setObjectName(f"action.{entry.name}")
@@ -60,21 +61,22 @@ def make_action(entry: Entry, window: QWidget, viewport: QWidget) -> QAction:
 
 
 def keypad(digit: int) -> tuple[str, str]:
-    """A digit of either block of the keyboard."""
+    """Returns the shortcuts of a digit, in the number row and on the keypad."""
     return str(digit), f"Num+{digit}"
 
 
-# ---- Actions that say what they would undo or redo, and the mark of what is not saved ------------
+# ---- Texts of undo and redo, and the mark for unsaved edits
+# ----------------------------------------
 
 
 class HistoryActions(QObject):
-    """Makes two actions follow a stack: "Undo intensity of /Key".
+    """Updater of the texts of undo and redo, such as "Undo intensity of /Key".
 
     Args:
-        stack: Its texts come after the actions' own.
-        undo: Its first action.
-        redo: Its second action.
-        parent: Lives as long.
+        stack: Undo stack, whose texts are appended to the actions' texts.
+        undo: The undo action.
+        redo: The redo action.
+        parent: Qt parent.
     """
 
     def __init__(self, stack: QUndoStack, undo: QAction, redo: QAction, parent: QObject) -> None:
@@ -97,12 +99,12 @@ class HistoryActions(QObject):
         self._tell(self._redo, what)
 
     def _tell(self, action: QAction, what: str) -> None:
-        if shiboken6.isValid(action):  # a stack that goes empties itself
+        if shiboken6.isValid(action):  # a stack clears itself while it is destroyed
             action.setText(f"{self._texts[action]} {what.replace('&', '&&')}".rstrip())
 
 
 class UnsavedMark(QObject):
-    """The window's title has a mark where the edits are not as they were saved."""
+    """Updater of the mark in the window's title that stands for unsaved edits."""
 
     def __init__(self, stack: QUndoStack, window: QWidget) -> None:
         super().__init__(window)

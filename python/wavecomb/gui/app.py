@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the window and runs it to its end."""
+"""Starts the window and runs it until it is closed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ from wavecomb.gui.setup import Setup
 
 
 def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
-    """Qt's own messages: what ends the process becomes one line, the rest is for developers."""
+    """Handles messages of Qt.
+
+    A fatal message becomes one error line. All other messages are for developers.
+    """
     if kind == QtMsgType.QtFatalMsg:
         line = " ".join(text.split())
         if "platform plugin" in line and not has_display():
@@ -43,7 +46,7 @@ def _qt_says(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
 
 
 def make_application() -> QApplication:
-    """The application; raises WavecombError where there is no display."""
+    """Creates the application. Raises WavecombError if there is no display."""
     if not has_display():
         raise WavecombError(NO_DISPLAY)
     qInstallMessageHandler(_qt_says)
@@ -66,7 +69,7 @@ def run(
     variants: Mapping[str, str] | None = None,
     purposes: tuple[str, ...] | None = None,
 ) -> int:
-    """Shows the window; returns the exit code when it is closed."""
+    """Shows the window until it is closed, and returns the exit code."""
     application = make_application()
     from wavecomb.gui.main_window import MainWindow
     from wavecomb.usd.stage.diagnostics import Listening
@@ -78,10 +81,10 @@ def run(
         (one, signal.signal(one, lambda *_: window.close()))
         for one in (signal.SIGINT, signal.SIGTERM)
     ]
-    # Python looks at signals only while it runs.
+    # Python handles signals only while its interpreter runs, so a timer wakes it regularly.
     beat = QTimer(window)
     beat.start(200)
-    # What USD says of edits and of what panels look at goes to the notes, as what loading found.
+    # USD also reports problems during edits and when panels read the stage. Add them to the notes.
     listening = Listening()
     beat.timeout.connect(lambda: window.session.note_words(listening.take()))
     window.show()
@@ -98,9 +101,9 @@ def run(
 
 
 def destroy(window: QWidget) -> None:
-    """Ends a window that is closed, now and here: not when Python's collector finds it.
+    """Destroys a closed window immediately, instead of leaving it to Python's garbage collector.
 
-    What Python still has of its parts has nothing of Qt's behind it any more.
+    Python objects of the window's parts remain, but their Qt objects no longer exist.
     """
     window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

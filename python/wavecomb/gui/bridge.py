@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one way from other threads to the window's; they hold and make no object of Qt's for it.
+"""Messages from other threads to the thread of the window, without Qt objects on other threads.
 
-A thread puts a letter into a mailbox of plain Python and writes a byte to a socket. A notifier on
-the window's thread sees the byte and hands the letters to whom they are for. No thread but the
-window's takes a lock of Qt's: docs/decisions/window-threads.md says why that matters.
+A thread puts a message into a plain Python mailbox and writes a byte to a socket. A socket notifier
+on the window's thread sees the byte and passes the messages to their receivers. Only the window's
+thread takes locks of Qt; docs/decisions/window-threads.md explains why that matters.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Receive = Callable[[Any], None]
 
 
 class Mailbox:
-    """Letters from any thread to one. Knows nothing of Qt."""
+    """Queue of messages from any thread to one thread. Independent of Qt."""
 
     def __init__(self) -> None:
         self._letters: deque[tuple[int, Any]] = deque()
@@ -33,33 +33,33 @@ class Mailbox:
         self._writer.setblocking(False)
 
     def fileno(self) -> int:
-        """Can be read where there are letters."""
+        """Returns a file descriptor that is readable while there are messages."""
         return self._reader.fileno()
 
     def put(self, address: int, letter: Any) -> None:
-        """From any thread; waits for nothing."""
+        """Adds a message, from any thread, without blocking."""
         self._letters.append((address, letter))
         self.wake()
 
     def wake(self) -> None:
-        """Makes the reader look."""
-        # A full socket is one that is going to be read anyway.
+        """Wakes the reader."""
+        # A full socket buffer already wakes the reader.
         with contextlib.suppress(OSError):
             self._writer.send(b"\0")
 
     def hush(self) -> None:
-        """What was written until now is seen; letters that come later wake the reader again."""
+        """Clears all wake-ups so far. Later messages wake the reader again."""
         with contextlib.suppress(OSError):
             while self._reader.recv(4096):
                 pass
 
     def take(self) -> tuple[int, Any] | None:
-        """The oldest letter and its address; None: there is none."""
+        """Removes and returns the oldest message and its address, or returns None."""
         return self._letters.popleft() if self._letters else None
 
 
 class Port:
-    """Where a thread sends what one receiver is to have. Plain Python: any thread may keep it."""
+    """Sender of messages to one receiver. A plain Python object that any thread may hold."""
 
     __slots__ = ("_address", "_mailbox")
 
@@ -67,12 +67,12 @@ class Port:
         self._mailbox, self._address = mailbox, address
 
     def send(self, letter: Any) -> None:
-        """The receiver gets it on the window's thread, after what was sent before."""
+        """Sends a message. The receiver gets messages in order, on the window's thread."""
         self._mailbox.put(self._address, letter)
 
 
 class Bridge(QObject):
-    """Hands letters to their receivers; one for an application, on its thread."""
+    """Dispatcher of messages to receivers, one for the application, on its thread."""
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -83,7 +83,7 @@ class Bridge(QObject):
         self._notifier.activated.connect(self._deliver)
 
     def port(self, receive: Receive) -> Port:
-        """A port whose letters go to a method; it is not kept alive by that."""
+        """Creates a port that sends to a bound method, without keeping its object alive."""
         address = next(self._numbers)
         forget = partial(_forget, self._receivers, address)
         self._receivers[address] = weakref.WeakMethod(receive, forget)
@@ -99,7 +99,7 @@ class Bridge(QObject):
             try:
                 receive(letter[1])
             except BaseException:
-                self._mailbox.wake()  # the others still have to get theirs
+                self._mailbox.wake()  # delivers the remaining messages later
                 raise
 
 
@@ -108,7 +108,7 @@ def _forget(receivers: dict[int, Any], address: int, reference: object) -> None:
 
 
 def _is_there(receiver: object) -> bool:
-    """Whether Qt has not destroyed it."""
+    """Returns whether Qt has not destroyed the receiver."""
     return not isinstance(receiver, QObject) or shiboken6.isValid(receiver)
 
 
@@ -116,10 +116,12 @@ _bridge: Bridge | None = None
 
 
 def port(receive: Receive) -> Port:
-    """Where another thread sends what a method is to get on the window's; called on the window's.
+    """Creates a port through which other threads send messages to the window's thread.
+
+    Must be called on the window's thread.
 
     Args:
-        receive: A bound method. Where its object has gone letters are dropped.
+        receive: A bound method. Messages are dropped once its object is gone.
     """
     global _bridge
     application = QCoreApplication.instance()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A `wavecomb` command in a process of its own, so that the window never waits for it."""
+"""Runs `wavecomb` commands in separate processes, so that the window never waits for them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from PySide6.QtCore import QObject, QProcess, QTimer, Signal
 from wavecomb import processes
 
 KILL_MS = 8000
-"""After a stop: what has not ended by then is killed."""
+"""Time after a stop request after which the process is killed, in milliseconds."""
 
 
 class Command(QObject):
-    """One process at a time.
+    """A process that runs a command, one at a time.
 
     Signals:
-        event(dict): A JSON object that it wrote to stdout as a line.
-        said(str): Another line, of stdout or stderr.
-        finished(code, text, error): How it ended; all of stdout; the last line of stderr that is
-            an error, or "". A process that was stopped has the code 130.
+        event(dict): The process printed a line with a JSON object on stdout.
+        said(str): The process printed another line, on stdout or stderr.
+        finished(code, text, error): The process ended: exit code, all of stdout, and the last line
+            of stderr if it failed, else "". A stopped process has the code 130.
     """
 
     event = Signal(dict)
@@ -40,15 +40,15 @@ class Command(QObject):
 
     @property
     def running(self) -> bool:
-        """Whether there is a process."""
+        """Whether a process is running."""
         return self._process is not None
 
     def start(self, arguments: Sequence[str], *, module: str = "wavecomb", text: str = "") -> None:
         """Runs a module of Wavecomb as a program.
 
         Args:
-            arguments: Of the command line.
-            module: The module; the default is the command line.
+            arguments: Command-line arguments.
+            module: The module; the default is the command-line program.
             text: Standard input.
         """
         assert self._process is None, "one at a time"
@@ -60,7 +60,7 @@ class Command(QObject):
         self._process = process
         self._out = self._err = self._text = self._last = ""
         self._stopping = False
-        # Qt starts it from this thread, which is the main one and stays.
+        # Qt starts the process from the main thread, which exists as long as the window.
         flags = ["-u", "-X", "utf8"]
         words = processes.command(module, *arguments, parent=os.getpid(), flags=flags)
         process.start(words[0], words[1:])
@@ -68,7 +68,7 @@ class Command(QObject):
         process.closeWriteChannel()
 
     def stop(self) -> None:
-        """Asks it to end (SIGTERM); kills it if it does not."""
+        """Sends SIGTERM to the process, and kills it later if it does not end."""
         process = self._process
         if process is None:
             return
@@ -80,7 +80,7 @@ class Command(QObject):
         QTimer.singleShot(KILL_MS, process, process.kill)
 
     def shutdown(self) -> None:
-        """Asks it to end and waits for that, three seconds at most: the window is closing."""
+        """Ends the process when the window closes, waiting at most three seconds."""
         process, self._process = self._process, None
         if process is not None:
             process.blockSignals(True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render > Send to a farm: a job of what the window shows, and how far it is."""
+"""Dialog of Render > Send to a farm, which submits a job and shows its progress."""
 
 from __future__ import annotations
 
@@ -28,22 +28,23 @@ from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
-"""From an output file to what ``farm.from_json`` takes; raises WavecombError."""
+"""Function that describes a job for ``farm.from_json``, given its output file. Raises
+WavecombError."""
 
 
 class FarmDialog(QDialog):
-    """Asks where to, sends, and watches.
+    """Dialog that asks for output and workers, submits the job and shows its progress.
 
     Attributes:
-        folder: Of the job; None: there is none yet.
+        folder: Folder of the job; None before it is submitted.
     """
 
     def __init__(self, describe: Describe, output: str, parent: QWidget | None = None) -> None:
-        """Nothing is sent yet.
+        """Creates the dialog without submitting anything.
 
         Args:
-            describe: What is to be rendered.
-            output: A file to begin with.
+            describe: Describes the job.
+            output: Initial output file.
             parent: The window.
         """
         super().__init__(parent)
@@ -56,10 +57,10 @@ class FarmDialog(QDialog):
         self._command.finished.connect(self._end)
         self._is_resuming = False
         self.output = self._line(
-            "farm.output", "Picture", output, "A file; for frames a name with ####"
+            "farm.output", "Picture", output, "File name; with #### for several frames"
         )
         self.frames = self._line(
-            "farm.frames", "Frames", "", "Such as 1-48; empty: the one that is shown"
+            "farm.frames", "Frames", "", "Such as 1-48; empty means the current frame"
         )
         self.tiles = self._line(
             "farm.tiles", "Tiles", "auto", "auto, or columns and rows such as 4x3"
@@ -67,10 +68,10 @@ class FarmDialog(QDialog):
         self.engine = self._line(
             "farm.on", "On", "local:2", "local:N, dask:ADDRESS, slurm:N, or none"
         )
-        self.send = named(QPushButton("&Send"), "farm.send", "Send", "Write the job and work on it")
-        self.stop = named(QPushButton("S&top"), "farm.stop", "Stop", "Finished tiles are kept")
-        self.bar = named(QProgressBar(), "farm.bar", "Progress", "Tasks that are done")
-        self.state = named(QLabel(), "farm.state", "State", "Where the job stands")
+        self.send = named(QPushButton("&Send"), "farm.send", "Send", "Write the job and render it")
+        self.stop = named(QPushButton("S&top"), "farm.stop", "Stop", "Keeps finished tiles")
+        self.bar = named(QProgressBar(), "farm.bar", "Progress", "Finished tasks")
+        self.state = named(QLabel(), "farm.state", "State", "State of the job")
         self.state.setWordWrap(True)
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.stop.setEnabled(False)
@@ -99,7 +100,7 @@ class FarmDialog(QDialog):
     # ---- what it does ----------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Writes the job in a process, since reading a stage takes time, and then works on it."""
+        """Submits the job in a process, since reading a stage takes time, and then runs it."""
         try:
             wanted = self._describe(self.output.text())
         except WavecombError as error:
@@ -121,7 +122,7 @@ class FarmDialog(QDialog):
         self.stop.setEnabled(True)
 
     def _take(self, found: dict[str, Any]) -> None:
-        """Handles a JSON line: the job that was written, why it was not, or its progress."""
+        """Handles a JSON line: the job that was written, an error, or progress."""
         if "error" in found:
             self.say(found["error"])
         elif "job" in found and not self._is_resuming:
@@ -153,11 +154,11 @@ class FarmDialog(QDialog):
         self._command.stop()
 
     def say(self, line: str) -> None:
-        """Shows a line in place of the state."""
+        """Shows a line of text as the state."""
         self.state.setText(html.escape(line))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Stops a running job and hides until it has ended; finished tiles are kept."""
+        """Stops a running job, and hides until it has ended. Finished tiles are kept."""
         if not self._command.running:
             super().closeEvent(event)
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the window shows as the description of a job (``farm.from_json``)."""
+"""Describes the window's stage, edits and settings as a farm job (``farm.from_json``)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NOT_FOR_A_FARM = ("time_limit",)
 
 
 def changed_settings(setup: Setup) -> dict[str, Any]:
-    """Settings that are not as they always are, but size and samples."""
+    """Returns the settings that differ from their defaults, except size and samples."""
     rows = settings()
     return {
         one.name: getattr(setup, one.name)
@@ -32,15 +32,18 @@ def changed_settings(setup: Setup) -> dict[str, Any]:
 
 
 def describe(session: Session, edits: StageEdits | None, output: str) -> dict[str, Any]:
-    """A job of what is shown; edits are saved beside the picture, as a layer over the stage.
+    """Describes a farm job for the displayed image.
+
+    Edits are saved as a layer over the stage, beside the image.
 
     Args:
-        session: Of the window.
-        edits: Of its stage.
-        output: The picture's file.
+        session: Session of the window.
+        edits: Edits of its stage.
+        output: File of the image.
 
     Raises:
-        WavecombError: There is no stage, the view is of no camera, or edits cannot be saved.
+        WavecombError: There is no stage, the view is not through a camera, or edits cannot be
+            saved.
     """
     source, setup = session.source, session.setup
     if source is None:
@@ -48,16 +51,14 @@ def describe(session: Session, edits: StageEdits | None, output: str) -> dict[st
     if Path(output).suffix.lower() != ".exr":
         raise WavecombError(f"{output or 'Picture'}: give a file that ends in .exr")
     if setup.own_policy is not None:
-        raise WavecombError("a policy in Python is of this window; choose another")
+        raise WavecombError("a Python policy exists only in this window; choose another")
     if session.pose is not None and session.pose.path is None:
-        raise WavecombError(
-            "the view is free, and a job renders through a camera: choose one of the stage's"
-        )
+        raise WavecombError("the view is free, and a job needs a camera: choose one of the stage")
     stage = str(source.path)
     if edits is not None and edits.lines():
         if edits.values:
             raise WavecombError(
-                f"{len(edits.values)} edit(s) have no place in a layer, so a job would lack them"
+                f"{len(edits.values)} edit(s) cannot be saved in a layer, so a job would lack them"
             )
         target = Path(output.replace("#", "") or "shot").with_suffix(".edits.usda")
         stage = str(save_edits(edits.stage, target))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Views of lists: whole rows are chosen, and the roles of `table_model` are painted."""
+"""List views that select whole rows and paint the roles of ``table_model``."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ Index = QModelIndex | QPersistentModelIndex
 
 
 def tone(name: str) -> QColor:
-    """The colour of a ``ToneRole``."""
+    """Returns the colour of a ``ToneRole``."""
     return {"dim": theme.dim, "warning": theme.warning, "error": theme.error}[name]()
 
 
 class RowDelegate(QStyledItemDelegate):
-    """Paints ``ColourRole`` and ``ToneRole``."""
+    """Delegate that paints ``ColourRole`` and ``ToneRole``."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
-        """As Qt has it."""
+        """Initialises the style option with colour and tone."""
         super().initStyleOption(option, index)
         colour = index.data(ColourRole)
         if colour is not None:
@@ -47,7 +47,7 @@ class RowDelegate(QStyledItemDelegate):
 
 
 def show_rows(view: QTableView, name: str, title: str, tip: str) -> None:
-    """A list without a grid of which whole rows are chosen."""
+    """Sets up a list without grid lines that selects whole rows."""
     named(view, name, title, tip)
     view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     view.setTabKeyNavigation(False)
@@ -66,15 +66,15 @@ def lay_out_rows(
     stretch: int,
     widths: Mapping[int, float],
 ) -> None:
-    """A list of which whole rows are chosen, one at a time.
+    """Sets up a list that selects whole rows, one at a time.
 
     Args:
-        view: With its model.
+        view: View that already has its model.
         name: Object name.
         title: Accessible name.
         tip: Tooltip.
-        stretch: Column that takes what room is left.
-        widths: Of the others, in font heights.
+        stretch: Column that takes the remaining width.
+        widths: Widths of the fixed columns, in font heights.
     """
     show_rows(view, name, title, tip)
     view.setItemDelegate(RowDelegate(view))
@@ -86,7 +86,7 @@ def lay_out_rows(
 
 
 def compact(view: QTableView, name: str, title: str, tip: str) -> None:
-    """Rows of one line; long texts are cut in the middle, where paths say least."""
+    """Sets up rows of one line; long texts such as paths are shortened in the middle."""
     show_rows(view, name, title, tip)
     view.setWordWrap(False)
     view.setTextElideMode(Qt.TextElideMode.ElideMiddle)

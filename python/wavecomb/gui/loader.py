@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What reading a stage for the window takes and gives. No Qt: it happens on another thread."""
+"""Reading of a stage for the window. Independent of Qt, because it runs on another thread."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from wavecomb.usd.looks.texture import TextureCache
 
 @dataclass(frozen=True)
 class Source:
-    """What is read, and how.
+    """A stage to read, with its loading options.
 
     Attributes:
-        path: The stage's file.
-        camera: Prim path or unique name.
-        time: Time code; None: the stage's start.
-        variants: Selections as ``wavecomb.load`` takes them; made in the session layer.
-        purposes: Of the geometry; None: default and render.
+        path: File of the stage.
+        camera: Prim path or unique name, or None.
+        time: Time code; None means the start of the stage.
+        variants: Selections as for ``wavecomb.load``, authored in the session layer.
+        purposes: Purposes of the geometry; None means default and render.
     """
 
     path: Path
@@ -35,16 +35,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Request:
-    """What the session wants to be read.
+    """Request of a session to read a stage.
 
     Attributes:
-        source: What to read.
-        usd: A stage that is open already, or None.
-        overrides: What its session layer holds; a copy of its own.
-        fresh: Read the layers of ``usd`` from the disk again, first.
-        threads: For textures; 0: all.
-        textures: Of the scene read before, to share.
-        size: Of the picture, width and height.
+        source: Stage and loading options.
+        usd: A stage that is already open, or None.
+        overrides: Private copy of its session layer, or None.
+        fresh: Whether to reload the layers of ``usd`` from disk first.
+        threads: Number of threads for textures; 0 uses all cores.
+        textures: Textures of the previous scene, to share.
+        size: Width and height of the image, in pixels.
     """
 
     source: Source
@@ -57,7 +57,7 @@ class Request:
 
 
 def copied(layer: Sdf.Layer) -> Sdf.Layer:
-    """A layer with the same content that nobody else has."""
+    """Returns a private copy of a layer."""
     copy = Sdf.Layer.CreateAnonymous("overrides.usda")
     copy.TransferContent(layer)
     return copy
@@ -95,7 +95,7 @@ def read(request: Request) -> Read:
 
 
 def _overrides(request: Request, usd: Usd.Stage) -> Sdf.Layer:
-    """The requested session layer, by default that of the stage that is open."""
+    """Returns the requested session layer, by default the one of the open stage."""
     return usd.GetSessionLayer() if request.overrides is None else request.overrides
 
 

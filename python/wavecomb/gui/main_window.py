@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The window: puts viewport, bars and panels together."""
+"""The main window, which contains viewport, bars and panels."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class MainWindow(TakesFiles, QMainWindow):
     """The window of `wavecomb view`.
 
     Args:
-        setup: To begin with.
-        settings: Where the window's state is kept; None: the user's.
+        setup: Initial render settings.
+        settings: Storage of the window's state; None uses the user's settings.
     """
 
     def __init__(self, setup: Setup | None = None, settings: QSettings | None = None) -> None:
@@ -103,7 +103,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self.resizeDocks(sides, [theme.em(22), theme.em(20)], Qt.Orientation.Horizontal)
 
     def _room(self, wide: int, high: int) -> QSize:
-        """A size, or what the screen has; frames of windows take some of it."""
+        """Limits a size to the screen, minus some space for the window frame."""
         there = self.screen().availableGeometry().size()
         return QSize(
             min(wide, there.width() - theme.em(0.5)), min(high, there.height() - theme.em(2.5))
@@ -132,7 +132,7 @@ class MainWindow(TakesFiles, QMainWindow):
         return dock
 
     def _size_bottom(self, visible: bool) -> None:
-        """A panel below the picture gets room when shown first, not all that it would like."""
+        """Limits the height of a panel below the image when it is first shown."""
         if visible and not self._bottom_sized:
             self._bottom_sized = True
             shown = [dock for dock in self.docks.values() if dock is self.sender()]
@@ -184,23 +184,23 @@ class MainWindow(TakesFiles, QMainWindow):
         variants: Mapping[str, str] | None = None,
         purposes: tuple[str, ...] | None = None,
     ) -> None:
-        """Reads a stage."""
+        """Opens a stage."""
         self.message.hide()
         self.session.open(path, camera, time, variants, purposes)
 
     def ask_open(self) -> None:
-        """Lets the user choose a file."""
+        """Opens a dialog to choose a stage."""
         folder = str(self.session.path.parent) if self.session.path is not None else ""
         kinds = " ".join(f"*{ending}" for ending in ENDINGS)
         ask_file(self, "Open a stage", f"USD ({kinds})", self.open, start=folder)
 
     def reload(self) -> None:
-        """Reads the stage from the disk again."""
+        """Reads the stage from disk again."""
         self.message.hide()
         self.session.reload()
 
     def recent(self) -> list[str]:
-        """Files that were opened, the last first."""
+        """Returns the recently opened files, the last one first."""
         return self._recent.names()
 
     def _opened(self) -> None:
@@ -220,24 +220,24 @@ class MainWindow(TakesFiles, QMainWindow):
                 self.viewport.set_message()
 
     def takes(self, path: str) -> bool:
-        """Whether a file is a stage."""
+        """Returns whether a file is a stage."""
         return path.lower().endswith(ENDINGS)
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Opens the first of the stages that were dropped."""
+        """Opens the first of the dropped stages."""
         self.open(paths[0])
 
     # ---- the picture -----------------------------------------------------------------------------
 
     def save(self) -> None:
-        """To the file of the last time."""
+        """Saves the image to the file of the previous save."""
         if self._save_path is None:
             self.save_as()
         else:
             self.save_to(self._save_path)
 
     def save_as(self) -> None:
-        """Lets the user choose a file."""
+        """Opens a dialog to choose an image file."""
         path = self.session.path
         start = str(path.with_suffix(".exr")) if path is not None else "picture.exr"
         name, chosen = QFileDialog.getSaveFileName(
@@ -249,33 +249,33 @@ class MainWindow(TakesFiles, QMainWindow):
             self.save_to(name)
 
     def save_to(self, path: str) -> None:
-        """Writes .exr (all layers) or .png (as shown)."""
+        """Writes .exr (all layers) or .png (the displayed image)."""
         self._save_path = path
         self.session.save(path, self.viewport.look)
 
     def toggle_pause(self) -> None:
-        """Stands still, goes on, or begins again."""
+        """Pauses, resumes or restarts the render."""
         if self.session.state == "rendering":
             self.session.pause()
         else:
             self.session.resume()
 
     def fit_size(self) -> None:
-        """Renders at the size of the viewport, a pixel for each of the screen."""
+        """Sets the render size to the viewport's size in screen pixels."""
         ratio = self.viewport.devicePixelRatioF()
         wide, high = self.viewport.width() * ratio, self.viewport.height() * ratio
         self.session.change(width=round(wide), height=round(high))
         self.viewport.set_zoom(None)
 
     def look_through_camera(self) -> None:
-        """The stage's own camera."""
+        """Views the stage through its camera."""
         stage = self.session.stage
         if stage is not None and (stage.camera_path or stage.cameras):
             self.session.use_camera(stage.camera_path or stage.cameras[0])
 
     def _state_changed(self, state: str) -> None:
         pause = self.actions_by_name["pause"]
-        pause.setText({"paused": "&Go on", "stopped": "&Go on"}.get(state, "&Pause"))
+        pause.setText({"paused": "&Continue", "stopped": "&Continue"}.get(state, "&Pause"))
         pause.setEnabled(state in ("rendering", "paused", "stopped"))
         self.actions_by_name["stop"].setEnabled(state in ("rendering", "paused"))
         self.actions_by_name["restart"].setEnabled(self.session.stage is not None)
@@ -286,20 +286,20 @@ class MainWindow(TakesFiles, QMainWindow):
     # ---- help, colours, state --------------------------------------------------------------------
 
     def set_theme(self, choice: str) -> None:
-        """Dark, light, or as the system has it."""
+        """Sets a dark or a light theme, or the one of the system."""
         theme.apply(choice)
         self.settings.setValue("theme", choice)
 
     def show_shortcuts(self) -> None:
-        """The list of keys."""
+        """Shows the list of keyboard shortcuts."""
         self._open_dialog(ShortcutsDialog(self))
 
     def show_about(self) -> None:
-        """Versions."""
+        """Shows the versions."""
         self._open_dialog(make_about(self))
 
     def send_to_farm(self) -> None:
-        """Asks for a file and workers, and watches the job."""
+        """Opens the farm dialog."""
         from wavecomb.gui.farm_dialog import FarmDialog
 
         path = self.session.path
@@ -309,7 +309,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._open_dialog(FarmDialog(self._farm_job, str(path.with_suffix(".exr")), self))
 
     def _farm_job(self, output: str) -> dict[str, Any]:
-        """What is shown, for a farm: the stage, or its edits saved beside the picture.
+        """Describes a farm job for the displayed stage, saving edits beside the image.
 
         Raises:
             WavecombError: There is no stage, or its edits cannot be saved.
@@ -333,7 +333,7 @@ class MainWindow(TakesFiles, QMainWindow):
         self._dialog = None
 
     def show_compare(self) -> None:
-        """The window in which pictures and settings are compared."""
+        """Shows the compare window."""
         dock = self.docks["compare"]
         if not self._bottom_sized and dock.isHidden():
             dock.setFloating(True)
@@ -344,11 +344,11 @@ class MainWindow(TakesFiles, QMainWindow):
         dock.activateWindow()
 
     def toggle_full_screen(self) -> None:
-        """All of the screen, or not."""
+        """Toggles full screen."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def reset_layout(self) -> None:
-        """All panels where they were at first."""
+        """Restores the initial layout of all panels."""
         self.restoreState(self._first_state, _STATE_VERSION)
 
     def _restore(self) -> None:
@@ -364,7 +364,7 @@ class MainWindow(TakesFiles, QMainWindow):
             self.actions_by_name[name].setChecked(False)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Keeps the state, ends the threads."""
+        """Saves the state and ends the threads."""
         self.autosave.close()
         self.settings.setValue("geometry", self.saveGeometry())
         self.settings.setValue("state", self.saveState(_STATE_VERSION))

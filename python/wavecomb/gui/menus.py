@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the window's actions are and which menu they stand in."""
+"""Actions of the window and their places in the menus."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wavecomb.gui.actions import Entry, keypad, make_action
 from wavecomb.gui.recent_stages import RecentStages
 
 Window = Any
-"""A ``main_window.MainWindow``, which has its menus from here."""
+"""A ``main_window.MainWindow``, whose module imports this one."""
 
 MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
@@ -47,12 +47,12 @@ MENUS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     ("&Help", ("shortcuts", "about")),
 )  # fmt: skip
-"""Title and names; "-": a line."""
+"""Titles of menus and names of their actions; "-" is a separator."""
 CHECKED = ("region",)
 
 
 def entries(window: Window) -> list[Entry]:
-    """All actions."""
+    """Returns all actions."""
     viewport, display, session = window.viewport, window.display, window.session
     scene = window.scene
 
@@ -68,47 +68,47 @@ def entries(window: Window) -> list[Entry]:
         Entry("open", "&Open\u2026", window.ask_open, ["Ctrl+O"], "Open a USD stage"),
         Entry(
             "reload", "Re&load", window.reload, ["Ctrl+R"],
-            "Read the stage from the disk again; edits made here are dropped",
+            "Reload the stage from disk and drop edits",
         ),
         Entry("save", "&Save", window.save, ["Ctrl+S"], "Write the picture to the same file"),
         Entry(
             "save_as", "Save &as\u2026", window.save_as, ["Ctrl+Shift+S"],
-            "Write all layers (EXR) or what is shown (PNG)",
+            "Write all layers (EXR) or the displayed picture (PNG)",
         ),
         Entry(
             "save_edits", "Save &edits as layer\u2026", scene.ask_save, [],
-            "Write what was edited as a small USD layer over the stage",
+            "Write the edits as a small USD layer over the stage",
         ),
-        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Take the last edit back"),
+        Entry("undo", "&Undo", scene.edits.undo, ["Ctrl+Z"], "Undo the last edit"),
         Entry(
             "redo", "&Redo", scene.edits.redo, ["Ctrl+Shift+Z", "Ctrl+Y"],
-            "Make the edit again that was taken back",
+            "Redo the last undone edit",
         ),
         Entry("quit", "&Quit", window.close, ["Ctrl+Q"]),
         Entry(
-            "pause", "&Pause", window.toggle_pause, ["Space"], "Stand still, or go on", local=True
+            "pause", "&Pause", window.toggle_pause, ["Space"], "Pause or continue", local=True
         ),
-        Entry("stop", "S&top", session.stop, ["Ctrl+."], "End the render; the picture stays"),
-        Entry("restart", "&Restart", session.restart, ["F5"], "Begin again from the first sample"),
+        Entry("stop", "S&top", session.stop, ["Ctrl+."], "Stop the render and keep the picture"),
+        Entry("restart", "&Restart", session.restart, ["F5"], "Restart from the first sample"),
         Entry(
             "region", "Re&gion", viewport.set_region_mode, ["Ctrl+B"],
-            "Drag a rectangle: only that is rendered", checkable=True,
+            "Drag a rectangle to render only that region", checkable=True,
         ),
         Entry(
             "clear_region", "&Whole picture", viewport.clear_region, ["Ctrl+Alt+B"],
-            "Render all of the picture again",
+            "Render the whole picture again",
         ),
         Entry(
             "fit_size", "Si&ze of the viewport", window.fit_size, ["Ctrl+Shift+F"],
-            "Render as many pixels as the viewport has",
+            "Render at the pixel size of the viewport",
         ),
         Entry(
             "denoise", "&Denoise on, off", window.render_bar.denoise.toggle, ["Shift+D"],
-            "By Open Image Denoise",
+            "Denoise the picture with Open Image Denoise",
         ),
         Entry(
             "farm", "Send to a &farm\u2026", window.send_to_farm, [],
-            "Render the stage with its edits in a job for many workers, and watch it",
+            "Render the stage with its edits as a job for many workers",
         ),
         Entry("frame", "&Frame selected", viewport.frame_selected, ["F"], local=True),
         Entry("frame_all", "Frame &all", viewport.frame_all, ["Home", "A"], local=True),
@@ -120,15 +120,15 @@ def entries(window: Window) -> list[Entry]:
         view("top", 7),
         Entry(
             "view_back", "&Back from", window.views.stack.undo, ["Ctrl+Alt+Z"],
-            "Where the camera was before; edits stay",
+            "Move the camera back to its previous view; keeps edits",
         ),
         Entry(
             "view_forth", "For&ward to", window.views.stack.redo, ["Ctrl+Alt+Shift+Z"],
-            "Where the camera was before it went back",
+            "Move the camera forward to the next view",
         ),
         Entry("opposite", "From the other side", viewport.view_opposite, keypad(9), local=True),
-        Entry("brighter", "&Brighter", lambda: expose(0.5), ["]"], "Half a stop", local=True),
-        Entry("darker", "&Darker", lambda: expose(-0.5), ["["], "Half a stop", local=True),
+        Entry("brighter", "&Brighter", lambda: expose(0.5), ["]"], "By half a stop", local=True),
+        Entry("darker", "&Darker", lambda: expose(-0.5), ["["], "By half a stop", local=True),
         Entry(
             "exposure_0", "Exposure &0", lambda: display.set_exposure(0.0), ["\\"], local=True
         ),
@@ -137,7 +137,7 @@ def entries(window: Window) -> list[Entry]:
         Entry("beauty", "Bea&uty", lambda: display.choose_layer("beauty"), ["B"], local=True),
         Entry(
             "expression", "Light &path expression\u2026", display.ask_expression, [],
-            "Write an expression; the light of the paths that match is a layer",
+            "Show the light of paths that match an expression as a layer",
         ),
         Entry("fit", "&Fit the picture", lambda: viewport.set_zoom(None), ["Ctrl+0"]),
         Entry("full", "&100 %", lambda: viewport.set_zoom(1.0), ["Ctrl+1"]),
@@ -150,14 +150,14 @@ def entries(window: Window) -> list[Entry]:
         ),
         Entry(
             "compare", "&Compare\u2026", window.show_compare, ["Ctrl+D"],
-            "Two pictures or two live settings, side by side or with a wipe",
+            "Compare two pictures or live renders, side by side or with a wipe",
         ),
         *(
             Entry(
                 f"keep_{which.lower()}", f"Keep as &{which}",
                 lambda which=which: window.docks["compare"].widget().keep(which),
                 [f"Ctrl+Shift+{which}"],
-                f"The picture as it is now becomes {which} of Compare",
+                f"Use the current picture as {which} in Compare",
             )
             for which in "AB"
         ),
@@ -172,7 +172,7 @@ def make_menus(window: Window) -> tuple[dict[str, QAction], RecentStages]:
     """Fills the menu bar of a window.
 
     Returns:
-        The actions by name, and the menu of stages that were opened before.
+        The actions by name, and the menu of recently opened stages.
     """
     actions: dict[str, QAction] = {}
     by_name = {entry.name: entry for entry in entries(window)}

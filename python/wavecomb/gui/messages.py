@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How errors reach a person: a line that stays until it is read, never a traceback."""
+"""Error messages of the window: a line that stays until it is closed, never a traceback."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WARNING_MS = 12000
 
 
 class MessageBar(QFrame):
-    """A line over the picture: an error until it is closed, a warning for a while."""
+    """Message bar above the image. Errors stay until closed, warnings disappear after some time."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -53,16 +53,16 @@ class MessageBar(QFrame):
         self.hide()
 
     def text(self) -> str:
-        """What it says; "" while it is hidden."""
+        """The current text, or "" while the bar is hidden."""
         return self._label.text() if not self.isHidden() else ""
 
     def show_error(self, message: str) -> None:
-        """Stays until it is closed or replaced."""
+        """Shows an error until it is closed or replaced."""
         self._timer.stop()
         self._show("Error: " + message, True)
 
     def show_warning(self, message: str) -> None:
-        """Goes by itself; never in place of an error."""
+        """Shows a warning for some time, unless an error is shown."""
         if self._is_error and not self.isHidden():
             return
         self._show(message, False)
@@ -80,7 +80,7 @@ class MessageBar(QFrame):
 
 
 class _Reporter(QObject):
-    """Tells on the window's thread what was caught on any."""
+    """Receiver that reports errors of any thread on the window's thread."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         super().__init__()
@@ -92,25 +92,28 @@ class _Reporter(QObject):
             self._tell(line)
 
     def end(self) -> None:
-        """Nothing is told any more."""
+        """Stops reporting."""
         self._tell = None
         self.deleteLater()
 
 
 def log_folder() -> Path:
-    """Where reports of faults are written."""
+    """Returns the folder for error reports."""
     place = QStandardPaths.StandardLocation.AppLocalDataLocation
     return Path(QStandardPaths.writableLocation(place))
 
 
 def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
-    """Faults of our own become one line for ``tell`` and a file to report, on any thread.
+    """Installs hooks that turn internal errors on any thread into one line and a report file.
+
+    Args:
+        tell: Called with the line, on the window's thread.
 
     Returns:
-        What takes the hooks away again.
+        A function that removes the hooks.
     """
     reporter = _Reporter(tell)
-    caught = reporter.caught  # the hooks hold no object of Qt's
+    caught = reporter.caught  # the hooks must not hold a Qt object
     before, before_threads = sys.excepthook, threading.excepthook
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
@@ -133,7 +136,7 @@ def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
 
 
 def fault_line(error: BaseException, report: Path | None) -> str:
-    """What to say of a fault of our own."""
+    """Returns the line that reports an internal error."""
     from wavecomb.run.faults import describe
 
     core = describe(error) if isinstance(error, Exception) else str(error)
@@ -146,7 +149,7 @@ def fault_line(error: BaseException, report: Path | None) -> str:
 def write_report(
     kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> Path | None:
-    """The traceback into a file that can be sent; None where none can be written."""
+    """Writes the traceback to a report file; returns None if that is not possible."""
     from wavecomb.version import version
 
     now = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")

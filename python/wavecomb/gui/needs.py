@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a window needs, asked without loading Qt."""
+"""Checks for the requirements of a window, without importing Qt."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ NO_DISPLAY = (
 
 
 def has_display() -> bool:
-    """Whether there is something to open a window on."""
+    """Returns whether there is a display for a window."""
     if not sys.platform.startswith("linux"):
         return True
     return any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
 
 
 def check_window() -> None:
-    """Raises WavecombError, in one line, unless a window could be opened."""
+    """Raises WavecombError with one line unless a window can be opened."""
     check_installed("gui", "the window")
     if not has_display():
         raise WavecombError(NO_DISPLAY)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which panels the window has, and where."""
+"""The panels of the window and their places."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Panel:
     """A panel of the window.
 
     Attributes:
-        name: For its state.
-        title: For people.
-        widget: Takes part in the session.
-        area: Where its dock is at first.
-        hidden: Whether it waits in the View menu at first.
+        name: Name in the saved state.
+        title: Title for people.
+        widget: The widget.
+        area: Initial area of its dock.
+        hidden: Whether the panel is hidden initially.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Panel:
 
 
 def make_panels(session: Session) -> list[Panel]:
-    """All of them."""
+    """Creates all panels."""
     return [
         Panel("scene", "Scene", ScenePanel(session), _LEFT),
         Panel("scheduling", "Scheduling", SchedulingPanel(session), _RIGHT),

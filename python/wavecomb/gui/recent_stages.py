@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages that were opened before, in the settings and in a menu."""
+"""Recently opened stages, kept in the settings and shown in a menu."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MOST = 10
 
 
 class RecentStages(QMenu):
-    """The menu of the files, the last first.
+    """Menu of the recently opened files, the last one first.
 
     Args:
-        settings: Where the files are kept.
+        settings: Storage of the files.
         parent: The window.
 
     Signals:
@@ -32,12 +32,12 @@ class RecentStages(QMenu):
         self._fill()
 
     def names(self) -> list[str]:
-        """All files."""
+        """Returns all files."""
         value: Any = self._settings.value("recent", [])
         return [value] if isinstance(value, str) else [str(path) for path in value or []]
 
     def add(self, path: Path) -> None:
-        """Puts a file first."""
+        """Adds a file as the first entry."""
         name = str(path.resolve())
         others = [other for other in self.names() if other != name]
         self._settings.setValue("recent", [name, *others][:MOST])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a live render is asked for: the core's settings, and what only a window has."""
+"""Settings of a live render: those of the core, and those that only a window has."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
 Region = tuple[int, int, int, int]
 NOT_LIVE = ("progressive", "crop")
-"""Settings that a live render has of itself: passes that double, and all of the picture."""
+"""Settings that do not apply to live renders, which always use progressive passes and the whole
+image."""
 
 
 if TYPE_CHECKING:
 
     class _Rows:
-        """A field for each row of the table of settings."""
+        """Type stub with a field for each row of the table of settings."""
 
         def __init__(self, **values: Any) -> None: ...
         def __getattr__(self, name: str) -> Any: ...
@@ -38,14 +39,14 @@ else:
 
 @dataclass(frozen=True)
 class Setup(_Rows):
-    """Settings of a live render: those of the table, and what only a window has.
+    """Settings of a live render: those of the core's table, and those that only a window has.
 
     Attributes:
-        aovs: Layers to keep beside the beauty, names of docs/aovs.md.
-        denoise: Whether frames come denoised, too.
-        region: x0, y0, x1, y1 in pixels, end excluded: only these are rendered; None: all.
-        own_policy: A policy in Python, in place of ``policy``.
-        profile: Costs to start from, as ``wavecomb.run.costs.load_costs`` reads them.
+        aovs: Layers to keep beside the beauty, by the names of docs/aovs.md.
+        denoise: Whether frames are also denoised.
+        region: Rectangle x0, y0, x1, y1 of pixels to render, without x1 and y1; None renders all.
+        own_policy: A policy object that replaces ``policy``, or None.
+        profile: Initial costs from ``wavecomb.run.costs.load_costs``, or None.
     """
 
     aovs: tuple[str, ...] = aov_names.DEFAULT
@@ -55,11 +56,11 @@ class Setup(_Rows):
     profile: Profile | None = None
 
     def changed(self, **values: Any) -> Setup:
-        """With other values, checked.
+        """Returns a checked copy with some values replaced.
 
         Raises:
-            WavecombError: A field is not known.
-            wavecomb._core.Error: A value is no good.
+            WavecombError: A field does not exist.
+            wavecomb._core.Error: A value is invalid.
         """
         known = {field.name for field in fields(self)}
         unknown = sorted(set(values) - known)
@@ -77,19 +78,19 @@ class Setup(_Rows):
         return new
 
     def layers(self) -> tuple[str, ...]:
-        """AOVs to render: those asked for and those that the denoiser needs."""
+        """Returns the AOVs to render, including those that the denoiser needs."""
         guides = aov_names.GUIDES if self.denoise else ()
         return aov_names.with_others(aov_names.expand(self.aovs), guides)
 
     def settings(self, scale: int = 1, *, preview: bool = False) -> Settings:
-        """The core's settings, checked.
+        """Returns the checked settings of the core.
 
         Args:
-            scale: Edges are divided by it.
-            preview: One sample a pixel and no more.
+            scale: Divisor of width and height.
+            preview: Whether to render only one sample per pixel.
 
         Raises:
-            WavecombError, wavecomb._core.Error: A value is no good; one line.
+            WavecombError, wavecomb._core.Error: A value is invalid. The message is one line.
         """
         from wavecomb.run.settings import make_settings
 
@@ -98,7 +99,7 @@ class Setup(_Rows):
         if self.region is not None:
             values["region"] = scaled_region(self.region, scale, self.width, self.height)
         if preview:
-            # Measuring what materials cost would take longer than the picture.
+            # Measuring material costs would take longer than the preview.
             values |= {"adaptive": 0.0, "noise": 0.0, "time_limit": 0.0, "costs": "model"}
         else:
             values["progressive"] = True
@@ -107,14 +108,14 @@ class Setup(_Rows):
 
 
 def scaled_size(width: int, height: int, scale: int) -> tuple[int, int]:
-    """The size of a picture at 1 / scale, at least one pixel."""
+    """Returns the size of an image at 1 / scale, at least one pixel."""
     if scale == 1:
         return width, height
     return max(1, width // scale), max(1, height // scale)
 
 
 def scaled_region(region: Region, scale: int, width: int, height: int) -> Region:
-    """A region at 1 / scale that covers the whole one, within the scaled picture."""
+    """Returns a region at 1 / scale that covers the full region, within the scaled image."""
     x0, y0, x1, y1 = region
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise WavecombError(

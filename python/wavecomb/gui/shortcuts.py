@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Help > Keyboard shortcuts: made from the actions themselves, so that it is never out of date."""
+"""Help > Keyboard shortcuts, built from the actions, so that it is always up to date."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from wavecomb.gui.actions import TITLE
 from wavecomb.gui.widgets import named, search_field
 
 MOUSE = (
-    ("Orbit about what is under the cursor", "Middle drag, Alt+Left drag"),
+    ("Orbit about the point under the cursor", "Middle drag, Alt+Left drag"),
     ("Pan", "Shift+Middle drag"),
     ("Dolly", "Wheel, Ctrl+Middle drag, Alt+Right drag"),
-    ("Select what is there", "Left click"),
+    ("Select the prim under the cursor", "Left click"),
     ("Zoom the picture", "Ctrl+Wheel"),
-    ("Shift the picture", "Right drag"),
+    ("Pan the picture", "Right drag"),
     ("Orbit by 15 degrees", "Arrow keys, in the viewport"),
-    ("Pan by a tenth", "Shift+arrow keys, in the viewport"),
+    ("Pan by a tenth of the picture", "Shift+arrow keys, in the viewport"),
     ("Dolly in, out", "PgUp, PgDown, in the viewport"),
 )
-"""What mouse and viewport do without an action."""
+"""Mouse and keyboard controls of the viewport that are not actions."""
 
 
 def plain_text(action: QAction) -> str:
-    """Without mnemonics and dots, and without what is at hand just now."""
+    """Returns an action's original text without mnemonics and dots."""
     text = str(action.property(TITLE) or action.text())
     return text.replace("&", "").rstrip(".\u2026")
 
 
 def listed(window: QWidget) -> list[tuple[str, str]]:
-    """What and which keys, of all actions of a window that have any, then the mouse."""
+    """Lists the actions of a window that have shortcuts, then the controls of the viewport."""
     rows = []
     for action in window.findChildren(QAction):
         keys = [key.toString(QKeySequence.SequenceFormat.NativeText) for key in action.shortcuts()]
@@ -53,7 +53,7 @@ def listed(window: QWidget) -> list[tuple[str, str]]:
 
 
 class ShortcutsDialog(QDialog):
-    """The list, with a field to search it."""
+    """Dialog with a searchable list of shortcuts."""
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
@@ -90,14 +90,15 @@ class ShortcutsDialog(QDialog):
             self.table.setRowHidden(row, not found)
 
 
-# ---- Help > About: versions of Wavecomb and of what it stands on ---------------------------------
+# ---- Help > About: versions of Wavecomb and its dependencies
+# ---------------------------------------
 
 
 _PARTS = ("usd-core", "numpy", "openimageio", "PySide6-Essentials", "pyqtgraph", "pyoidn")
 
 
 def about_text() -> str:
-    """As lines."""
+    """Returns the versions as lines of text."""
     from wavecomb.isa import library_text
     from wavecomb.version import version
 
@@ -114,7 +115,7 @@ def about_text() -> str:
 
 
 def make_about(parent: QWidget) -> QMessageBox:
-    """The dialog, not shown yet."""
+    """Creates the dialog without showing it."""
     box = QMessageBox(parent)
     box.setObjectName("about")
     box.setWindowTitle("About Wavecomb")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bar at the bottom: how far the render is, and what else goes on."""
+"""Status bar with the progress of the render and of background work."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wavecomb.gui.widgets import named
 
 
 def frame_text(frame: Frame, state: str) -> str:
-    """How far a render is, in a line."""
+    """Describes the progress of a render in a line."""
     done = frame.status.get("samples_done", 0)
     if frame.scale > 1:
         return f"preview at 1/{frame.scale} of the size"
@@ -31,18 +31,18 @@ def frame_text(frame: Frame, state: str) -> str:
 
 
 class StatusLine(QStatusBar):
-    """Progress, state, what goes on beside it."""
+    """Status bar with progress, state and background work."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("status")
         self._session = session
-        self.progress = named(QProgressBar(), "status.progress", "Progress", "Of the render")
+        self.progress = named(QProgressBar(), "status.progress", "Progress", "Render progress")
         self.progress.setFixedWidth(theme.em(10))
         self.progress.setRange(0, 1000)
         self.progress.setTextVisible(False)
         self.text = named(QLabel("no stage"), "status.text", "State of the render", "")
-        self.work = named(QLabel(), "status.work", "Work beside the render", "")
+        self.work = named(QLabel(), "status.work", "Background work", "")
         self.addWidget(self.progress)
         self.addWidget(self.text, 1)
         self.addPermanentWidget(self.work)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear colours on the screen."""
+"""Linear colours on the screen, and conversion of pixels to Qt images."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Colour = tuple[float, float, float]
 
 
 def to_display(colour: Colour) -> QColor:
-    """A linear colour as a screen shows it, clipped."""
+    """Converts a linear colour to sRGB, clipped to 0 to 1."""
     linear = np.clip(np.asarray(colour, float), 0.0, 1.0)
     low, high = 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055
     r, g, b = np.where(linear <= 0.0031308, low, high)
@@ -21,7 +21,7 @@ def to_display(colour: Colour) -> QColor:
 
 
 def from_display(colour: QColor) -> Colour:
-    """The linear colour of one on the screen."""
+    """Converts an sRGB colour to a linear one."""
     shown = np.array([colour.redF(), colour.greenF(), colour.blueF()])
     low, high = shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4
     r, g, b = np.where(shown <= 0.04045, low, high)
@@ -29,7 +29,10 @@ def from_display(colour: QColor) -> Colour:
 
 
 def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
-    """A square of a colour, or a bar of some, framed so that it is seen on any background."""
+    """Makes an icon filled with a colour, ``wide`` times as wide as high.
+
+    Its frame makes it visible on any background.
+    """
     ratio = 2.0
     pixmap = QPixmap(round(size * wide * ratio), round(size * ratio))
     pixmap.setDevicePixelRatio(ratio)
@@ -40,16 +43,17 @@ def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
         painter.setPen(theme.dim())
         painter.drawRect(0, 0, wide * size - 1, size - 1)
     icon = QIcon(pixmap)
-    # Else a row that is selected would tint it.
+    # Otherwise Qt tints the icon of a selected row.
     icon.addPixmap(pixmap, QIcon.Mode.Selected)
     return icon
 
 
-# ---- Pixels as Qt has them; for the window's thread ----------------------------------------------
+# ---- Conversion of pixels to Qt images, on the window's thread
+# ------------------------------------
 
 
 def to_qimage(pixels: NDArray[np.uint8]) -> QImage:
-    """(height, width, 3) 8-bit codes as an image that owns its data."""
+    """Converts (height, width, 3) 8-bit values to an image that owns its data."""
     height, width = pixels.shape[:2]
     data = np.ascontiguousarray(pixels)
     borrowed = QImage(data.data, width, height, 3 * width, QImage.Format.Format_RGB888)

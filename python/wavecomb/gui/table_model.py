@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A table of texts with keys to sort by, replaced as a whole; cheap for thousands of rows."""
+"""Table models that are replaced as a whole, with sort keys, efficient for thousands of rows."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, Qt
 from PySide6.QtGui import QColor, QFont
 
 ColourRole = Qt.ItemDataRole.UserRole + 10
-"""A linear colour, shown as a square before the text."""
+"""Role of a linear colour, shown as a square before the text."""
 ToneRole = Qt.ItemDataRole.UserRole + 11
-"""The tone of the text: "dim", "warning", "error", or None."""
+"""Role of the text's tone: "dim", "warning", "error", or None."""
 
 
 class HeadedModel(QAbstractTableModel):
-    """A table under fixed headers; subclasses have ``data``.
+    """Table with fixed column titles. Subclasses implement ``data``.
 
     Args:
         headers: Titles of the columns.
-        tips: Tooltips of the titles; none where it is empty.
+        tips: Tooltips of the titles; empty means none.
     """
 
     def __init__(
@@ -31,29 +31,29 @@ class HeadedModel(QAbstractTableModel):
         self.rows: list[Any] = []
 
     def fill(self, rows: Sequence[Any]) -> None:
-        """Replaces all rows; selections are lost."""
+        """Replaces all rows, which clears the selection."""
         self.beginResetModel()
         self.rows = list(rows)
         self.endResetModel()
 
     def tell(self, first: int, last: int) -> None:
-        """Some columns say something else now."""
+        """Updates the cells of some columns."""
         if self.rows:
             corners = self.index(0, first), self.index(len(self.rows) - 1, last)
             self.dataChanged.emit(*corners)
 
     def rowCount(self, parent: Any = None) -> int:
-        """As Qt has it."""
+        """Returns the number of rows."""
         return 0 if parent is not None and parent.isValid() else len(self.rows)
 
     def columnCount(self, parent: Any = None) -> int:
-        """As Qt has it."""
+        """Returns the number of columns."""
         return len(self._headers)
 
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
-        """As Qt has it."""
+        """Returns the title or tooltip of a column."""
         if orientation != Qt.Orientation.Horizontal:
             return None
         if role == Qt.ItemDataRole.DisplayRole:
@@ -62,11 +62,11 @@ class HeadedModel(QAbstractTableModel):
 
 
 Cell = tuple[str, Any]
-"""What is shown, and what is sorted by (``Qt.ItemDataRole.UserRole``), whole in a tooltip."""
+"""Text and sort key (``Qt.ItemDataRole.UserRole``) of a cell. The tooltip has the whole text."""
 
 
 class Table(HeadedModel):
-    """Rows of cells under a header; ``left``: columns of text, others are aligned right."""
+    """Rows of cells under a header. The columns ``left`` hold text, all others align right."""
 
     def __init__(
         self, header: Mapping[str, str], left: Collection[int], parent: QObject | None = None
@@ -82,7 +82,7 @@ class Table(HeadedModel):
         bold: Collection[int] = (),
         colours: Mapping[tuple[int, int], QColor] | None = None,
     ) -> None:
-        """Takes new rows; selection and scrolling stay where rows do."""
+        """Replaces the rows, keeping selection and scroll position of rows that remain."""
         more = len(rows) - len(self.rows)
         if more > 0:
             self.beginInsertRows(QModelIndex(), len(self.rows), len(rows) - 1)
@@ -96,7 +96,7 @@ class Table(HeadedModel):
         self.tell(0, self.columnCount() - 1)
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """What one cell shows."""
+        """Returns a cell's data."""
         row, column = index.row(), index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             return self.rows[row][column][0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dark and light: palettes, colours of plots, sizes that follow the font."""
+"""Dark and light themes: palettes, colours of plots, sizes relative to the font."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _COLOURS = {
         "#1a5cc8",
     ),
 }  # fmt: skip
-# Told apart in greyscale and with the common colour deficiencies (Okabe and Ito 2008, adapted).
+# Distinguishable in greyscale and with common colour deficiencies (Okabe and Ito 2008, adapted).
 _SERIES = {
     DARK: ("#56b4e9", "#e69f00", "#2fbf8f", "#f0e442", "#d98cc0", "#ff7f50", "#9aa7ff", "#c0c5cc"),
     LIGHT: ("#0072b2", "#c67a00", "#00835f", "#8a7d00", "#a8508a", "#c04a00", "#4a54c4", "#5a6068"),
@@ -31,7 +31,7 @@ _SERIES = {
 
 
 class _Theme(QObject):
-    """Tells widgets that colours changed."""
+    """Emitter of the signal that colours changed."""
 
     changed = Signal()
 
@@ -57,24 +57,24 @@ def _follow() -> None:
 
 
 def on_change(call: Callable[[], None]) -> None:
-    """Calls a method of a QObject whenever colours change; ends with that object."""
+    """Calls a method of a QObject whenever colours change, as long as the object exists."""
     _the().changed.connect(call)
 
 
 def choice() -> str:
-    """What was applied last: "system", "dark" or "light"."""
+    """Returns the applied theme: "system", "dark" or "light"."""
     return _the().choice
 
 
 def is_dark() -> bool:
-    """Whether colours are dark now."""
+    """Returns whether colours are dark now."""
     if _the().choice != SYSTEM:
         return _the().choice == DARK
     return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
 
 
 def apply(chosen: str) -> None:
-    """Gives the application the colours: "system" follows the desktop."""
+    """Applies a theme to the application; "system" follows the desktop."""
     application = QApplication.instance()
     assert isinstance(application, QApplication)
     theme = _the()
@@ -91,7 +91,7 @@ def _name() -> str:
 
 
 def palette(dark: bool) -> QPalette:
-    """All roles, for enabled and disabled widgets."""
+    """Returns a palette with all roles, for enabled and disabled widgets."""
     window, base, alternate, button, text, dim, line, highlight, link = map(
         QColor, _COLOURS[DARK if dark else LIGHT]
     )
@@ -116,53 +116,53 @@ def palette(dark: bool) -> QPalette:
 
 
 def series(n: int) -> QColor:
-    """The colour of the n-th curve, told apart from its neighbours also in greyscale."""
+    """Returns the colour of the n-th curve; neighbours are distinguishable even in greyscale."""
     colours = _SERIES[_name()]
     return QColor(colours[n % len(colours)])
 
 
 def text() -> QColor:
-    """The colour of text in plots."""
+    """Returns the colour of text in plots."""
     return QColor(_COLOURS[_name()][4])
 
 
 def dim() -> QColor:
-    """The colour of text that matters less."""
+    """Returns the colour of less important text."""
     return QColor(_COLOURS[_name()][5])
 
 
 def grid() -> QColor:
-    """The colour of lines behind curves."""
+    """Returns the colour of grid lines."""
     colour = QColor(text())
     colour.setAlphaF(0.18)
     return colour
 
 
 def surface() -> QColor:
-    """Behind plots and lists."""
+    """Returns the background colour of plots and lists."""
     return QColor(_COLOURS[_name()][1])
 
 
 def surround() -> QColor:
-    """Around pictures: neutral, so that it does not tint what is judged."""
+    """Returns the background colour around images, neutral so that they look right."""
     return QColor("#181818" if is_dark() else "#777777")
 
 
 def accent() -> QColor:
-    """The colour of what is chosen."""
+    """Returns the colour of selections."""
     return QColor(_COLOURS[_name()][7])
 
 
 def warning() -> QColor:
-    """The colour of text that warns."""
+    """Returns the colour of warnings."""
     return QColor("#e8a33d" if is_dark() else "#9a5b00")
 
 
 def error() -> QColor:
-    """The colour of text that tells of an error."""
+    """Returns the colour of errors."""
     return QColor("#ff7b72" if is_dark() else "#b3261e")
 
 
 def em(count: float = 1.0) -> int:
-    """So many heights of the application's font, in device-independent pixels."""
+    """Converts heights of the application's font to device-independent pixels."""
     return round(QFontMetricsF(QApplication.font()).height() * count)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small controls that panels share; each has a tooltip, an accessible name and an object name."""
+"""Small shared controls with tooltip, accessible name and object name."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ W = TypeVar("W", bound=QWidget)
 
 
 def named(widget: W, name: str, title: str, tip: str) -> W:
-    """Gives a widget its object name, accessible name and tooltip."""
+    """Sets object name, accessible name and tooltip of a widget."""
     widget.setObjectName(name)
     widget.setAccessibleName(title)
     widget.setToolTip(tip)
@@ -32,7 +32,7 @@ def named(widget: W, name: str, title: str, tip: str) -> W:
 
 
 def tool(name: str, text: str, tip: str, parent: QWidget | None = None) -> QToolButton:
-    """A small button."""
+    """Creates a small button."""
     button = named(QToolButton(parent), name, tip, tip)
     button.setText(text)
     return button
@@ -49,7 +49,7 @@ def real(
     changed: Callable[[float], object],
     decimals: int = 2,
 ) -> QDoubleSpinBox:
-    """A number that is taken when editing ends."""
+    """Creates a number box whose value takes effect when editing ends."""
     box = named(QDoubleSpinBox(), name, title, tip)
     box.setKeyboardTracking(False)
     box.setDecimals(decimals)
@@ -63,7 +63,7 @@ def real(
 def choice(
     name: str, title: str, tip: str, entries: Sequence[str], chosen: Callable[[str], object]
 ) -> QComboBox:
-    """One of several; told when a person chooses, not when it is set."""
+    """Creates a combo box that calls ``chosen`` only when the user selects an entry."""
     box = named(QComboBox(), name, title, tip)
     box.addItems(list(entries))
     box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
@@ -72,7 +72,7 @@ def choice(
 
 
 def search_field(name: str, title: str, tip: str, hint: str) -> QLineEdit:
-    """A line to type what is looked for; ``hint`` stands in it while it is empty."""
+    """Creates a search field; ``hint`` is shown while it is empty."""
     field = named(QLineEdit(), name, title, tip)
     field.setPlaceholderText(hint)
     field.setClearButtonEnabled(True)
@@ -80,7 +80,7 @@ def search_field(name: str, title: str, tip: str, hint: str) -> QLineEdit:
 
 
 def caption(text: str, buddy: QWidget) -> QLabel:
-    """The label of a control; its mnemonic leads there."""
+    """Creates a label whose mnemonic focuses the control ``buddy``."""
     label = QLabel(text)
     label.setBuddy(buddy)
     label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -97,16 +97,16 @@ def ask_file(
     mode: QFileDialog.FileMode = QFileDialog.FileMode.ExistingFile,
     ending: str = "",
 ) -> None:
-    """Shows a dialog for the name of a file, and returns at once.
+    """Opens a file dialog without blocking.
 
     Args:
-        parent: The dialog belongs to it.
-        title: Of the dialog.
+        parent: Parent of the dialog.
+        title: Title of the dialog.
         kinds: Filter, such as "USD (*.usda *.usdc)".
-        take: Called with the name that the user chose.
-        start: Folder or file to begin with.
+        take: Called with the chosen name.
+        start: Initial folder or file.
         mode: An existing file, or a folder.
-        ending: Of a file to be written, without the dot; "": the file is to be read.
+        ending: Ending of a file to write, without the dot; "" means that the file is read.
     """
     dialog = QFileDialog(parent, title, start, kinds)
     if ending:
@@ -120,22 +120,22 @@ def ask_file(
 
 
 class TakesFiles:
-    """Base of widgets that files can be dropped on."""
+    """Base class of widgets that accept dropped files."""
 
     def takes(self, path: str) -> bool:
-        """Whether a file that is dragged is of a kind that is taken."""
+        """Returns whether a dragged file has an accepted kind."""
         return True
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Files were dropped at a point of the widget."""
+        """Handles files dropped at a point of the widget."""
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accepts the drag of files that are taken."""
+        """Accepts a drag of accepted files."""
         if self._taken(event):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Takes the files."""
+        """Handles dropped files."""
         paths = self._taken(event)
         if paths:
             event.acceptProposedAction()
@@ -147,14 +147,14 @@ class TakesFiles:
 
 
 def set_quietly(box: QSpinBox | QDoubleSpinBox | QSlider, value: float) -> None:
-    """Sets a value without telling anybody."""
+    """Sets a value without emitting signals."""
     box.blockSignals(True)
     box.setValue(value)  # type: ignore[arg-type]
     box.blockSignals(False)
 
 
 def set_text_colour(label: QLabel, colour: QColor) -> None:
-    """Sets the colour of the text alone; the rest goes on following the application."""
+    """Sets the colour of a label's text; other colours continue to follow the application."""
     palette = label.palette()
     palette.setColor(label.foregroundRole(), colour)
     label.setPalette(palette)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Work on another thread: of which only the newest counts, or all of it in order.
+"""Background threads: workers for only the newest job, or for all jobs in order.
 
-Contract: both classes live on the window's thread and wait for nothing but in ``close``. A job is
-plain: it holds and makes no object of Qt's, and its result is plain data.
+The classes live on the window's thread and block only in ``close``. A job must not hold or create
+Qt objects, and its result must be plain data.
 """
 
 from __future__ import annotations
@@ -22,18 +22,21 @@ from wavecomb.run.faults import describe
 
 Job = Callable[[], Any]
 Outcome = tuple[Any, str | None]
-"""The result and None, or None and a line."""
+"""(result, None), or (None, error line)."""
 
 
 def refuse_qt(job: Job) -> None:
-    """Raises TypeError where a job holds an object of Qt's, which its thread might let go last."""
+    """Raises TypeError if a job holds a Qt object.
+
+    Otherwise its thread might release the last reference to that object.
+    """
     for held in _held(job):
         if isinstance(held, (shiboken6.Object, SignalInstance)):
             raise TypeError(f"a job must not hold an object of Qt's: {type(held).__name__}")
 
 
 def _held(job: Any) -> Iterator[Any]:
-    """What a function has beside its globals: self, arguments, defaults, variables around it."""
+    """Yields the values that a function holds: self, arguments, defaults, closure variables."""
     yield getattr(job, "__self__", None)
     if isinstance(job, functools.partial):
         yield from job.args
@@ -46,7 +49,7 @@ def _held(job: Any) -> Iterator[Any]:
 
 
 def _run(number: int, job: Job, told: Port) -> None:
-    """The thread: no name here is an object of Qt's."""
+    """Runs a job on its thread. No variable here may be a Qt object."""
     try:
         outcome: Outcome = (job(), None)
     except Exception as error:
@@ -55,7 +58,7 @@ def _run(number: int, job: Job, told: Port) -> None:
 
 
 class _OneThread(QObject):
-    """One job at a time."""
+    """Base class of objects that run one job at a time on a thread."""
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -67,7 +70,7 @@ class _OneThread(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether something runs or waits."""
+        """Whether a job is running or waiting."""
         return self._thread is not None
 
     def _begin(self, job: Job) -> None:
@@ -88,9 +91,9 @@ class _OneThread(QObject):
         raise NotImplementedError
 
     def close(self, seconds: float = 5.0) -> bool:
-        """Nothing is begun or told any more; waits for what runs, and says whether it has ended.
+        """Rejects further jobs and waits for the running one; returns whether it has ended.
 
-        What has not ended by then goes on by itself: there is nothing of the window in it.
+        A job that has not ended continues harmlessly, because it holds nothing of the window.
         """
         self._closed = True
         thread, self._thread = self._thread, None
@@ -101,13 +104,13 @@ class _OneThread(QObject):
 
 
 class Worker(_OneThread):
-    """The newest wins: a job that waits is replaced by one that comes later.
+    """Worker for the newest job: a later job replaces a waiting one.
 
-    What runs is not ended, and its result is told though something newer waits, unless it was
-    cancelled.
+    A running job is not stopped. Its result is reported even if a newer job waits, unless
+    ``cancel`` was called.
 
     Signals:
-        done(key, result), failed(key, line): On the window's thread.
+        done(key, result), failed(key, line): Results, emitted on the window's thread.
     """
 
     done = Signal(object, object)
@@ -120,14 +123,14 @@ class Worker(_OneThread):
         self._told = True
 
     def submit(self, job: Job, key: object = None) -> None:
-        """Does a job next.
+        """Submits the next job.
 
         Args:
-            job: Plain; a partial of a function at best.
-            key: Comes back with the result. While a job with this key runs there is nothing to do.
+            job: The job, preferably a partial of a function.
+            key: Returned with the result. Nothing happens if a job with this key is running.
 
         Raises:
-            TypeError: The job holds an object of Qt's.
+            TypeError: The job holds a Qt object.
         """
         refuse_qt(job)
         if self._closed:
@@ -140,11 +143,11 @@ class Worker(_OneThread):
             self._waiting = (job, key)
 
     def cancel(self) -> None:
-        """Nothing is wanted any more."""
+        """Drops the waiting job and the result of the running one."""
         self._waiting, self._told = None, False
 
     def close(self, seconds: float = 5.0) -> bool:
-        """Nothing is begun or told any more; waits for what runs."""
+        """Rejects further jobs, drops all results and waits for the running job."""
         self.cancel()
         return super().close(seconds)
 
@@ -167,17 +170,17 @@ class Worker(_OneThread):
 
 
 class Errands(_OneThread):
-    """All jobs are done, one after the other, and each is told to whom it was asked by."""
+    """Worker for all jobs, one after the other, with separate callbacks for each."""
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(name, parent)
         self._jobs: deque[tuple[Job, Callable[[Any], None], Callable[[str], None]]] = deque()
 
     def submit(self, job: Job, done: Callable[[Any], None], failed: Callable[[str], None]) -> None:
-        """Does a job after those before it; then calls ``done(result)`` or ``failed(line)``.
+        """Queues a job; afterwards calls ``done(result)`` or ``failed(line)``.
 
         Raises:
-            TypeError: The job holds an object of Qt's.
+            TypeError: The job holds a Qt object.
         """
         refuse_qt(job)
         if self._closed:
@@ -187,7 +190,7 @@ class Errands(_OneThread):
             self._begin(job)
 
     def close(self, seconds: float = 5.0) -> bool:
-        """Nothing is begun or told any more; waits for what runs."""
+        """Rejects further jobs, drops all results and waits for the running job."""
         self._jobs.clear()
         return super().close(seconds)
 
@@ -202,18 +205,19 @@ class Errands(_OneThread):
             failed(line)
 
 
-# ---- What goes on beside rendering, and the words for it -----------------------------------------
+# ---- Background work and its descriptions
+# -----------------------------------------------------------
 
 
 class Tasks(QObject):
-    """Tasks that are under way; the one that was begun last is told.
+    """Background tasks, of which the newest is reported.
 
     Signals:
-        busy(str): What goes on: "writing a.exr"; "": nothing.
-        failed(str): One line.
+        busy(str): Description such as "writing a.exr", or "" if there is no task.
+        failed(str): Error in one line.
 
     Attributes:
-        jobs: Key and words of each.
+        jobs: Key and description of each task.
     """
 
     busy = Signal(str)
@@ -226,17 +230,17 @@ class Tasks(QObject):
         self._numbers = itertools.count()
 
     def begin(self, key: str, what: str) -> None:
-        """Something goes on, in place of what has the same key."""
+        """Reports a task, replacing one with the same key."""
         self.jobs = [job for job in self.jobs if job[0] != key] + [(key, what)]
         self.busy.emit(what)
 
     def end(self, key: str) -> None:
-        """It has ended."""
+        """Reports the end of a task."""
         self.jobs = [job for job in self.jobs if job[0] != key]
         self.busy.emit(self.jobs[-1][1] if self.jobs else "")
 
     def run(self, what: str, work: Callable[[], object], then: Callable[[], None] | None) -> None:
-        """Does something plain on another thread, after what was asked before."""
+        """Runs a function on another thread, after all earlier ones."""
         key = f"{what} {next(self._numbers)}"
         self.begin(key, what)
 
@@ -252,5 +256,5 @@ class Tasks(QObject):
         self._errands.submit(work, done, failed)
 
     def close(self) -> None:
-        """Waits for what runs; nothing is told any more."""
+        """Waits for the running task and drops all results."""
         self._errands.close()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures: files, layers, colour, comparison, denoising, merging."""
+"""Image files, layers, colour, comparison, denoising and merging."""

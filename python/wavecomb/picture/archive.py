@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""NumPy archives from anywhere: none may take more memory than its file has bytes."""
+"""Reads and writes NumPy archives.
+
+Reading an untrusted archive needs no more memory than its size.
+"""
 
 from __future__ import annotations
 
@@ -20,21 +23,21 @@ from wavecomb.picture.files import check_regular, replacing
 from wavecomb.version import version
 
 MAX_HEADER = 1 << 24
-"""Bytes of the text of an archive."""
+"""Most bytes of an archive's header."""
 
 MAX_ENTRIES = 4096
 
 
 class ArchiveError(Exception):
-    """It is no such archive, or is damaged."""
+    """A file is not an archive of the expected kind, or is damaged."""
 
 
 def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """The header (what its JSON says) and the other arrays of an archive that is not compressed.
+    """Reads an uncompressed archive; returns its header (parsed JSON) and the other arrays.
 
     Raises:
-        ArchiveError: It is none, says that it holds more than it does, or is damaged.
-        OSError: It cannot be opened.
+        ArchiveError: The file is not an archive, declares more data than it has, or is damaged.
+        OSError: The file cannot be opened.
     """
     with Path(path).open("rb") as file:
         try:
@@ -48,7 +51,8 @@ def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
                 }
         except ArchiveError:
             raise
-        # RecursionError: JSON in JSON; NotImplementedError and RuntimeError: kinds of zip files.
+        # RecursionError: nested JSON. NotImplementedError, RuntimeError: unsupported kinds of zip
+        # files.
         except (
             ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, OverflowError,
             MemoryError, RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile, zlib.error,
@@ -64,13 +68,14 @@ def write_archive(
     *,
     durable: bool = False,
 ) -> None:
-    """Writes what ``read_archive`` reads; the file is whole when it has its name.
+    """Writes an archive for ``read_archive`` atomically.
 
     Args:
         path: The file.
-        header: Becomes JSON.
-        arrays: Numbers by name.
-        durable: The file is on the disk, not only in the system's memory, when it has its name.
+        header: Values that are stored as JSON.
+        arrays: Numeric arrays by name.
+        durable: Whether the file must be on disk, not only in the system's cache, before it is
+            renamed.
     """
     parts = {name: np.asarray(value) for name, value in arrays.items()}
     parts["header"] = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
@@ -81,19 +86,19 @@ def write_archive(
 def read_kind(
     path: str | os.PathLike[str], kind: str, of_format: int, option: str, advice: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Reads an archive of Wavecomb's own whose header gives its kind, format and version.
+    """Reads an archive of Wavecomb, whose header states its kind, format and version.
 
     Args:
         path: The file.
-        kind: Expected.
-        of_format: Expected.
-        option: Of `wavecomb render`, that writes such a file.
-        advice: What to do with a file of another format.
+        kind: Expected kind.
+        of_format: Expected format.
+        option: Option of `wavecomb render` that writes such a file.
+        advice: Advice for a file of another format.
 
     Raises:
-        ArchiveError: The file is damaged, or of another kind.
-        OSError: It cannot be opened.
-        WavecombError: It is of another format.
+        ArchiveError: The file is damaged or of another kind.
+        OSError: The file cannot be opened.
+        WavecombError: The file has another format.
     """
     name = os.fspath(path)
     if not Path(name).exists():
@@ -112,7 +117,7 @@ def read_kind(
 
 
 def _check_sizes(file: Any) -> None:
-    """Raises ArchiveError for an archive whose parts are larger than its file."""
+    """Raises ArchiveError for an archive whose members are larger than its file."""
     size = os.fstat(file.fileno()).st_size
     with zipfile.ZipFile(file) as archive:
         parts = archive.infolist()
@@ -129,7 +134,7 @@ def _check_sizes(file: Any) -> None:
 
 
 def _check_shape(member: Any, size: int) -> None:
-    """Raises ArchiveError for an array that says that it has more values than there are bytes."""
+    """Raises ArchiveError for an array that declares more values than it has bytes."""
     version = np.lib.format.read_magic(member)
     if version == (1, 0):
         shape, _, dtype = np.lib.format.read_array_header_1_0(member)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures that are named together: those of a folder, of a sequence, or one by one."""
+"""Collects images from folders, sequences and single files."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from wavecomb.picture.files import kind_of
 from wavecomb.run.frame_names import frame_text, has_place, matching
 
 ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr")
-"""What counts as a picture in a folder."""
+"""Extensions of image files in folders."""
 
 
 def is_many(source: str) -> bool:
-    """Whether a name stands for several pictures: a folder, or a name with a place for the frame.
+    """Returns whether a name stands for several images: a folder, or a frame pattern.
 
-    A file that is called so is a file.
+    An existing file with such a name counts as a single file.
     """
     return os.path.isdir(source) or (has_place(source) and not os.path.exists(source))
 
 
 def pictures_of(source: str) -> dict[str, str]:
-    """Name -> file: frames of a sequence in their order, or what is in a folder and below it.
+    """Returns files by name: frames of a sequence in order, or all images in a folder tree.
 
     Args:
-        source: A folder, or a name with a place for the frame: ``out/shot.####.exr``.
+        source: A folder, or a name with a frame placeholder, such as ``out/shot.####.exr``.
 
     Raises:
-        WavecombError: There are none.
+        WavecombError: There are no images.
     """
     try:
         if os.path.isdir(source):
@@ -57,10 +57,10 @@ def _below(folder: str) -> list[str]:
 
 
 def collect(sources: Iterable[str]) -> dict[str, str]:
-    """Name -> file of all pictures of folders, sequences and files, in the order they are named.
+    """Returns files by name of all images in folders, sequences and files, in the given order.
 
     Raises:
-        WavecombError: One of them is not there.
+        WavecombError: A source does not exist.
     """
     found: dict[str, str] = {}
     for source in sources:
@@ -76,7 +76,7 @@ def collect(sources: Iterable[str]) -> dict[str, str]:
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
-    """A key by which 9 comes before 10.
+    """Returns a sort key that orders numbers by value.
 
     >>> sorted(["a10.exr", "a9.exr"], key=natural)
     ['a9.exr', 'a10.exr']

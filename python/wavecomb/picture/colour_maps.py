@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colour maps in which equal steps look equal, also to the colour-blind."""
+"""Perceptually uniform colour maps that are suitable for people with colour deficiencies."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ _HUE_BELOW, _HUE_ABOVE = 255.0, 70.0
 
 
 def colour_map(count: int = 256) -> NDArray[np.float32]:
-    """Dark violet over red to light yellow, (count, 3), linear Rec.709.
+    """Returns a map from dark violet over red to light yellow (count, 3), in linear Rec.709.
 
-    Lightness of OKLab (Ottosson 2020) rises evenly, so equal steps look equal; the hue turns from
-    violet to yellow; chroma is the largest that the gamut has, up to 0.2.
+    OKLab lightness (Ottosson 2020) rises linearly, so that steps look uniform; the hue turns from
+    violet to yellow; chroma is the largest in the gamut, up to 0.2.
     """
     t = np.linspace(0.0, 1.0, count)
     return _largest_chroma(0.2 + 0.76 * t, np.radians(300.0 + 170.0 * t), 0.2)
 
 
 def signed_colour_map(count: int = 257) -> NDArray[np.float32]:
-    """Light blue over black to light orange, (count, 3), linear Rec.709; black is the middle.
+    """Returns a map from light blue over black to light orange (count, 3), in linear Rec.709.
 
-    Lightness rises evenly from the middle to both ends. Blue and orange are told apart by people
-    with any of the common colour deficiencies.
+    Lightness rises linearly from the middle, which is black, to both ends. Blue and orange are
+    distinguishable with all common colour deficiencies.
     """
     t = np.linspace(-1.0, 1.0, count)
     hue = np.radians(np.where(t < 0.0, _HUE_BELOW, _HUE_ABOVE))
@@ -35,7 +35,7 @@ def signed_colour_map(count: int = 257) -> NDArray[np.float32]:
 def _largest_chroma(
     lightness: NDArray[np.float64], hue: NDArray[np.float64], most: float
 ) -> NDArray[np.float32]:
-    """Colours with the largest chroma that lies in the gamut, by bisection."""
+    """Returns colours with the largest chroma inside the gamut, found by bisection."""
     low, high = np.zeros_like(lightness), np.full_like(lightness, most)
     for _ in range(20):
         chroma = 0.5 * (low + high)
@@ -49,7 +49,7 @@ def _largest_chroma(
 def _linear_from_oklab(
     lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """OKLab -> linear Rec.709, (n, 3): https://bottosson.github.io/posts/oklab/."""
+    """Converts OKLab to linear Rec.709 (n, 3): https://bottosson.github.io/posts/oklab/."""
     long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
     medium = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
     short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3

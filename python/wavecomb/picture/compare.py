@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Says how two pictures differ."""
+"""Compares two images numerically."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ TRIMMED_SHARE = 0.001
 
 @dataclass(frozen=True)
 class Comparison:
-    """How picture A differs from picture B, the reference.
+    """Differences between image A and the reference image B.
 
-    Differences are A - B, of linear values. Pixels in which a channel of A or of B is NaN or
-    infinite are counted and left out of every mean and maximum; equal bits are equal there too.
+    Differences are A - B in linear values. Pixels in which a channel of A or B is NaN or infinite
+    are counted and excluded from all means and maxima; equality compares their bits.
 
     Attributes:
-        equal: Every layer that both have is the same, bit for bit: -0 is not 0, and a NaN equals
-            itself. Layers that only one has are named, and do not count.
-        width: In pixels.
-        height: In pixels.
-        channels: Of the colour layer.
-        pixels_different: Pixels of the colour layer with other bits.
-        pixels_not_finite: Pixels left out, as said above.
-        not_finite_differ: Of those, the ones with other bits.
+        equal: Whether all common layers are bit-identical: -0 differs from 0, and a NaN equals
+            itself. Layers that only one image has are listed but ignored.
+        width: Width in pixels.
+        height: Height in pixels.
+        channels: Number of channels of the colour layer.
+        pixels_different: Number of pixels of the colour layer with different bits.
+        pixels_not_finite: Number of excluded pixels.
+        not_finite_differ: Number of excluded pixels with different bits.
         luminance_mean_abs: Mean absolute difference of Rec.709 luminance.
         luminance_max_abs: Largest absolute difference of Rec.709 luminance.
-        luminance_max_at: Where that is: column and row from the top left, from 0; None if it is 0.
+        luminance_max_at: Its column and row from the top left, starting at 0; None if it is 0.
         max_abs: Largest absolute difference of any channel.
         mean_signed: Mean difference of each channel.
         mean_abs: Mean absolute difference of each channel.
         rmse: Square root of the mean squared difference over pixels and channels.
         rel_mse: Mean of (A - B)^2 / (B^2 + 0.01) over pixels and channels.
-        rel_mse_trimmed: The same without the 0.1 % of pixels with the largest terms, which a few
-            bright outliers would decide.
-        layers: Other layers that both have -> {"equal": bool, "max_abs": float}; max_abs is over
-            the values that are finite in both, None where the shapes differ.
+        rel_mse_trimmed: ``rel_mse`` without the 0.1 % of pixels with the largest terms, which would
+            otherwise dominate it.
+        layers: Other common layers -> {"equal": bool, "max_abs": float}; max_abs covers values that
+            are finite in both, and is None if the shapes differ.
         only_a: Layers that only A has.
         only_b: Layers that only B has.
     """
@@ -73,16 +73,16 @@ class Comparison:
     only_b: tuple[str, ...] = ()
 
     def within(self, tolerance: float) -> bool:
-        """No channel differs by more than ``tolerance``, and no bit of what is not finite."""
+        """Returns whether channels differ by at most ``tolerance`` and excluded pixels match."""
         return self.max_abs <= tolerance and self.not_finite_differ == 0
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields, for JSON."""
+        """Returns the fields for JSON."""
         return dataclasses.asdict(self)
 
 
 def compare(a: Source, b: Source) -> Comparison:
-    """Compares two pictures: files, ``Picture`` objects or arrays (height, width[, channels]).
+    """Compares two images: files, ``Picture`` objects or arrays (height, width[, channels]).
 
     >>> import numpy as np
     >>> difference = compare(np.ones((4, 4, 3)), np.zeros((4, 4, 3)))
@@ -90,8 +90,8 @@ def compare(a: Source, b: Source) -> Comparison:
     (False, 1.0, 100.0)
 
     Raises:
-        ValueError: The pictures have other sizes or numbers of channels.
-        OSError: A file cannot be read.
+            ValueError: The sizes or the numbers of channels differ.
+            OSError: A file cannot be read.
     """
     layers_a, layers_b = layers_of(a), layers_of(b)
     colour_a, colour_b = _colour_pair(a, layers_a, b, layers_b)
@@ -105,7 +105,7 @@ def compare(a: Source, b: Source) -> Comparison:
 
 
 def layers_of(source: Source) -> dict[str, NDArray[Any]]:
-    """The layers of a file, a picture or an array, as float32 (height, width, channels)."""
+    """Returns the layers of a file, picture or array as float32 (height, width, channels)."""
     import numpy as np
 
     if isinstance(source, (str, os.PathLike)):
@@ -127,7 +127,7 @@ def layers_of(source: Source) -> dict[str, NDArray[Any]]:
 
 
 def colour_layer(layers: Mapping[str, NDArray[Any]], name: str) -> NDArray[Any]:
-    """The beauty, or the only layer there is."""
+    """Returns the beauty layer, or the only layer."""
     if "beauty" in layers:
         return layers["beauty"]
     if len(layers) == 1:
@@ -136,10 +136,10 @@ def colour_layer(layers: Mapping[str, NDArray[Any]], name: str) -> NDArray[Any]:
 
 
 def colour_pair(a: Source, b: Source) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The colour layers of two pictures of one size.
+    """Returns the colour layers of two images of equal size.
 
     Raises:
-        ValueError: They have other sizes or numbers of channels.
+        ValueError: The sizes or the numbers of channels differ.
     """
     return _colour_pair(a, layers_of(a), b, layers_of(b))
 
@@ -158,7 +158,7 @@ def _colour_pair(
 
 
 def trimmed_mean(values: NDArray[Any], share: float = TRIMMED_SHARE) -> float:
-    """The mean without the largest ones: floor(share x number) of them; 0 of none.
+    """Returns the mean without the largest floor(share * size) values; 0 for an empty array.
 
     >>> import numpy as np
     >>> trimmed_mean(np.array([1.0, 2.0, 3.0, 100.0]), 0.25)
@@ -171,7 +171,7 @@ def trimmed_mean(values: NDArray[Any], share: float = TRIMMED_SHARE) -> float:
 
 
 def luminance(pixels: NDArray[Any]) -> NDArray[Any]:
-    """Rec.709 luminance in float64, (height, width); of fewer than 3 channels the first."""
+    """Returns Rec.709 luminance in float64 (height, width); the first channel if fewer than 3."""
     import numpy as np
 
     from wavecomb.picture.working_space import LUMINANCE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Says how the pictures of two folders, or of two sequences, differ."""
+"""Compares the images of two folders or sequences, and writes a page with the results."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from wavecomb.picture.thumbnails import Look, fitted
 
 @dataclass(frozen=True)
 class PairResult:
-    """Two pictures of one name.
+    """Comparison of two images with the same name.
 
     Attributes:
-        name: Below the folders, or the frame.
-        a: File.
-        b: The reference.
-        result: How they differ; None: they cannot be compared.
-        problem: Why not; "" where they can.
+        name: Path inside the folders, or frame.
+        a: File of image A.
+        b: File of the reference image B.
+        result: Differences; None if the images cannot be compared.
+        problem: Reason why they cannot be compared, or "".
     """
 
     name: str
@@ -36,7 +36,7 @@ class PairResult:
     problem: str = ""
 
     def passed(self, tolerance: float | None) -> bool:
-        """Whether they are equal, or within a tolerance."""
+        """Returns whether the images are equal, or within a tolerance."""
         if self.result is None:
             return False
         within = tolerance is not None and self.result.within(tolerance)
@@ -45,10 +45,10 @@ class PairResult:
 
 @dataclass(frozen=True)
 class Folders:
-    """What there is to compare.
+    """Images of two folders or sequences.
 
     Attributes:
-        pairs: Name -> files of A and of B.
+        pairs: Name -> files of A and B.
         only_a: Names that only A has.
         only_b: Names that only B has.
     """
@@ -58,7 +58,7 @@ class Folders:
     only_b: tuple[str, ...]
 
     def compared(self) -> Iterator[PairResult]:
-        """Each pair in turn; what cannot be read or compared is a result, too."""
+        """Compares each pair in turn; yields a result with a problem for unreadable images."""
         for name, (a, b) in self.pairs.items():
             try:
                 yield PairResult(name, a, b, compare(a, b))
@@ -67,14 +67,14 @@ class Folders:
 
 
 def pair_up(a: str, b: str) -> Folders:
-    """Pictures of two folders by their names below them, of two sequences by their frames.
+    """Pairs images of two folders by their paths, or of two sequences by their frames.
 
     Args:
-        a: A folder, or a name with a place for the frame.
-        b: The reference, likewise.
+        a: A folder, or a name with a frame placeholder.
+        b: The reference, in the same form.
 
     Raises:
-        WavecombError: One is not there, or they have no name in common.
+        WavecombError: A source does not exist, or the two have no name in common.
     """
     for one, other in ((a, b), (b, a)):
         if not is_many(one):
@@ -89,18 +89,18 @@ def pair_up(a: str, b: str) -> Folders:
 
 
 def as_plain(pair: PairResult, tolerance: float | None) -> dict[str, Any]:
-    """A pair for JSON."""
+    """Returns the result of a pair for JSON."""
     found = {} if pair.result is None else pair.result.to_dict()
     passed = pair.passed(tolerance)
     return {"name": pair.name, "a": pair.a, "b": pair.b, "passed": passed,
             "problem": pair.problem or None, **found}  # fmt: skip
 
 
-# ---- A page of pairs of pictures that are wiped, with maps of their differences and figures ------
+# ---- Page with pairs of images under a wipe line, difference maps and figures --------------------
 
 
 MOST_PAIRS = 60
-"""Pairs whose pictures are in a page: those that differ most. All are in its table."""
+"""Most pairs whose images are in a page, those with the largest differences; its table has all."""
 _HEAD = ("picture", "", "differ", "RMSE", "relMSE", "largest", "at")
 
 
@@ -114,16 +114,16 @@ def compare_page(
     kind: Kind = "absolute",
     width: int = 1600,
 ) -> str:
-    """HTML that needs nothing else.
+    """Returns a self-contained HTML page with comparisons.
 
     Args:
-        results: What came of each pair.
-        look: How pictures are shown.
-        sources: Names of A and of B, the reference.
-        folders: What was compared, where it is more than two files.
-        tolerance: Within which pictures pass.
-        kind: Of the maps.
-        width: Of the pictures in the page at most, pixels.
+        results: Results of the pairs.
+        look: Display options of images.
+        sources: Names of A and of the reference B.
+        folders: The compared folders; None for a comparison of two files.
+        tolerance: Tolerance within which images pass.
+        kind: Kind of difference maps.
+        width: Largest width of images in the page, pixels.
     """
     ranked = [one for one in results if one.result is not None and not one.passed(tolerance)]
     ranked.sort(key=lambda one: -_rmse(one))
@@ -148,7 +148,7 @@ def compare_page(
 
 
 def _short(sources: tuple[str, str]) -> tuple[str, str]:
-    """Names of A and B that tell them apart."""
+    """Returns short names of A and B that differ from each other."""
     names = [os.path.basename(os.path.normpath(one)) for one in sources]
     if names[0] != names[1]:
         return names[0], names[1]

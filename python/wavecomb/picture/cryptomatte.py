@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cryptomatte in files: layer names, manifests and metadata (specification 1.2.0).
 
-Ranks of (id, coverage), most coverage first, are pairs of channels: R, G of the layer
-"CryptoObject00" are the first, B, A the second, and so on. Ids are the bits of floats.
+Ranks of (id, coverage), sorted by descending coverage, are stored as pairs of channels: channels R,
+G of the layer "CryptoObject00" hold the first rank, B, A the second, and so on. Ids are stored as
+the bits of floats.
 """
 
 from __future__ import annotations
@@ -20,23 +21,23 @@ LEVELS = {
     "crypto_material": "CryptoMaterial",
     "crypto_asset": "CryptoAsset",
 }
-"""AOV -> name in files."""
+"""AOV -> layer name in files."""
 
 
 def is_crypto(layer: str) -> bool:
-    """Whether a layer, by its name in a file, is of a Cryptomatte."""
+    """Returns whether a layer of a file belongs to a Cryptomatte."""
     return re.fullmatch(r"Crypto(Object|Material|Asset)\d\d", layer) is not None
 
 
 def layers(aov: str, pairs: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Layers of four channels for pairs (height, width, 2 * ranks)."""
+    """Splits ranks (height, width, 2 * ranks) into layers of four channels."""
     return {
         f"{LEVELS[aov]}{k:02d}": pairs[:, :, 4 * k : 4 * k + 4] for k in range(pairs.shape[2] // 4)
     }
 
 
 def gather(found: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """The pairs (height, width, 2 * ranks) of each level among layers of a file, by AOV."""
+    """Collects the ranks (height, width, 2 * ranks) of each level from a file's layers, by AOV."""
     out: dict[str, NDArray[Any]] = {}
     for aov, name in LEVELS.items():
         parts = sorted(layer for layer in found if re.fullmatch(rf"{name}\d\d", layer))
@@ -46,7 +47,7 @@ def gather(found: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 
 
 def metadata(manifests: Mapping[str, Mapping[str, int]]) -> dict[str, str]:
-    """Attributes that tell readers of the levels and their names.
+    """Returns the file attributes that describe the levels and their names.
 
     Args:
         manifests: AOV -> name -> id.
@@ -69,7 +70,7 @@ def metadata(manifests: Mapping[str, Mapping[str, int]]) -> dict[str, str]:
 
 
 def manifests(attributes: Mapping[str, Any]) -> dict[str, dict[str, int]]:
-    """What ``metadata`` was made of, out of the attributes of a file."""
+    """Parses the manifests from a file's attributes."""
     out: dict[str, dict[str, int]] = {}
     by_name = {name: aov for aov, name in LEVELS.items()}
     for key, value in attributes.items():
@@ -81,11 +82,11 @@ def manifests(attributes: Mapping[str, Any]) -> dict[str, dict[str, int]]:
 
 
 def matte(pairs: NDArray[Any], number: int) -> NDArray[np.float32]:
-    """How much of each pixel an id covers: (height, width).
+    """Returns the coverage (height, width) of each pixel by an id.
 
     Args:
         pairs: (height, width, 2 * ranks).
-        number: The id, as ``_core.crypto_id`` gives it.
+        number: The id, from ``_core.crypto_id``.
     """
     bits = np.ascontiguousarray(pairs[:, :, 0::2], dtype=np.float32).view(np.uint32)
     return np.where(bits == np.uint32(number), pairs[:, :, 1::2], 0).sum(axis=2, dtype=np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deep pictures: samples of each pixel by depth, and their OpenEXR files (docs/deep.md)."""
+"""Deep images: samples of each pixel by depth, and their OpenEXR files (docs/deep.md)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wavecomb.picture.exr import BAND, Window, bands_of, set_attributes
 from wavecomb.picture.files import one_line, replacing, why_not_written
 
 CHANNELS = ("R", "G", "B", "A", "Z", "ZBack")
-"""Of a sample, in the order of ``DeepPicture.samples``."""
+"""Channels of a sample, in the order of ``DeepPicture.samples``."""
 _HALF_MAX = 65504.0
 
 
@@ -27,17 +27,17 @@ class DeepPicture:
     """Samples of each pixel by depth. Row 0 is the top.
 
     Attributes:
-        counts: (height, width), samples of each pixel.
-        samples: (n, 6): R, G, B, A, Z, ZBack of all samples, pixel by pixel and row by row, the
-            nearest of a pixel first. Colours are premultiplied; Z is the depth along the camera's
-            axis, scene units, and ZBack is beyond it where the sample is of a volume.
+        counts: (height, width) number of samples of each pixel.
+        samples: (n, 6) R, G, B, A, Z, ZBack of all samples, pixel by pixel in row order, the
+            closest sample of a pixel first. Colours are premultiplied. Z is the depth along the
+            camera's axis in scene units; ZBack is larger than Z for samples of volumes.
     """
 
     counts: NDArray[np.uint32]
     samples: NDArray[np.float32]
 
     def flat(self) -> NDArray[np.float64]:
-        """All samples of each pixel over each other: (height, width, 4), premultiplied.
+        """Composites all samples of each pixel to (height, width, 4), premultiplied.
 
         >>> one = DeepPicture(np.full((1, 1), 2), np.array([[.5, 0, 0, .5, 1, 1.], [1] * 6]))
         >>> one.flat()[0, 0].tolist()
@@ -60,13 +60,13 @@ class DeepPicture:
         metadata: Mapping[str, Any] | None = None,
         window: Window | None = None,
     ) -> Path:
-        """Writes a deep OpenEXR file; whole or not at all.
+        """Writes a deep OpenEXR file atomically.
 
         Args:
-            path: Ends in .exr.
-            half: 16 bit colours and alpha; depths stay 32 bit.
-            metadata: Attributes, as of ``write_exr``.
-            window: Likewise.
+            path: File name that ends in .exr.
+            half: Whether to store colours and alpha as 16-bit floats; depths are always 32-bit.
+            metadata: File attributes, as for ``write_exr``.
+            window: Position in a larger image, as for ``write_exr``.
 
         Raises:
             WavecombError: The name does not end in .exr.
@@ -116,14 +116,14 @@ class DeepPicture:
 
 
 def _clamped(samples: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Colours within the range of a half."""
+    """Clamps colours to the range of half floats."""
     out = samples.copy()
     out[:, :4] = np.clip(out[:, :4], -_HALF_MAX, _HALF_MAX)
     return out
 
 
 def _deep_data(spec: Any, counts: NDArray[np.uint32], samples: NDArray[np.float32]) -> Any:
-    """Some rows as OpenImageIO holds them."""
+    """Converts rows to OpenImageIO's deep data."""
     import OpenImageIO as oiio
 
     data = oiio.DeepData()
@@ -145,5 +145,5 @@ def _run(function: Any, *columns: NDArray[Any]) -> None:
 
 
 def deep_of(pair: tuple[Any, Any] | None) -> DeepPicture | None:
-    """What the core gives as a picture; None where none was asked for."""
+    """Converts a deep image of the core; returns None for None."""
     return None if pair is None else DeepPicture(*pair)

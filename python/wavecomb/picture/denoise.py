@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Denoising by Intel Open Image Denoise, by way of the extra ``denoise``."""
+"""Denoising with Intel Open Image Denoise, which the extra ``denoise`` installs."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ Array = NDArray[np.float32]
 
 
 def check_denoiser() -> None:
-    """Raises WavecombError that says what to install, unless pictures can be denoised here."""
+    """Raises WavecombError with installation advice unless denoising is available."""
     needed("pyoidn", "denoising", extra="denoise")
 
 
 def denoise(beauty: Array, albedo: Array, normal: Array, *, threads: int = 0) -> Array:
-    """A picture without its noise.
+    """Denoises an image.
 
-    Albedo and normals are denoised first, each by itself, and then guide the picture as clean ones:
-    what Open Image Denoise recommends for the most detail.
+    Albedo and normals are denoised separately first and then guide the image as noise-free
+    features, which Open Image Denoise recommends for the most detail.
 
     Args:
-        beauty: (height, width, 3), linear; values that are not finite are filled in.
-        albedo: (height, width, 3), of what is seen.
-        normal: (height, width, 3), means of unit vectors.
-        threads: 0: all.
+        beauty: (height, width, 3), linear; values that are not finite are replaced.
+        albedo: (height, width, 3) albedo.
+        normal: (height, width, 3) means of unit normals.
+        threads: Number of threads; 0 means all.
 
     Raises:
-        WavecombError: The library is missing, or fails.
+        WavecombError: The library is missing or fails.
     """
     oidn = needed("pyoidn", "denoising", extra="denoise")
     with oidn.Device() as device:
@@ -48,7 +48,7 @@ def denoise(beauty: Array, albedo: Array, normal: Array, *, threads: int = 0) ->
 
 
 def _clean(image: Array, low: float, high: float | None) -> Array:
-    """Finite values within the range that the filter reads."""
+    """Returns finite values in the filter's input range."""
     finite = np.nan_to_num(image, nan=0.0, posinf=0.0, neginf=0.0)
     return np.ascontiguousarray(np.clip(finite, low, high), dtype=np.float32)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Distributions of directions, as the core keeps them, and as maps of all directions."""
+"""Directional distributions: the core's square parametrisation, and latlong maps."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 
 def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
-    """Points (u, v) in [0, 1] of unit vectors, (..., 3) -> (..., 2).
+    """Maps unit vectors (..., 3) to points (u, v) in the unit square (..., 2).
 
-    P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008, as
-    guiding/directions.h has it.
+    P. Clarberg, "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", JGT 13(3) 2008; the same
+    mapping as guiding/directions.h.
 
     >>> square_points(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])).tolist()
     [[0.5, 0.5], [1.0, 0.5]]
@@ -29,19 +29,21 @@ def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
 def map_directions(
     up: NDArray[Any], ahead: NDArray[Any], height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Unit vectors of the pixels of a map of all directions, and the axes that it is drawn by.
+    """Returns the unit vectors of a latlong map's pixels, and the axes of the map.
 
     Args:
-        up: Unit vector; the map's top row.
-        ahead: Its middle, but for the height; any direction.
-        height: Rows; there are twice as many columns, and what is to the right is right of it.
+        up: Unit vector of the map's top row.
+        ahead: Direction of the map's centre column; any direction.
+        height: Number of rows. There are twice as many columns; image right is to the right of
+            ``ahead``.
 
     Returns:
-        (height, 2 height, 3), and the rows ahead, right, up, (3, 3).
+        (height, 2 height, 3) vectors, and a (3, 3) matrix with the rows ahead, right and up.
     """
     up = np.asarray(up, np.float64)
     flat = np.asarray(ahead, np.float64) - up * (np.asarray(ahead, np.float64) @ up)
-    if np.linalg.norm(flat) < 1e-6:  # straight up or down: any will do
+    # Looking straight up or down, any horizontal direction works.
+    if np.linalg.norm(flat) < 1e-6:
         flat = np.eye(3)[np.argmin(np.abs(up))]
         flat = flat - up * (flat @ up)
     flat = flat / np.linalg.norm(flat)
@@ -60,7 +62,7 @@ def map_directions(
 
 
 def map_point(direction: NDArray[Any], axes: NDArray[np.float64]) -> tuple[float, float]:
-    """Where a unit vector is on the map of ``axes``: x from 0 (left) to 1, y from 0 (top) to 1."""
+    """Returns map coordinates of a unit vector: x from 0 (left) to 1, y from 0 (top) to 1."""
     ahead, right, up = axes @ np.asarray(direction, np.float64)
     return (
         float(0.5 + np.arctan2(right, ahead) / (2.0 * np.pi)),
@@ -71,13 +73,13 @@ def map_point(direction: NDArray[Any], axes: NDArray[np.float64]) -> tuple[float
 def density_map(
     density: NDArray[Any], up: NDArray[Any], ahead: NDArray[Any], height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A distribution over the bins of the square as a map of all directions, and its axes.
+    """Resamples a distribution over bins of the square to a latlong map; also returns its axes.
 
     Args:
-        density: (n, n), of bins, rows by v.
-        up: As ``map_directions``, like the others.
-        ahead: Likewise.
-        height: Likewise.
+        density: (n, n) values of bins, with rows along v.
+        up: Unit vector of the map's top row.
+        ahead: Direction of the map's centre column.
+        height: Number of rows.
     """
     vectors, axes = map_directions(up, ahead, height)
     side = len(density)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures inside pages and notebooks: PNG or JPEG as bytes, and as text that a page holds."""
+"""Encodes images for pages and notebooks: PNG or JPEG as bytes or as data URIs."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ _QUALITY = "jpeg:90"
 
 
 def encoded(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
-    """8-bit sRGB codes, (height, width, 3), as the bytes of a file.
+    """Encodes 8-bit sRGB codes (height, width, 3) as the bytes of an image file.
 
     Args:
-        codes: Row 0 at the top.
-        kind: "png": as they are; "jpeg": a tenth of that, at quality 90 with all of the colour.
+        codes: Pixels with row 0 at the top.
+        kind: "png" is lossless; "jpeg" has quality 90 without chroma subsampling and takes about a
+            tenth of the size.
     """
     spec = png_spec(*codes.shape[:2])
     if kind == "jpeg":
         spec.attribute("Compression", _QUALITY)
         spec.attribute("jpeg:subsampling", "4:4:4")
-    # A file, not a folder of its own: that is all that a process in a sandbox may make.
+    # Use a file instead of a folder, since a sandboxed process may create only files.
     number, name = tempfile.mkstemp(suffix=f".{kind}")
     os.close(number)
     try:
@@ -43,21 +44,21 @@ def encoded(codes: NDArray[np.uint8], kind: Kind = "png") -> bytes:
 
 
 def base64_text(data: bytes) -> str:
-    """Bytes as text."""
+    """Encodes bytes as Base64 text."""
     return base64.b64encode(data).decode("ascii")
 
 
 def data_uri(codes: NDArray[np.uint8], kind: Kind = "png") -> str:
-    """The picture as an address that holds all of it."""
+    """Encodes an image as a data URI."""
     return f"data:image/{kind};base64,{base64_text(encoded(codes, kind))}"
 
 
 def smaller(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
-    """A picture with at most so many pixels an edge: each is the mean of a square of others.
+    """Reduces an image to at most ``most`` pixels per edge by averaging square blocks.
 
     Args:
-        pixels: Linear, (height, width, channels).
-        most: Pixels of the longer edge.
+        pixels: Linear (height, width, channels).
+        most: Largest length of the longer edge in pixels.
 
     >>> smaller(np.ones((100, 50, 3)), 40).shape
     (33, 16, 3)
@@ -72,6 +73,6 @@ def smaller(pixels: NDArray[Any], most: int) -> NDArray[np.float32]:
 
 
 def every_nth(pixels: NDArray[P], most: int) -> NDArray[P]:
-    """The same by leaving pixels out: of ids and of what is not finite there are no means."""
+    """Reduces an image by skipping pixels, for ids and values that are not finite."""
     step = max(1, -(-max(pixels.shape[:2]) // most))
     return np.ascontiguousarray(pixels[::step, ::step])

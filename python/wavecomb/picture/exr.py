@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""OpenEXR files of many layers, by OpenImageIO: channel names, types, compression, attributes.
+"""Writes OpenEXR files with many layers by OpenImageIO.
 
-Arrays are (height, width) or (height, width, channels), row 0 at the top. Errors are OSError (the
-file), WavecombError (options) or ValueError (the arrays), one line that names the file.
+Arrays are (height, width) or (height, width, channels), with row 0 at the top. Errors are OSError
+(for the file), WavecombError (for options) or ValueError (for arrays) with a one-line message that
+names the file.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ COMPRESSIONS: tuple[str, ...] = get_args(Compression)
 _LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
 MAX_TILE = 4096
 Window = tuple[int, int, int, int]
-"""Column and row of the first pixel in the whole picture, and that picture's width and height."""
+"""Column and row of the first pixel in the whole image, and the width and height of that image."""
 
 _HALF_MAX = 65504.0
 _SUFFIXES = {
@@ -58,19 +59,19 @@ _COLOURS = (
     "by_light_samples",
     "by_light_paths",
 )
-"""Layers that are half where halves are asked for, with those of lights and expressions."""
+"""Layers that can be stored as half floats, besides those of light groups and expressions."""
 _EXACT = ("position", "material_id", "instance_id", "motion", "depth_nearest", "distance")
 ALPHA = "A"
-"""The layer that is the alpha channel of R, G and B."""
+"""Name of the alpha channel of R, G and B."""
 BAND = 64
-"""Rows that are made ready and written at once: four blocks of an EXR file."""
+"""Rows that are converted and written together: four blocks of an EXR file."""
 
 LAYER_ORDER = tuple(_SUFFIXES)
-"""Layers that have letters of their own for their channels, in the order of a file."""
+"""Layers with special channel letters, in the order of a file."""
 
 
 def channel_names(layer: str, channels: int) -> list[str]:
-    """Channel names of a layer in an EXR file: beauty is R, G, B; albedo is albedo.R and so on.
+    """Returns the EXR channel names of a layer: beauty is R, G, B; albedo is albedo.R and so on.
 
     >>> channel_names("normal", 3)
     ['normal.X', 'normal.Y', 'normal.Z']
@@ -89,10 +90,10 @@ def channel_names(layer: str, channels: int) -> list[str]:
 
 
 def is_exact(layer: str) -> bool:
-    """Whether a lossy compression would spoil a layer.
+    """Returns whether lossy compression would invalidate a layer.
 
-    Of ids it makes others. Positions far from 0 go out of its range: dwaa takes any channel called
-    Y for a brightness.
+    It would change ids. Positions far from 0 exceed its range, since dwaa treats every channel
+    named Y as luminance.
     """
     return is_crypto(layer) or layer in _EXACT
 
@@ -108,20 +109,19 @@ def write_exr(
     window: Window | None = None,
     called: str | os.PathLike[str] | None = None,
 ) -> None:
-    """Writes an OpenEXR file with one part; whole or not at all.
+    """Writes an OpenEXR file with one part atomically.
 
     Args:
-        path: Ends in .exr.
+        path: File name that ends in .exr.
         layers: Name -> (height, width) or (height, width, channels); "beauty" becomes R, G, B.
-        half: 16 bit colours and normals; all else stays 32 bit. Finite values beyond the range of
-            a half are clamped to it.
-        compression: Of OpenEXR. Those that lose something (pxr24, b44, dwaa ...) are refused for
-            layers of ids and positions.
-        tile: Edge of square tiles, pixels, a multiple of 16; 0: scanlines.
-        metadata: Attributes of the file: str, int, float, or (4, 4) arrays. "Software" is set if
-            it is not given.
-        window: Where the pixels lie in a larger picture; None: they are all of it.
-        called: The file in messages, where ``path`` is to be renamed to it.
+        half: Whether to store colours as 16-bit floats; other layers are always 32-bit. Finite
+            values outside of the range of half floats are clamped.
+        compression: OpenEXR compression. Lossy ones (pxr24, b44, dwaa ...) are rejected for layers
+            with ids or positions.
+        tile: Edge of square tiles in pixels, a multiple of 16; 0 means scanlines.
+        metadata: File attributes: str, int, float, or (4, 4) arrays. "Software" has a default.
+        window: Position of the pixels in a larger image; None means that they are the whole image.
+        called: Name of the file in messages if ``path`` is temporary.
     """
     name = os.fspath(path if called is None else called)
     sheet = Sheet(
@@ -133,10 +133,10 @@ def write_exr(
 
 
 class Sheet:
-    """How layers lie in an EXR file: its header, and its values of some rows.
+    """Layout of layers in an EXR file: its header, and pixel values by rows.
 
     Attributes:
-        spec: OpenImageIO's.
+        spec: OpenImageIO's specification of the file.
     """
 
     def __init__(
@@ -151,7 +151,10 @@ class Sheet:
         window: Window | None = None,
         height: int | None = None,
     ) -> None:
-        """Arguments are those of ``write_exr``; height: rows of the file, where layers are some."""
+        """Arguments are those of ``write_exr``.
+
+        ``height`` is the file's height if layers have fewer rows.
+        """
         if Path(name).suffix.lower() != ".exr":
             raise ValueError(f"{name}: the name of an OpenEXR file must end in .exr")
         if not layers:
@@ -176,7 +179,7 @@ class Sheet:
     def values(
         self, layers: Mapping[str, NDArray[Any]], rows: slice = slice(None)
     ) -> NDArray[np.float32]:
-        """Rows of layers as (rows, width, channels of the file)."""
+        """Returns rows of the layers as (rows, width, channels of the file)."""
         both = zip(self._planes(layers), self._halves, strict=True)
         return np.concatenate([_values(plane[rows], as_half) for plane, as_half in both], axis=2)
 
@@ -196,7 +199,7 @@ def _may_be_half(layer: str) -> bool:
 
 
 def check_options(name: str, layers: Any, compression: str, tile: int) -> None:
-    """Raises WavecombError for options that a file with these layers cannot have."""
+    """Raises WavecombError for options that are invalid for a file with these layers."""
     if compression not in COMPRESSIONS:
         raise WavecombError(
             f"{name}: compression {compression!r} is none of {', '.join(COMPRESSIONS)}"
@@ -230,13 +233,13 @@ def _spec(planes: list[NDArray[Any]], halves: list[bool], names: list[str], tile
 
 
 def set_attributes(spec: Any, metadata: Mapping[str, Any]) -> None:
-    """Attributes of a file, as ``write_exr`` takes them."""
+    """Sets file attributes in the form of ``write_exr``."""
     for key, value in {"Software": "Wavecomb", **metadata}.items():
         _attribute(spec, key, value)
 
 
 def _attribute(spec: Any, key: str, value: Any) -> None:
-    """Sets an attribute; (4, 4) becomes a matrix of floats, (n,) as many floats."""
+    """Sets an attribute; (4, 4) becomes a float matrix and (n,) a float array."""
     import OpenImageIO as oiio
 
     if np.ndim(value) == 2:
@@ -248,7 +251,7 @@ def _attribute(spec: Any, key: str, value: Any) -> None:
 
 
 def bands_of(height: int, rows: int = BAND) -> Iterator[slice]:
-    """The rows of a picture, a band at a time, so that nothing of its size is held twice."""
+    """Yields slices of rows, so that no copy of the whole image is needed."""
     return (slice(row, min(row + rows, height)) for row in range(0, height, rows))
 
 
@@ -259,7 +262,10 @@ def write_bands(
     *,
     called: str | None = None,
 ) -> None:
-    """Writes a picture, given a band of rows at a time from the top; of tiles, a row of them."""
+    """Writes an image from bands of rows, from the top.
+
+    For tiled files a band is a row of tiles.
+    """
     with replacing(path) as part:
         file = RowFile(part, spec, called or os.fspath(path))
         for pixels in bands:
@@ -268,18 +274,19 @@ def write_bands(
 
 
 class RowFile:
-    """A picture that is written a band of rows at a time from the top; of tiles, rows of them.
+    """An image file that is written in bands of rows, from the top.
 
-    Failures are OSError, one line that names the file.
+    For tiled files a band is a row of tiles. Errors are OSError with a one-line message that names
+    the file.
     """
 
     def __init__(self, part: Path, spec: Any, called: str) -> None:
-        """Opens it.
+        """Opens the file.
 
         Args:
             part: The file.
-            spec: OpenImageIO's.
-            called: The file in messages.
+            spec: OpenImageIO's specification of the file.
+            called: Name of the file in messages.
         """
         import OpenImageIO as oiio
 
@@ -293,7 +300,7 @@ class RowFile:
         self._check(self._output.open(self._part, spec))
 
     def add(self, pixels: NDArray[Any]) -> None:
-        """The next rows, (rows, width, channels)."""
+        """Writes the next rows (rows, width, channels)."""
         first = self._spec.y + self._row
         self._row += len(pixels)
         last, left = self._spec.y + self._row, self._spec.x
@@ -304,10 +311,10 @@ class RowFile:
         self._check(ok)
 
     def close(self) -> None:
-        """Ends the file."""
+        """Completes the file."""
         self._check(self._output.close())
         if self._part.lower().endswith(".png") and not is_whole_png(self._part):
-            # OpenImageIO does not look whether the system took all that it wrote.
+            # OpenImageIO does not check whether the system wrote all data.
             why = why_not_written(self._part, "the file is incomplete")
             raise OSError(f"{self._called}: cannot be written: {why}")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output files, written whole or not at all."""
+"""Writes output files atomically."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from wavecomb.picture.private_folder import PrivateFolder, remove_abandoned
 
 
 class Publisher(Protocol):
-    """Who gives files their names where this process may not."""
+    """Interface that renames files on behalf of a process without permission."""
 
     def is_own(self, target: Path) -> bool:
-        """Whether a file is in a folder that this process may do anything in."""
+        """Returns whether a file is in a folder that this process may modify freely."""
 
     def part_of(self, target: Path) -> Path:
-        """Where to write what is to be a file."""
+        """Returns a temporary name for a file."""
 
     def check(self, target: Path) -> None:
-        """Raises OSError unless the file could be written now."""
+        """Raises OSError unless the file can be written now."""
 
     def publish(self, part: Path, target: Path, *, durable: bool) -> None:
-        """Gives what was written its name."""
+        """Renames the temporary file."""
 
 
 publisher: Publisher | None = None
@@ -40,7 +40,7 @@ def _publisher_of(target: Path) -> Publisher | None:
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
-    """The file behind symbolic links; raises OSError where no file can be written."""
+    """Returns the file behind symbolic links; raises OSError if it cannot be written."""
     check_name(path)
     target = Path(os.path.realpath(path))
     if target.is_dir():
@@ -57,7 +57,7 @@ def _target(path: str | os.PathLike[str]) -> Path:
 
 
 def reason(error: OSError) -> str:
-    """Why, in words: "Permission denied"; the whole message where there is no number."""
+    """Returns the reason for an error, such as "Permission denied", else the whole message."""
     return error.strerror or str(error)
 
 
@@ -65,9 +65,9 @@ _ENDINGS = (".exr", ".png", ".jpg", ".jpeg", ".html", ".learned")
 
 
 def check_name(path: str | os.PathLike[str]) -> None:
-    """Raises OSError, in one line, where libraries could not open a file of this name.
+    """Raises OSError with a one-line message if libraries cannot open a file with this name.
 
-    USD and OpenImageIO take names in UTF-8, and tell the kind of a file by its ending.
+    USD and OpenImageIO require UTF-8 names and determine the format by the extension.
     """
     name = os.fspath(path)
     try:
@@ -82,9 +82,9 @@ def check_name(path: str | os.PathLike[str]) -> None:
 
 
 def why_not_written(part: str | os.PathLike[str], said: str) -> str:
-    """Why a library could not write a file: a full disk, or what it says itself.
+    """Returns the reason why a library could not write a file: a full disk, or its own message.
 
-    Libraries do not pass on what the system said. So this appends to what they wrote.
+    Libraries do not report the system's error, so this function appends to the file to obtain it.
 
     Args:
         part: The incomplete file.
@@ -104,7 +104,7 @@ def why_not_written(part: str | os.PathLike[str], said: str) -> str:
 
 
 def is_whole_png(path: str | os.PathLike[str]) -> bool:
-    """Whether the chunks of a PNG file follow each other to its end."""
+    """Returns whether the chunks of a PNG file are complete."""
     with open(path, "rb") as file:
         end = os.fstat(file.fileno()).st_size
         place, kind = 8, b""
@@ -124,9 +124,9 @@ _KINDS = (
 
 
 def kind_of(path: str | os.PathLike[str]) -> str | None:
-    """What a file is that is neither regular nor a folder, such as "a FIFO"; None for others.
+    """Returns the kind of a special file, such as "a FIFO"; None for regular files and folders.
 
-    Opening a FIFO waits until somebody writes to it, which may be for ever.
+    Opening a FIFO blocks until another process opens it for writing.
     """
     try:
         mode = os.stat(path).st_mode
@@ -136,22 +136,22 @@ def kind_of(path: str | os.PathLike[str]) -> str | None:
 
 
 def check_regular(path: str | os.PathLike[str]) -> None:
-    """Raises OSError, in one line that names the file, if ``kind_of`` names it."""
+    """Raises OSError with a one-line message for a special file (see ``kind_of``)."""
     kind = kind_of(path)
     if kind is not None:
         raise OSError(f"{os.fspath(path)}: is {kind}, not a regular file; give a regular file")
 
 
 def one_line(message: str, name: str) -> str:
-    """A library's message in one line, without the file's name, which the caller gives."""
+    """Returns a library's message as one line without the file name, which the caller adds."""
     line = " ".join(message.replace(f'"{name}"', "it").split())
     return line.rstrip(".") or "unknown reason"
 
 
 def problem_of(library: Any) -> str:
-    """What OpenImageIO, or one of its readers, says went wrong.
+    """Returns the error message of OpenImageIO or of one of its readers.
 
-    It quotes what it finds in files, which need not be text.
+    The message quotes file content, which may not be valid text.
     """
     try:
         return str(library.geterror())
@@ -160,9 +160,9 @@ def problem_of(library: Any) -> str:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raises OSError, in one line that names the file, unless it could be written now.
+    """Raises OSError with a one-line message unless the file can be written now.
 
-    To be called before long work: makes and removes a private folder beside the file.
+    Call this before long work. It creates and removes a private folder next to the file.
     """
     target = _target(path)
     other = _publisher_of(target)
@@ -179,7 +179,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Waits until a file, or what a folder says of its files, is on the disk."""
+    """Flushes a file or a folder's entries to disk."""
     number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)
@@ -188,7 +188,7 @@ def _sync(path: Path) -> None:
 
 
 def publish(part: Path, target: Path, *, durable: bool = False) -> None:
-    """Gives what was written its name; on another file system by a copy beside it."""
+    """Renames a finished file; copies it first if the target is on another file system."""
     if durable:
         _sync(part)
     try:
@@ -208,15 +208,15 @@ def publish(part: Path, target: Path, *, durable: bool = False) -> None:
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
-    """Yields a temporary file name; renames that file to ``path`` if all went well.
+    """Yields a temporary file name; renames that file to ``path`` on success.
 
-    The temporary file is in a private folder beside ``path``. On any exception it is removed and
-    ``path`` stays as it was. After a kill ``path`` is as it was, too, and the next call for a file
-    in that folder removes the private folder.
+    The temporary file is in a private folder next to ``path``. On an exception it is removed and
+    ``path`` remains unchanged. After a crash ``path`` is unchanged as well, and the next call for a
+    file in that folder removes the private folder.
 
     Args:
         path: The file.
-        durable: Write the file to the disk before it gets its name, for power failures.
+        durable: Whether to flush the file to disk before the renaming, for power failures.
 
     >>> with replacing("/tmp/answer.txt") as part:
     ...     _ = part.write_text("42")
@@ -246,6 +246,6 @@ def replacing(path: str | os.PathLike[str], *, durable: bool = False) -> Iterato
 
 @contextlib.contextmanager
 def replacing_all(paths: Iterable[str | os.PathLike[str]]) -> Iterator[list[Path]]:
-    """``replacing`` for several files: none is put in its place before all are written."""
+    """Replaces several files: renames none before all are written."""
     with contextlib.ExitStack() as stack:
         yield [stack.enter_context(replacing(path)) for path in paths]

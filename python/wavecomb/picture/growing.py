@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of a picture that comes in bands of rows from the top, so that it is never held whole."""
+"""Writes image files from bands of rows, so that the whole image is never in memory."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ if TYPE_CHECKING:
 
 
 class GrowingFiles:
-    """The EXR file of a picture, or one for each AOV, and its PNG.
+    """The EXR file of an image, or one file per AOV, and its PNG.
 
-    A context manager: the files have their names where it ends well, and are absent where it does
-    not.
+    A context manager: the files are renamed on success and removed on an exception.
 
     Attributes:
         written: Names of the files, once there was a band.
-        rows: Rows so far.
+        rows: Number of rows so far.
     """
 
     def __init__(
@@ -44,16 +43,16 @@ class GrowingFiles:
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
     ) -> None:
-        """What ``Picture.save`` gets, and the rows of the whole picture.
+        """Takes the arguments of ``Picture.save`` and the height of the whole image.
 
         Args:
-            output: Ends in .exr.
-            png: Ends in .png; None: there is none.
-            height: Rows of all bands together.
-            window: Where they lie in a larger picture, as in ``write_exr``.
+            output: File name that ends in .exr.
+            png: File name that ends in .png, or None.
+            height: Total number of rows.
+            window: Position in a larger image, as in ``write_exr``.
             file_options: half, compression, tile and split of ``Picture.save``.
-            exposure: Of the PNG.
-            tone_map: Likewise.
+            exposure: Exposure of the PNG in stops.
+            tone_map: Tone mapping of the PNG.
         """
         self.written: list[str] = []
         self.rows = 0
@@ -67,11 +66,11 @@ class GrowingFiles:
         self._display: RowFile | None = None
 
     def __enter__(self) -> GrowingFiles:
-        """Nothing is opened before the first band."""
+        """Returns itself; files are opened with the first band."""
         return self
 
     def add(self, band: Picture) -> None:
-        """The next rows; all bands have the same layers."""
+        """Writes the next rows; all bands must have the same layers."""
         self.rows += len(band.beauty)
         layers = self._by_file(band.layers())
         if not self._sheets:
@@ -92,7 +91,7 @@ class GrowingFiles:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Ends the files, or takes them away."""
+        """Completes the files, or removes them after an exception."""
         files = [file for _, file in self._sheets.values()]
         files += [self._display] if self._display is not None else []
         if error is None:

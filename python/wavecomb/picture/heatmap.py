@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of where two pictures differ, with a title and a colour bar."""
+"""Images of the differences between two images, with a title and a colour bar."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 DECADES = 4
 Z_RANGE = 5.0
 LEAST_WIDTH = 340
-"""Width of the whole in pixels, for title and numbers; a narrower picture has black beside it."""
+"""Smallest width in pixels, for title and labels; narrower images are padded with black."""
 
 _NOT_FINITE = (0.0, 1.0, 1.0)
 _BAR_HEIGHT = 58
@@ -33,14 +33,15 @@ _TEXT_SIZE = 13
 
 @dataclass(frozen=True)
 class Scale:
-    """Differences on a scale of colours.
+    """Differences mapped to a colour scale.
 
     Attributes:
-        title: Quantity and unit, for people.
-        colours: (count, 3).
+        title: Quantity and unit.
+        colours: (count, 3) colours of the scale.
         ticks: Position along the bar, from 0 to 1, and label.
-        position: Of every pixel along the bar, (height, width); NaN: black.
-        finite: False where a pixel of A or B is not finite: cyan. None: all are.
+        position: (height, width) position of every pixel along the bar; NaN means black.
+        finite: (height, width) mask; False (a value of A or B is not finite) means cyan. None if
+            all are finite.
     """
 
     title: str
@@ -50,7 +51,7 @@ class Scale:
     finite: NDArray[np.bool_] | None = None
 
     def pixels(self) -> NDArray[np.float32]:
-        """The colour of every pixel, linear Rec.709, (height, width, 3)."""
+        """Returns the colours (height, width, 3) of all pixels in linear Rec.709."""
         last = len(self.colours) - 1
         known = ~np.isnan(self.position)
         along = np.clip(np.where(known, self.position, 0.0), 0.0, 1.0)
@@ -64,15 +65,15 @@ class Scale:
 def heat_map(
     a: Source, b: Source, kind: Kind = "absolute", *, exposure: float = 0.0
 ) -> NDArray[np.float32]:
-    """Differences of picture A to the reference B as colours, with title and colour bar below.
+    """Shows differences of image A to the reference B as colours, with title and colour bar.
 
-    - "absolute": of luminance, on a logarithmic scale from the largest down over four decades;
-      smaller ones have the darkest colour.
-    - "signed": of luminance, the same scale to both sides: orange where A is brighter, blue where
-      it is darker, black from four decades below the largest.
-    - "flip-ldr", "flip-hdr": FLIP from 0 to 1; ``perceptual.flip`` says what it is.
+    - "absolute" shows differences of luminance on a logarithmic scale. It covers four decades
+      below the largest difference; smaller differences have the darkest colour.
+    - "signed" applies this scale to both signs: A is brighter in orange pixels and darker in blue
+      ones. Differences below the four decades are black.
+    - "flip-ldr" and "flip-hdr" show FLIP from 0 to 1; see ``perceptual.flip``.
 
-    Equal pixels are black, pixels with a NaN or an infinity are cyan.
+    Equal pixels are black; pixels with a NaN or an infinity are cyan.
 
     Returns:
         Linear Rec.709, (height + bar, width, 3), at least ``LEAST_WIDTH`` wide.
@@ -88,14 +89,14 @@ def scale_of(
     exposure: float = 0.0,
     flip_values: NDArray[np.float32] | None = None,
 ) -> Scale:
-    """What ``heat_map`` draws, without its bar.
+    """Returns the scale that ``heat_map`` draws.
 
     Args:
-        a: Picture.
-        b: Reference.
-        kind: As ``heat_map`` has it.
-        exposure: Likewise.
-        flip_values: Of ``perceptual.flip``, where they are known already.
+        a: Image A.
+        b: Reference image.
+        kind: Kind of difference, as for ``heat_map``.
+        exposure: Exposure in stops for FLIP of displayed images.
+        flip_values: Result of ``perceptual.flip`` if it is known already.
     """
     pixels_a, pixels_b = colour_pair(a, b)
     finite = np.isfinite(pixels_a).all(axis=2) & np.isfinite(pixels_b).all(axis=2)
@@ -114,12 +115,12 @@ def scale_of(
 
 
 def z_map(test: ZTest) -> NDArray[np.float32]:
-    """Deviates of a z-test from -5 to 5 standard errors, the largest of a pixel's channels."""
+    """Shows z-test deviates from -5 to 5 standard errors, the largest of each pixel's channels."""
     return _draw(z_scale(test))
 
 
 def z_scale(test: ZTest) -> Scale:
-    """What ``z_map`` draws, without its bar."""
+    """Returns the scale that ``z_map`` draws."""
     channel = np.abs(test.z_pixels).argmax(axis=2)[:, :, None]
     z = np.take_along_axis(test.z_pixels, channel, axis=2)[:, :, 0]
     ticks = [(0.5 + 0.5 * value / Z_RANGE, _number(value)) for value in (-5, -2.5, 0, 2.5, 5)]
@@ -174,7 +175,7 @@ def _linear(values: NDArray[Any], kind: str) -> Scale:
 
 
 def _decades(size: NDArray[np.float64], peak: float) -> NDArray[np.float64]:
-    """1 at the peak, 0 from four decades below it."""
+    """Maps the peak to 1, and four decades below it to 0."""
     with np.errstate(divide="ignore"):
         return np.clip(1.0 + np.log10(size / peak) / DECADES, 0.0, 1.0)
 
@@ -189,7 +190,7 @@ def _draw(scale: Scale) -> NDArray[np.float32]:
 
 
 def _bar(width: int, scale: Scale) -> NDArray[np.float32]:
-    """Title, colour ramp, and a tick with a number for as many values as fit."""
+    """Draws the title, the colour ramp, and as many labelled ticks as fit."""
     import OpenImageIO as oiio
 
     length = width - 2 * _MARGIN

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures in and out of files, by OpenImageIO.
+"""Reads image files of any format and writes PNG files, by OpenImageIO.
 
-Arrays are (height, width, channels), row 0 at the top.
+Arrays are (height, width, channels), with row 0 at the top.
 
-Errors are OSError (the file) or ValueError (the arrays), one line that names the file.
+Errors are OSError (for the file) or ValueError (for arrays) with a one-line message that names the
+file.
 """
 
 from __future__ import annotations
@@ -46,14 +47,14 @@ def write_png(
     tone_map: Transfer = "clamp",
     alpha: NDArray[Any] | None = None,
 ) -> None:
-    """Writes an 8-bit sRGB picture; whole or not at all.
+    """Writes an 8-bit sRGB image atomically.
 
     Args:
-        path: Ends in .png.
-        rgb: Linear Rec.709, (height, width, 3).
-        exposure: In stops: the picture is multiplied by 2^exposure first.
-        tone_map: "clamp" cuts at 1; "neutral" rolls highlights off towards white. See ``display``.
-        alpha: (height, width), that the colours are multiplied by; None: the picture is opaque.
+        path: File name that ends in .png.
+        rgb: Linear Rec.709 (height, width, 3).
+        exposure: Exposure in stops; the image is multiplied by 2^exposure.
+        tone_map: "clamp" clips at 1; "neutral" rolls highlights off towards white. See ``display``.
+        alpha: (height, width) alpha of premultiplied colours; None means an opaque image.
     """
     name = os.fspath(path)
     if Path(name).suffix.lower() != ".png":
@@ -70,7 +71,7 @@ def write_png(
 
 
 def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> None:
-    """Writes 8-bit sRGB codes, (height, width, 3), as they are; whole or not at all."""
+    """Writes 8-bit sRGB codes (height, width, 3) unchanged and atomically."""
     name = os.fspath(path)
     pixels = _colours(codes)
     spec = png_spec(*pixels.shape[:2])
@@ -78,11 +79,12 @@ def write_png_codes(path: str | os.PathLike[str], codes: NDArray[np.uint8]) -> N
 
 
 def png_spec(height: int, width: int, *, has_alpha: bool = False) -> Any:
-    """What OpenImageIO is told of a PNG file of 8-bit sRGB colours."""
+    """Returns OpenImageIO's specification of a PNG file with 8-bit sRGB colours."""
     import OpenImageIO as oiio
 
     spec = oiio.ImageSpec(width, height, 4 if has_alpha else 3, "uint8")
-    if has_alpha:  # PNG's colours are not multiplied by it, and ours are not by then
+    # PNG stores unpremultiplied colours, to which the caller has converted.
+    if has_alpha:
         spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("oiio:ColorSpace", "sRGB")
     spec.attribute("Software", "Wavecomb")
@@ -103,9 +105,9 @@ def display(
     tone_map: Transfer = "clamp",
     alpha: NDArray[Any] | None = None,
 ) -> NDArray[np.uint8]:
-    """Linear Rec.709 -> 8-bit sRGB; with ``alpha``, which the colours are divided by, RGBA.
+    """Converts linear Rec.709 to 8-bit sRGB, or to unpremultiplied RGBA if ``alpha`` is given.
 
-    Pixels with a NaN become magenta, so that they are seen; infinities are clamped.
+    Pixels with a NaN become magenta to be visible; infinities are clamped.
     """
     linear = _colours(rgb).astype(np.float32, copy=False)
     broken = np.isnan(linear).any(axis=2)
@@ -128,9 +130,9 @@ def display(
 
 
 def _neutral(rgb: Array) -> Array:
-    """Khronos PBR Neutral: colours below 0.76 keep hue and value, highlights go towards white.
+    """Applies Khronos PBR Neutral: keeps colours below 0.76 and desaturates highlights.
 
-    https://github.com/KhronosGroup/ToneMapping, "PBR Neutral", equations of its reference.
+    Equations from the reference of https://github.com/KhronosGroup/ToneMapping, "PBR Neutral".
     """
     start, desaturation, f90 = 0.8 - 0.04, 0.15, 0.04
     low = rgb.min(axis=2, keepdims=True)
@@ -146,30 +148,30 @@ def _neutral(rgb: Array) -> Array:
 
 
 def srgb_from_linear(linear: Array) -> Array:
-    """The sRGB transfer function (IEC 61966-2-1), for values in [0, 1]."""
+    """Encodes values in [0, 1] with the sRGB transfer function (IEC 61966-2-1)."""
     high = 1.055 * np.power(np.maximum(linear, 0.0031308), np.float32(1 / 2.4)) - 0.055
     return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)
 
 
 def linear_from_srgb(encoded: Array) -> Array:
-    """The inverse of ``srgb_from_linear``."""
+    """Inverts ``srgb_from_linear``."""
     high = np.power((np.maximum(encoded, 0.04045) + 0.055) / 1.055, np.float32(2.4))
     return np.where(encoded <= 0.04045, encoded / 12.92, high).astype(np.float32)
 
 
 def read_image(path: str | os.PathLike[str]) -> Array:
-    """Reads a picture of any format: float32 (height, width, channels), linear.
+    """Reads an image of any format as linear float32 (height, width, channels).
 
-    Files of whole numbers (PNG, JPEG ...) are taken to be sRGB and are made linear, alpha not.
+    Treats integer files (PNG, JPEG ...) as sRGB and linearises them, except alpha.
     """
     return _read(path)[0]
 
 
 def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """Reads an 8-bit image as a screen shows it on white: (height, width, 3).
+    """Reads an 8-bit image as displayed on white: (height, width, 3).
 
     Raises:
-        OSError: The file cannot be read; one line that names it.
+        OSError: The file cannot be read; the one-line message names it.
     """
     codes, spec = _pixels(path, "uint8")
     alpha = spec.alpha_channel
@@ -182,10 +184,10 @@ def read_codes(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """Reads a picture by layers, as ``write_exr`` names them: {"beauty": (h, w, 3), ...}.
+    """Reads an image by layers, named as in ``write_exr``: {"beauty": (h, w, 3), ...}.
 
-    A layer is the part of a channel's name before the last dot. R, G, B and Y without a dot are
-    "beauty"; any other channel without a dot is a layer of its own.
+    The layer is the part of a channel's name before the last dot. R, G, B and Y without a dot are
+    "beauty"; any other channel without a dot is a separate layer.
     """
     pixels, names = _read(path)
     groups: dict[str, list[int]] = {}
@@ -203,7 +205,7 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, Array]:
 
 
 def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The attributes of a picture file."""
+    """Reads the attributes of an image file."""
     source = _open(os.fspath(path))
     values = {attribute.name: attribute.value for attribute in source.spec().extra_attribs}
     source.close()
@@ -228,10 +230,10 @@ def _open(name: str) -> Any:
 
 
 def _check_size(name: str, spec: Any) -> None:
-    """Raises OSError for a picture that this machine has no memory for, or that has no pixels."""
+    """Raises OSError for an image without pixels, or too large for this machine's memory."""
     if min(spec.width, spec.height, spec.nchannels) < 1 or spec.depth > 1 or spec.deep:
         raise OSError(f"{name}: has no pixels, or several in depth")
-    # As floats, again by layers, and what the library holds meanwhile.
+    # Counts the float copy, the copy by layers, and the library's buffers.
     needed = 3 * 4 * spec.width * spec.height * spec.nchannels
     there = memory_bytes()
     if there is not None and needed > there:
@@ -243,7 +245,7 @@ def _check_size(name: str, spec: Any) -> None:
 
 
 def _pixels(path: str | os.PathLike[str], kind: str) -> tuple[NDArray[Any], Any]:
-    """Numbers of a NumPy type, (height, width, channels), and OpenImageIO's specification."""
+    """Reads values of a NumPy type (height, width, channels) and OpenImageIO's specification."""
     name = os.fspath(path)
     source = _open(name)
     try:

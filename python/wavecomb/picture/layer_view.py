@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layers of a picture as a screen shows them: light as colours, everything else in its own way."""
+"""Converts layers of an image for display: radiance as colours, other layers in suitable forms."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from wavecomb.picture.colour_maps import colour_map
 from wavecomb.picture.working_space import LUMINANCE
 
 Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
-"""Linear Rec.709, (height, width, 3), to 8-bit codes."""
+"""Converts linear Rec.709 (height, width, 3) to 8-bit codes."""
 
 RADIANCE = (
     *("beauty", "denoised", "unbiased", "emission", "direct", "indirect"),
     *("by_bounces", "by_light_samples", "by_light_paths"),
 )
-"""Shown with exposure and tone mapping, as are light groups."""
+"""Layers that are displayed with exposure and tone mapping, besides light groups."""
 _COLOURS = ("albedo", "guide_albedo", "transmittance")
 _NORMALS = ("normal", "guide_normal")
 _IDS = ("material_id", "instance_id")
@@ -35,23 +35,23 @@ _UNITS = {
     "depth": "depth, scene units",
     "half_depth": "depth to half opacity, scene units",
     "guided_share": "share of bounces that are guided",
-    "survival": "probability that roulette lets go on",
+    "survival": "survival probability of roulette",
 }
 _LOGARITHMIC = ("cost", "error", "variance")
 SCALARS = tuple(_UNITS)
-"""Shown in false colours."""
+"""Layers that are displayed in false colours."""
 NOT_FINITE = (0, 255, 255)
 
 
 @dataclass(frozen=True)
 class Legend:
-    """What false colours mean.
+    """Legend of false colours.
 
     Attributes:
         title: Quantity and unit.
         low: Value of the darkest colour.
-        high: Value of the lightest.
-        logarithmic: Equal steps of colour are equal ratios.
+        high: Value of the lightest colour.
+        logarithmic: Whether equal colour steps are equal ratios.
     """
 
     title: str
@@ -60,7 +60,7 @@ class Legend:
     logarithmic: bool
 
     def ticks(self, count: int = 5) -> list[tuple[float, str]]:
-        """Places from 0 to 1 along the bar and what stands there."""
+        """Returns positions from 0 to 1 along the bar with their labels."""
         out = []
         for t in np.linspace(0.0, 1.0, count):
             if self.logarithmic:
@@ -73,11 +73,11 @@ class Legend:
 
 @dataclass(frozen=True)
 class Shown:
-    """A layer as it is on the screen.
+    """A layer converted for display.
 
     Attributes:
-        pixels: (height, width, 3), 8-bit codes.
-        legend: Of false colours; None for colours that are what they are.
+        pixels: (height, width, 3) 8-bit codes.
+        legend: Legend of false colours; None for true colours.
     """
 
     pixels: NDArray[np.uint8]
@@ -85,7 +85,7 @@ class Shown:
 
 
 def is_light(layer: str) -> bool:
-    """Whether a layer is light: exposure and tone mapping apply."""
+    """Returns whether a layer holds radiance, so that exposure and tone mapping apply."""
     return layer in RADIANCE or layer.startswith(("light_", "lpe_"))
 
 
@@ -97,14 +97,14 @@ def show_layer(
     low: float | None = None,
     high: float | None = None,
 ) -> Shown:
-    """A layer as the screen shows it.
+    """Converts a layer for display.
 
     Args:
         layer: (height, width) or (height, width, channels).
-        name: What it is: of an AOV, or of a layer of a file.
-        develop: Of light.
-        low: Of false colours; None: from the picture.
-        high: Likewise.
+        name: Name of the AOV or of the layer in a file.
+        develop: Conversion of radiance.
+        low: Lower end of false colours; None derives it from the image.
+        high: Upper end of false colours; None derives it from the image.
     """
     array = np.asarray(layer)
     if is_light(name):
@@ -128,7 +128,8 @@ def show_layer(
     if name == "position":
         return Shown(_codes(_stretched(array)))
     if array.ndim == 3:
-        with np.errstate(invalid="ignore"):  # an infinite variance: not known yet
+        # A variance is infinite while it is unknown.
+        with np.errstate(invalid="ignore"):
             array = array @ np.array(LUMINANCE, np.float32)
     return heat(array, name, low, high)
 
@@ -139,13 +140,13 @@ def heat(
     low: float | None = None,
     high: float | None = None,
 ) -> Shown:
-    """False colours from ``low`` to ``high``, by default those of the picture; not finite: cyan.
+    """Converts values to false colours; values that are not finite become cyan.
 
     Args:
         values: (height, width).
-        name: A layer's, for the title and whether the scale is logarithmic; else the title itself.
-        low: Darkest colour.
-        high: Lightest colour.
+        name: Name of a layer, which determines title and kind of scale, or another title.
+        low: Value of the darkest colour; None derives it from the image.
+        high: Value of the lightest colour; None derives it from the image.
     """
     wide = np.asarray(values, np.float64)
     finite = np.isfinite(wide)
@@ -153,7 +154,8 @@ def heat(
     usable = wide[finite & (wide > 0.0)] if logarithmic else wide[finite]
     if usable.size == 0:
         usable = np.array([1.0])
-    # Logarithmic: the ends of a hundredth, so that one hot pixel does not darken all others.
+    # Logarithmic scales exclude 1 % at both ends, so that one bright pixel does not darken all
+    # others.
     ends = np.percentile(usable, (1.0, 99.0)) if logarithmic else (usable.min(), usable.max())
     least = float(ends[0]) if low is None else low
     most = float(ends[1]) if high is None else high
@@ -173,7 +175,7 @@ def heat(
 
 
 def ramp(width: int) -> NDArray[np.uint8]:
-    """The false colours from low to high, (width, 3)."""
+    """Returns the false colours from low to high (width, 3)."""
     table = _table()
     return table[np.linspace(0, len(table) - 1, width).astype(np.intp)]
 
@@ -184,7 +186,7 @@ def _table() -> NDArray[np.uint8]:
 
 
 def id_colours(ids: NDArray[Any]) -> NDArray[np.uint8]:
-    """A colour for each whole number, 0 black; neighbours differ. (h, w) -> (h, w, 3)."""
+    """Returns a distinct colour for each integer (h, w) -> (h, w, 3); 0 is black."""
     mixed = ids.astype(np.uint32) * np.uint32(2654435761)
     mixed ^= mixed >> np.uint32(15)
     mixed *= np.uint32(2246822519)

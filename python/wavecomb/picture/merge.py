@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds pictures of one stage that were rendered with different seeds."""
+"""Merges images of one stage that were rendered with different seeds."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from wavecomb.picture.image import read_layers, read_metadata
 from wavecomb.run.aovs import of_kind
 
 SQUARED = ("variance",)
-"""Variances of means: they add up with the squares of the weights."""
+"""Layers with variances of means, which are combined with squared weights."""
 SPREAD = ("error",)
-"""Standard errors: the roots of such."""
+"""Layers with standard errors, the square roots of such variances."""
 _HITS = "_hits "
-"""Before the name of a layer: how many samples have hit something, of a mean over those."""
+"""Prefix of internal layers that count the samples with a hit, for means over hits."""
 
 
 def _sums() -> tuple[str, ...]:
-    """Layers that add up."""
+    """Returns the layers that are summed."""
     return ("samples", *of_kind("sum"))
 
 
 def _counted() -> tuple[str, ...]:
-    """Layers whose pixels count where they are finite."""
+    """Returns the layers whose pixels count only if they are finite."""
     return (*of_kind("mean_of_hits"), *of_kind("median"))
 
 
 @dataclass(frozen=True)
 class Merged:
-    """Several pictures as one.
+    """The merged image.
 
     Attributes:
-        layers: As ``read_layers`` gives them.
-        metadata: For the header.
+        layers: Layers in the form of ``read_layers``.
+        metadata: Attributes of the file header.
         manifests: Cryptomatte level -> name -> id.
-        seeds: Of all pictures in it.
-        window: Where the pixels lie, as ``write_exr`` takes it; None: they are what is shown.
+        seeds: Seeds of all merged images.
+        window: Position of the pixels, as for ``write_exr``; None if they are the displayed image.
     """
 
     layers: dict[str, NDArray[Any]]
@@ -58,7 +58,7 @@ class Merged:
 
 @dataclass(frozen=True)
 class _Source:
-    """A picture that is to be merged."""
+    """An image to be merged."""
 
     name: str
     attributes: dict[str, Any]
@@ -67,21 +67,21 @@ class _Source:
 
 
 def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
-    """Adds pictures pixel by pixel, each with the weight of its samples there.
+    """Merges images pixel by pixel, weighted by their sample counts.
 
-    Sample counts and costs add up. Variances and errors become those of the sum. Cryptomatte's
-    coverages are weighted like colours, and the largest are kept. A depth counts where it is
-    finite. Position, texture coordinates and ids, which are of single samples, are those of the
-    first picture that has a sample in that pixel. A denoised layer is left out.
+    Sums sample counts and costs. Combines variances and errors to those of the merged image.
+    Weights Cryptomatte coverage like colours and keeps the largest ranks. Ignores depths that are
+    not finite. Takes position, texture coordinates and ids, which belong to single samples, from
+    the first image with a sample in the pixel. Omits the denoised layer.
 
     >>> merge(["a.exr", "b.exr"]).layers["samples"].max()  # doctest: +SKIP
     128.0
 
     Args:
-        paths: EXR files of ``wavecomb render`` or of ``wavecomb merge``, two or more.
+        paths: Two or more EXR files of ``wavecomb render`` or ``wavecomb merge``.
 
     Raises:
-        WavecombError: They do not fit together; names the file and what differs.
+        WavecombError: The images cannot be merged; the message names the file and the difference.
         OSError: A file cannot be read.
     """
     if len(paths) < 2:
@@ -95,7 +95,7 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
             if seed in seeds:
                 raise WavecombError(
                     f"{source.name}: has seed {seed}, as {seeds[seed]} has: the same samples twice "
-                    "are no better; render it with another --seed"
+                    "do not reduce noise; render it with another --seed"
                 )
             seeds[seed] = source.name
     sums: dict[str, NDArray[Any]] = {}
@@ -104,7 +104,8 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
     shapes: dict[str, tuple[int, ...]] = {}
     for source in sources:
         layers = read_layers(source.name)
-        layers.pop("denoised", None)  # it is the sum that is to be denoised
+        # The denoised layer would have to be computed from the merged image.
+        layers.pop("denoised", None)
         _check_shapes(source, layers, shapes)
         _check_layers(first.name, sums, source.name, layers, pairs)
         _add(sums, pairs, layers)
@@ -122,16 +123,16 @@ def merge(paths: Sequence[str | os.PathLike[str]]) -> Merged:
 
 
 def _overscan(source: _Source) -> int:
-    """Of a picture whose size is what its settings say; raises WavecombError for none such."""
+    """Returns the overscan of an image; raises WavecombError if its settings are invalid."""
     beyond = source.settings.get("overscan", 0)
     edges = [source.settings.get(name) for name in ("width", "height")]
     if isinstance(beyond, int) and all(isinstance(e, int) and 0 <= 2 * beyond < e for e in edges):
         return beyond
-    raise WavecombError(f"{source.name}: its overscan is no good: the file is damaged")
+    raise WavecombError(f"{source.name}: its overscan is invalid: the file is damaged")
 
 
 def _source(name: str) -> _Source:
-    """Reads what a picture says of itself."""
+    """Reads the settings and seeds of an image."""
     attributes = read_metadata(name)
     try:
         settings = json.loads(str(attributes["wavecomb:settings"]))
@@ -146,7 +147,7 @@ def _source(name: str) -> _Source:
 
 
 def _check_fit(first: _Source, other: _Source) -> None:
-    """Raises WavecombError where two pictures are not of one thing."""
+    """Raises WavecombError if two images do not have the same expectation."""
 
     def refuse(what: str, a: Any, b: Any) -> None:
         raise WavecombError(f"{other.name}: {what} is {b}, that of {first.name} is {a}")
@@ -154,8 +155,9 @@ def _check_fit(first: _Source, other: _Source) -> None:
     rows = known_settings()
     for key in expectation():
         if key == "overscan":
-            continue  # checked below, with the size that it adds to
-        # Files of an earlier build lack settings that it did not have.
+            # Overscan is checked below together with the image size.
+            continue
+        # Files of an earlier build lack settings that did not exist then.
         a, b = (one.settings.get(key, rows[key].default) for one in (first, other))
         if a != b:
             refuse(key, a, b)
@@ -166,7 +168,8 @@ def _check_fit(first: _Source, other: _Source) -> None:
     if _overscan(first) != _overscan(other):
         refuse("overscan", _overscan(first), _overscan(other))
     scenes: list[Any] = [source.attributes.get("wavecomb:scene") for source in (first, other)]
-    if not np.array_equal(*scenes):  # what a file says may be an array
+    # The attribute of a damaged file may be an array.
+    if not np.array_equal(*scenes):
         raise WavecombError(
             f"{other.name}: its stage is not that of {first.name}: other prims, lights, materials, "
             "camera or frame"
@@ -176,9 +179,9 @@ def _check_fit(first: _Source, other: _Source) -> None:
 def _check_shapes(
     source: _Source, layers: dict[str, NDArray[Any]], shapes: dict[str, tuple[int, ...]]
 ) -> None:
-    """Raises WavecombError where layers have not the size that the file says, or other channels.
+    """Raises WavecombError if a layer's size or channel count is inconsistent.
 
-    ``shapes`` are those of the pictures before; what is new is added.
+    ``shapes`` holds the layer shapes of earlier images and is extended.
     """
     size = source.settings.get("height"), source.settings.get("width")
     for name, layer in layers.items():
@@ -222,7 +225,7 @@ def _add(
     pairs: dict[str, list[NDArray[Any]]],
     layers: dict[str, NDArray[Any]],
 ) -> None:
-    """Adds the layers of one picture to the weighted sums."""
+    """Adds the layers of one image to the weighted sums."""
     samples = layers["samples"].astype(np.float64)
     for level, ranks in cryptomatte.gather(layers).items():
         weighted = ranks.copy()
@@ -235,7 +238,7 @@ def _add(
         if name in of_kind("nearest"):
             sums[name] = np.where(had, sums[name], layer) if name in sums else layer
             continue
-        # A pixel without samples may hold anything.
+        # Pixels without samples may hold any value.
         values = np.where(samples > 0, layer, 0).astype(np.float64)
         if name in SQUARED:
             values = values * samples**2
@@ -276,7 +279,7 @@ def _means(
 
 
 def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Adds the counts of equal ids and keeps the largest; one row of pixels at a time."""
+    """Adds the coverage of equal ids and keeps the largest ranks; processes one row at a time."""
     height, width = samples.shape[:2]
     ranks = weighted[0].shape[2] // 2
     out = np.zeros((height, width, 2 * ranks), np.float32)
@@ -285,7 +288,7 @@ def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> 
         ids = np.ascontiguousarray(row[:, 0::2]).view(np.uint32)
         same = ids[:, :, None] == ids[:, None, :]
         counts = (same * row[:, None, 1::2].astype(np.float64)).sum(axis=2)
-        # The first of those with one id stands for all.
+        # The first rank of equal ids holds their total.
         repeated = (same & np.tri(ids.shape[1], k=-1, dtype=bool)).any(axis=2)
         counts[repeated] = 0
         order = np.lexsort((ids, -counts), axis=1)[:, :ranks]
@@ -297,7 +300,7 @@ def _merge_ranks(weighted: list[NDArray[Any]], samples: NDArray[np.float64]) -> 
 
 
 def _metadata(sources: list[_Source], seeds: tuple[int, ...]) -> dict[str, Any]:
-    """The first picture's, with what the sum is."""
+    """Returns the metadata of the first image, with the seeds and render time of all."""
     first = sources[0]
     kept = ("Software", "worldToCamera", "worldToNDC", "chromaticities")
     metadata = {

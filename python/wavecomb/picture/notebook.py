@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture as a notebook shows it: tone-mapped, what made it, and its layers behind a fold."""
+"""Shows an image in a notebook: tone-mapped, with a summary line and collapsible layers."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from wavecomb.picture.image import display
 from wavecomb.picture.layer_view import is_light, show_layer
 
 MOST_EDGE = 1600
-"""Pixels of the longer edge in a notebook; a larger picture is made smaller by averaging."""
+"""Longer edge of an image in a notebook in pixels; larger images are reduced by averaging."""
 LAYER_EDGE = 360
 
 
 class Rendered(Protocol):
-    """What is asked of ``wavecomb.Picture``, whose module imports this one."""
+    """Interface of ``wavecomb.Picture``, which imports this module."""
 
     @property
     def beauty(self) -> NDArray[np.float32]:
@@ -28,29 +28,29 @@ class Rendered(Protocol):
 
     @property
     def denoised(self) -> NDArray[np.float32] | None:
-        """Likewise, without its noise; None: it is not."""
+        """(height, width, 3), linear and denoised; None if it was not denoised."""
 
     @property
     def samples(self) -> NDArray[np.uint32]:
-        """(height, width)."""
+        """(height, width) sample counts."""
 
     @property
     def stats(self) -> dict[str, Any]:
-        """What was done and how long it took."""
+        """Statistics of the render."""
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was stopped."""
+        """Whether the render was stopped early."""
 
     def layers(self) -> dict[str, NDArray[Any]]:
-        """By name."""
+        """Returns the layers by name."""
 
     def shown(self) -> NDArray[Any]:
-        """What is displayed, linear Rec.709."""
+        """Returns the displayed colours in linear Rec.709."""
 
 
 def codes(picture: Rendered) -> NDArray[np.uint8]:
-    """The picture for a screen, 8-bit sRGB: highlights rolled off towards white ("neutral")."""
+    """Returns the image as 8-bit sRGB codes, with the tone mapping "neutral"."""
     return display(smaller(picture.shown(), MOST_EDGE), tone_map="neutral")
 
 
@@ -59,12 +59,12 @@ def mime_bundle(
     include: Collection[str] | None = None,
     exclude: Collection[str] | None = None,
 ) -> dict[str, str]:
-    """What ``Picture._repr_mimebundle_`` gives: HTML with the layers, a PNG, and a line.
+    """Returns the result of ``Picture._repr_mimebundle_``: HTML with layers, a PNG, and text.
 
     Args:
-        picture: Any.
-        include: The kinds that are asked for; None: all.
-        exclude: Those that are not.
+        picture: The image.
+        include: Requested MIME types; None means all.
+        exclude: MIME types to leave out.
     """
     made = {
         "text/html": lambda: page(picture),
@@ -76,9 +76,9 @@ def mime_bundle(
 
 
 def page(picture: Rendered) -> str:
-    """The picture, a line, and its layers; markup that a notebook keeps also where it trusts none.
+    """Returns HTML of the image, its summary and its layers, which untrusted notebooks keep.
 
-    There are no scripts and no styles beside those of the elements.
+    It contains no scripts, and only inline styles.
     """
     shown = codes(picture)
     line = html.escape(facts(picture))
@@ -121,9 +121,9 @@ def _layer(name: str, array: NDArray[Any]) -> str:
 
 
 def facts(picture: Rendered) -> str:
-    """What the picture is, in a line.
+    """Returns a one-line summary of the image.
 
-    Size, samples, time, and whether it was stopped.
+    It lists the size, samples, render time, and whether the render was stopped.
     """
     height, width = picture.beauty.shape[:2]
     parts = [f"{width} x {height}", samples_text(picture.samples)]
@@ -140,7 +140,7 @@ def facts(picture: Rendered) -> str:
 
 
 def samples_text(samples: NDArray[Any]) -> str:
-    """Samples a pixel, where they differ from which to which.
+    """Formats samples per pixel as a number or range.
 
     >>> samples_text(np.array([[16, 16]])), samples_text(np.array([[4, 64]]))
     ('16 samples a pixel', '4 to 64 samples a pixel')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files of a render: one for all layers, or one for each AOV, with what made them."""
+"""Writes the files of a render, one for all layers or one per AOV, with metadata."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ if TYPE_CHECKING:
 def scene_metadata(
     scene: Scene, width: int, height: int, origin: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> dict[str, Any]:
-    """Attributes that a picture of a scene has, whatever its settings: the camera's matrices.
+    """Returns scene-dependent file attributes of an image, mainly the camera's matrices.
 
-    What is as always is left out: "PixelAspectRatio" of square pixels, "wavecomb:exposure" of 1,
-    "wavecomb:projection" of perspective. A latlong picture has no "worldToNDC".
+    Omits default values: "PixelAspectRatio" of square pixels, "wavecomb:exposure" of 1, and
+    "wavecomb:projection" of perspective. A latlong image has no "worldToNDC".
 
-    Both are for row vectors, p' = p M. "worldToCamera" leads to a camera that looks along -z with
-    y up; "worldToNDC" from there to x, y in [-1, 1] across the picture, y up, after division by w,
-    and z in [-1, 1] between the clipping planes. ``origin``: world position of the scene's origin.
+    Both matrices are for row vectors, p' = p M. "worldToCamera" transforms to a camera that looks
+    along -z with y up; "worldToNDC" to x, y in [-1, 1] across the image with y up, after division
+    by w, and z in [-1, 1] between the clipping planes. ``origin`` is the world position of the
+    scene's origin.
     """
     camera = getattr(scene, "camera", None)
     if camera is None:
@@ -66,7 +67,7 @@ def scene_metadata(
 def _parallel(
     x0: float, x1: float, y0: float, y1: float, near: float, far: float
 ) -> NDArray[np.float64]:
-    """Projection of a window, without perspective."""
+    """Returns the orthographic projection matrix of a window."""
     projection = np.diag([2 / (x1 - x0), 2 / (y1 - y0), 2 / (near - far), 1.0])
     projection[3, :3] = (
         (x0 + x1) / (x0 - x1), (y0 + y1) / (y0 - y1), (near + far) / (near - far)
@@ -75,9 +76,9 @@ def _parallel(
 
 
 def scene_digest(scene: Scene) -> str:
-    """Tells scenes apart: a hash of counts, bounds, camera, lights, materials, and of their names.
+    """Returns a hash of counts, bounds, camera, lights, materials and names of a scene.
 
-    Not of every point and texel: that would take as long as reading them.
+    It excludes points and texels, since hashing them would take as long as reading them.
     """
     facts: list[Any] = [
         getattr(scene, name)
@@ -105,14 +106,14 @@ def fitted_window(
     conform: str = "expandAperture",
     pixel_aspect: float = 1.0,
 ) -> tuple[float, float, float, float]:
-    """A camera's window fitted to the shape of the picture, as the renderer does.
+    """Fits a camera's window to the aspect ratio of the image, like the renderer.
 
     Args:
         window: x0, x1, y0, y1.
-        width: Of the picture, in pixels.
-        height: Likewise.
+        width: Image width in pixels.
+        height: Image height in pixels.
         conform: UsdRender's aspectRatioConformPolicy.
-        pixel_aspect: Width of a pixel / its height.
+        pixel_aspect: Width of a pixel divided by its height.
 
     >>> fitted_window((-1, 1, -1, 1), 200, 100, "cropAperture")
     (-1.0, 1.0, -0.5, 0.5)
@@ -131,7 +132,7 @@ def fitted_window(
 def camera_window(
     camera: Mapping[str, Any], width: int, height: int
 ) -> tuple[float, float, float, float]:
-    """``fitted_window`` of ``Scene.camera`` or of arguments of ``set_camera``."""
+    """Returns ``fitted_window`` of ``Scene.camera`` or of arguments of ``set_camera``."""
     if camera.get("projection") == "latlong":
         x0, x1, y0, y1 = (float(edge) for edge in camera["window"])
         return x0, x1, y0, y1
@@ -145,13 +146,13 @@ def camera_window(
 
 
 def pixel_aspect(camera: Mapping[str, Any], width: int, height: int) -> float:
-    """Width / height of a pixel as it is to be shown."""
+    """Returns the displayed width of a pixel divided by its height."""
     x0, x1, y0, y1 = camera_window(camera, width, height)
     return (x1 - x0) / (y1 - y0) * height / width
 
 
 def aov_of(layer: str) -> str:
-    """The AOV of a layer of a file.
+    """Returns the AOV to which a layer of a file belongs.
 
     >>> aov_of("CryptoObject01"), aov_of("depth")
     ('crypto_object', 'depth')
@@ -165,7 +166,7 @@ def aov_of(layer: str) -> str:
 
 
 def split_names(path: str | os.PathLike[str], aovs: Collection[str]) -> dict[str, Path]:
-    """AOV -> its file: that of the beauty is ``path``, of depth with ".depth" before its ending.
+    """Returns file names by AOV: ``path`` for beauty, otherwise with ".NAME" before the extension.
 
     >>> split_names("out/a.exr", ["beauty", "depth"])["depth"].name
     'a.depth.exr'
@@ -181,7 +182,7 @@ def split_names(path: str | os.PathLike[str], aovs: Collection[str]) -> dict[str
 
 
 def by_aov(layers: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[Any]]]:
-    """AOV -> its layers: several of a Cryptomatte, else one."""
+    """Groups layers by AOV; only Cryptomattes have several."""
     grouped: dict[str, dict[str, NDArray[Any]]] = {}
     for name, pixels in layers.items():
         grouped.setdefault(aov_of(name), {})[name] = pixels
@@ -189,7 +190,10 @@ def by_aov(layers: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, NDArray[An
 
 
 def compression_for(layers: Iterable[str], compression: Compression) -> Compression:
-    """Of the file of these layers alone: zip where what is asked for would spoil one."""
+    """Returns the compression for a file with these layers.
+
+    Zip if the given one would invalidate any.
+    """
     return "zip" if any(map(is_exact, layers)) else compression
 
 
@@ -205,12 +209,12 @@ def save_layers(
     split: bool = False,
     window: Window | None = None,
 ) -> list[Path]:
-    """Writes layers to one file, or to one for each AOV; all of them whole, or none.
+    """Writes layers to one file, or to one file per AOV, atomically as a set.
 
-    Where files are split, ids and positions are kept from a lossy compression by zip.
+    Split files with ids or positions use zip instead of a lossy compression.
 
     Returns:
-        The files.
+        The files that were written.
     """
     if not split:
         attributes = {**metadata, **cryptomatte.metadata(manifests)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of pictures that need nothing else: a sequence that plays, pairs that are wiped."""
+"""Self-contained HTML pages of images: a playable sequence, and pairs under a wipe line."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from wavecomb.picture.embedded import Kind, data_uri
 from wavecomb.picture.thumbnails import Look, fitted
 
 MOST_FRAMES = 1000
-"""Pictures of a page."""
+"""Most images of a page."""
 SPEEDS = (6, 12, 24, 25, 30, 60)
-"""Frames a second that can be chosen, beside the one that is asked for."""
+"""Selectable playback speeds in frames per second, besides the requested one."""
 _HERE = Path(__file__).parent
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""A browser holds the page to what it says of itself: nothing is fetched."""
+"""Content security policy, by which the browser prevents the page from fetching anything."""
 
 
 def escape(text: object) -> str:
-    """Text that cannot be taken for markup."""
+    """Escapes text for HTML."""
     return html.escape(str(text), quote=True)
 
 
 def document(title: str, facts: str, body: str) -> str:
-    """The whole page; styles and scripts are inside.
+    """Returns the whole page with embedded styles and scripts.
 
     Args:
         title: Plain text.
-        facts: A line below it, plain text.
-        body: Markup.
+        facts: Line of plain text below the title.
+        body: HTML markup.
     """
     style = (_HERE / "pages.css").read_text(encoding="utf-8")
     script = (_HERE / "pages.js").read_text(encoding="utf-8")
@@ -53,17 +53,17 @@ def sequence_page(
     pictures: Mapping[str, str], look: Look, *, title: str, fps: float = 24.0, width: int = 960,
     kind: Kind = "jpeg",
 ) -> str:  # fmt: skip
-    """A page that plays pictures, with a sheet of all of them below.
+    """Returns a page that plays images, with a contact sheet of all images below.
 
-    Without scripts it is the sheet.
+    Without JavaScript it shows only the sheet.
 
     Args:
         pictures: Name -> file, in order.
-        look: How they are shown.
-        title: Of the page.
-        fps: Frames a second.
-        width: Of the pictures in the page at most, pixels.
-        kind: How they are held: "jpeg", or "png" for those that are to be looked at closely.
+        look: Display options.
+        title: Title of the page.
+        fps: Frames per second.
+        width: Largest width of images in the page, pixels.
+        kind: Encoding: "jpeg", or "png" for close inspection.
 
     Raises:
         WavecombError: A file lacks the layer.
@@ -92,14 +92,14 @@ def sequence_page(
 
 @dataclass(frozen=True)
 class Pair:
-    """Two pictures of a page, and what is said of them.
+    """Two images of a page with descriptive lines.
 
     Attributes:
-        name: Of both; "" where the page says it.
+        name: Common name; "" if the page title gives it.
         facts: Lines of plain text.
-        a: 8-bit sRGB codes, (height, width, 3).
-        b: The reference, of the same size.
-        difference: A map of it, of any size; None: there is none.
+        a: 8-bit sRGB codes (height, width, 3).
+        b: Reference of the same size.
+        difference: Difference map of any size, or None.
     """
 
     name: str
@@ -110,12 +110,12 @@ class Pair:
 
 
 def pair_section(pair: Pair, key: str, names: tuple[str, str]) -> str:
-    """A pair that is wiped; without scripts side by side.
+    """Returns HTML with a pair under a wipe line; side by side without JavaScript.
 
     Args:
-        pair: The pictures.
-        key: Address in the page.
-        names: Of A and B.
+        pair: The images.
+        key: Anchor in the page.
+        names: Names of A and B.
     """
     shown = [(names[0], pair.a), (names[1], pair.b)]
     if pair.difference is not None:
@@ -135,7 +135,7 @@ def pair_section(pair: Pair, key: str, names: tuple[str, str]) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table: text, an address in the page, and whether it is good or bad."""
+    """A table cell: text, an anchor in the page that it links to, and a style for good or bad."""
 
     text: str
     link: str = ""
@@ -143,7 +143,7 @@ class Cell:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]]) -> str:
-    """A table whose first column heads the rows."""
+    """Returns an HTML table whose first column holds row headers."""
     heads = "".join(f'<th scope="col">{escape(one)}</th>' for one in head)
     body = []
     for row in rows:
@@ -157,7 +157,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell | str]]) -> str:
 
 
 def figure_text(value: float | None) -> str:
-    """A figure of a table; an en dash where there is none.
+    """Formats a figure of a table; an en dash if there is none.
 
     >>> figure_text(0.001234), figure_text(None)
     ('0.001234', '–')

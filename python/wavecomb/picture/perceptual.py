@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How different two pictures look: PSNR, SSIM and FLIP.
+"""Perceptual differences of two images: PSNR, SSIM and FLIP.
 
-The last two need the extra "bench". Values that are not finite count as 0 here; ``compare`` counts
-them.
+SSIM and FLIP need the extra "bench". Values that are not finite count as 0 here; ``compare``
+reports their number.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SSIM_RADIUS = 5
 
 
 def measure(metric: Metric, a: Source, b: Source, exposure: float = 0.0) -> float:
-    """The mean over the picture of one metric, picture A against the reference B."""
+    """Returns the image mean of one metric for image A against the reference B."""
     if metric == "psnr":
         return psnr(a, b, exposure)
     if metric == "ssim":
@@ -38,9 +38,9 @@ def measure(metric: Metric, a: Source, b: Source, exposure: float = 0.0) -> floa
 
 
 def psnr(a: Source, b: Source, exposure: float = 0.0) -> float:
-    """Peak signal-to-noise ratio in dB of the pictures as shown: -10 log10(mean (A - B)^2).
+    """Returns the peak signal-to-noise ratio of the displayed images, -10 log10(mean (A - B)^2) dB.
 
-    Values are in [0, 1], sRGB encoded, not rounded; infinite where they look equal.
+    Values are sRGB encoded in [0, 1] and not rounded; the result is infinite for equal images.
 
     Raises:
         ValueError: The sizes differ.
@@ -51,16 +51,16 @@ def psnr(a: Source, b: Source, exposure: float = 0.0) -> float:
 
 
 def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
-    """Mean structural similarity of the pictures as shown, in [-1, 1]; 1 is equal.
+    """Returns the mean structural similarity of the displayed images, in [-1, 1]; 1 means equal.
 
-    SSIM = (2 m_a m_b + C1) (2 s_ab + C2) / ((m_a^2 + m_b^2 + C1) (s_a^2 + s_b^2 + C2)),
-    C1 = 0.01^2, C2 = 0.03^2, with means m and (co)variances s under a Gaussian window of 11 x 11
-    pixels, sigma 1.5 (Wang et al., "Image quality assessment: from error visibility to structural
-    similarity", 2004, equation 13 and section III.C). It is taken of Rec.709 luma of the picture
-    times 2^exposure, clamped to [0, 1] and sRGB encoded; windows lie wholly inside.
+    SSIM = (2 m_a m_b + C1) (2 s_ab + C2) / ((m_a^2 + m_b^2 + C1) (s_a^2 + s_b^2 + C2)), C1 =
+    0.01^2, C2 = 0.03^2, with means m and (co)variances s under a Gaussian window of 11 x 11 pixels,
+    sigma 1.5 (Wang et al., "Image quality assessment: from error visibility to structural
+    similarity", 2004, equation 13 and section III.C). It is computed on Rec.709 luma of the image
+    times 2^exposure, clamped to [0, 1] and sRGB encoded; only windows inside the image count.
 
     Raises:
-        ValueError: A side is below 11 pixels, or the sizes differ.
+        ValueError: A side is shorter than 11 pixels, or the sizes differ.
     """
     ndimage = needed("scipy.ndimage", "SSIM")
     pixels_a, pixels_b = colour_pair(a, b)
@@ -87,12 +87,13 @@ def ssim(a: Source, b: Source, exposure: float = 0.0) -> float:
 def flip(
     a: Source, b: Source, *, high_range: bool = False, exposure: float = 0.0
 ) -> NDArray[np.float32]:
-    """FLIP of each pixel, (height, width): 0 looks equal, 1 is the most that can differ.
+    """Returns FLIP of each pixel (height, width): 0 means equal appearance, 1 is the maximum.
 
-    Low range: LDR-FLIP of the pictures as shown (Andersson et al., "FLIP: a difference evaluator
-    for alternating images", 2020). High range: HDR-FLIP, the maximum over the exposures that the
-    reference B asks for (Andersson et al. 2021), with the ACES tone curve; exposure is not used.
-    Seen from 0.7 m on a 4K display of 0.7 m: 67 pixels a degree.
+    Low range is LDR-FLIP of the displayed images (Andersson et al., "FLIP: a difference evaluator
+    for alternating images", 2020). High range is HDR-FLIP, the maximum over exposures that are
+    derived from the reference B (Andersson et al. 2021), with the ACES tone curve; it ignores
+    ``exposure``. The viewing distance is 0.7 m from a 4K display that is 0.7 m wide: 67 pixels per
+    degree.
 
     Raises:
         ValueError: The sizes differ, or the reference of HDR-FLIP is black.
@@ -106,7 +107,8 @@ def flip(
     test, reference = (np.ascontiguousarray(p, np.float32) for p in kept)
     if np.array_equal(test, reference):
         return np.zeros(test.shape[:2], np.float32)
-    if high_range and not reference.any():  # the library would end the process
+    # The library would terminate the process.
+    if high_range and not reference.any():
         raise ValueError("HDR-FLIP takes its exposures from the reference, which is black")
     values, _, _ = evaluator.evaluate(
         reference,
@@ -120,12 +122,15 @@ def flip(
 
 
 def shown(pixels: NDArray[Any], exposure: float = 0.0) -> NDArray[np.float32]:
-    """What a display shows of linear values: sRGB in [0, 1], (height, width, 3), not rounded."""
+    """Returns displayed values of linear colours: sRGB (height, width, 3) in [0, 1], unrounded."""
     scaled = np.clip(_colours(pixels) * np.float32(2.0**exposure), 0.0, 1.0)
     return srgb_from_linear(scaled)
 
 
 def _colours(pixels: NDArray[Any]) -> NDArray[np.float32]:
-    """Three channels; of fewer the first, thrice; what is not finite becomes 0."""
+    """Returns three channels, repeating the first if there are fewer.
+
+    Replaces non-finite values by 0.
+    """
     colours = pixels[:, :, :3] if pixels.shape[2] >= 3 else pixels[:, :, :1].repeat(3, axis=2)
     return np.where(np.isfinite(colours), colours, np.float32(0)).astype(np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hidden folders for files that are not finished yet."""
+"""Hidden folders for unfinished files."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from types import TracebackType
 _START, _END, _LOCK = ".wavecomb-", ".part", ".lock"
 
 _YOUNG_S = 60.0
-"""A folder without a lock file is left alone for this long: its owner is about to lock it."""
+"""Seconds for which a folder without a lock file is kept, since it may just be created."""
 
 
 class PrivateFolder:
-    """Hidden folder beside an output file, which holds a lock while its owner lives.
+    """A hidden folder next to an output file, which is locked while its owner runs.
 
-    The kernel releases the lock (flock) when the owner ends, however it ends. A process id would
-    not do: two containers that share a disk can have processes of the same id.
+    The kernel releases the lock (flock) when the owner ends for any reason. A process id would not
+    work, since containers that share a disk may have processes with the same id.
 
     Attributes:
         path: The folder.
     """
 
     def __init__(self, parent: Path) -> None:
-        """Makes and locks the folder.
+        """Creates and locks the folder.
 
         Args:
             parent: Folder of the output file.
 
         Raises:
-            OSError: The folder cannot be made.
+            OSError: The folder cannot be created.
         """
         while True:
             self.path = parent / f"{_START}{secrets.token_hex(6)}{_END}"
@@ -50,10 +50,11 @@ class PrivateFolder:
                 raise
             if _try_lock(self._lock) is not False and _is_linked(self._lock):
                 return
-            os.close(self._lock)  # ``remove_abandoned`` was quicker than the lock
+            # ``remove_abandoned`` removed the file before it was locked.
+            os.close(self._lock)
 
     def close(self) -> None:
-        """Removes the folder with all that is in it."""
+        """Removes the folder and its content."""
         shutil.rmtree(self.path, ignore_errors=True)
         os.close(self._lock)
 
@@ -70,7 +71,7 @@ class PrivateFolder:
 
 
 def _try_lock(descriptor: int) -> bool | None:
-    """Locks a file: True if that worked, False if another holds it, None without locks here."""
+    """Locks a file: returns True on success, False if it is locked, None without lock support."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -85,9 +86,9 @@ def _is_linked(descriptor: int) -> bool:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Removes private folders in a folder whose owners were killed.
+    """Removes private folders whose owners have ended without cleaning up.
 
-    Folders whose lock is held stay, and so do all folders where the file system has no locks.
+    Keeps locked folders, and all folders on file systems without locks.
     """
     for folder in parent.glob(f"{_START}*{_END}"):
         with contextlib.suppress(OSError):

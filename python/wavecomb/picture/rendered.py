@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rendered picture: its layers, and how it is saved."""
+"""A rendered image: its layers, and methods that save it."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ if TYPE_CHECKING:
     from wavecomb.picture.image import Transfer
 
 NOWHERE = (0.0, 0.0, 0.0)
-"""Origin of scenes in world coordinates."""
+"""Origin of scenes that use world coordinates."""
 
 
 @dataclass(frozen=True, repr=False)
 class Picture:
-    """A rendered picture. Row 0 is the top.
+    """A rendered image. Row 0 is the top.
 
     Attributes:
         beauty: (height, width, 3), linear Rec.709, or in the working space of the stage.
-        albedo: (height, width, 3). Like normal and depth, None where it was not asked for.
+        albedo: (height, width, 3); like normal and depth, None if it was not requested.
         normal: (height, width, 3), world space.
-        depth: (height, width), along the camera's axis; infinite where nothing was hit.
-        samples: (height, width), samples that each pixel got.
-        error: (height, width), what adaptive sampling goes by (docs/render.md); infinite where
-            there are too few samples. None unless the render was adaptive or had error=True.
-        variance: (height, width, 3), of each pixel's mean, as if its samples were independent;
-            None likewise.
-        denoised: (height, width, 3), the beauty without its noise; None unless asked for.
-        stats: What was done and how long it took; docs/statistics.md has the schema.
-        cancelled: Progress asked to stop; the picture holds what was done.
-        learned: What guided the render, for another to start from; empty: nothing was learned.
-        costs: What shading took, by name of material and texture: a profile that another render
-            can start from.
+        depth: (height, width), along the camera's axis; infinite for pixels without a hit.
+        samples: (height, width) number of samples of each pixel.
+        error: (height, width) error estimate of adaptive sampling (docs/render.md); infinite for
+            too few samples. None unless the render was adaptive or had error=True.
+        variance: (height, width, 3) variance of each pixel's mean, as if its samples were
+            independent. None unless the render was adaptive or had error=True.
+        denoised: (height, width, 3) denoised beauty; None unless requested.
+        stats: Statistics of the render; docs/statistics.md has the schema.
+        cancelled: Whether the render was stopped early; the image then holds the finished samples.
+        learned: Guiding field, from which another render can start; empty if none was trained.
+        costs: Cost profile of shading by material and texture name, from which another render can
+            start.
         aovs: Further AOVs by name, (height, width) or (height, width, channels): docs/aovs.md.
-            Cryptomatte levels are pairs of id and coverage, as `wavecomb.cryptomatte` reads them.
-        manifests: Cryptomatte level -> name -> id, of what the picture holds.
-        deep: Samples by depth; None unless the AOV deep was asked for (docs/deep.md).
-        metadata: For the header of a file, beside what the statistics say.
-        chosen: Names of the layers that are saved; all that there are where it is empty.
+            Cryptomatte levels are pairs of id and coverage, which `wavecomb.cryptomatte` reads.
+        manifests: Cryptomatte level -> name -> id of objects in the image.
+        deep: Samples by depth; None unless the AOV deep was requested (docs/deep.md).
+        metadata: Additional attributes of the file header.
+        chosen: Names of the layers to save; empty means all layers.
     """
 
     beauty: NDArray[np.float32]
@@ -73,7 +73,7 @@ class Picture:
     chosen: tuple[str, ...] = ()
 
     def layers(self) -> dict[str, NDArray[Any]]:
-        """The layers of an EXR file by name and in order; a Cryptomatte is several there."""
+        """Returns the layers of an EXR file by name, in order; a Cryptomatte has several layers."""
         from wavecomb.picture import cryptomatte
 
         arrays = {
@@ -106,17 +106,17 @@ class Picture:
 
     @property
     def has_alpha(self) -> bool:
-        """Whether it goes over another: it was rendered with the setting ``alpha``."""
+        """Whether the image has alpha for compositing, from the setting ``alpha``."""
         return bool(self.stats.get("settings", {}).get("alpha")) and "alpha" in self.aovs
 
     def with_denoised(self, *, threads: int = 0) -> Picture:
-        """The picture with its layer ``denoised``, by Open Image Denoise; the beauty stays.
+        """Returns the image with the layer ``denoised`` (Open Image Denoise); beauty is unchanged.
 
-        Guided by the AOVs guide_albedo and guide_normal, which see through mirrors and clear glass,
-        or else by albedo and normal.
+        The AOVs guide_albedo and guide_normal guide the denoiser, or albedo and normal if the image
+        lacks them. The former describe the surfaces that mirrors and clear glass show.
 
         Raises:
-            WavecombError: The extra ``denoise`` is missing; says how to install it.
+            WavecombError: The extra ``denoise`` or an AOV is missing.
         """
         from wavecomb.errors import WavecombError
         from wavecomb.picture.denoise import denoise
@@ -143,17 +143,17 @@ class Picture:
         exposure: float = 0.0,
         tone_map: Transfer = "clamp",
     ) -> list[Path]:
-        """Writes all layers (.exr) or the picture for display (.png), whole or not at all.
+        """Writes all layers (.exr) or the image for display (.png), atomically.
 
-        A .png is of the denoised picture where there is one.
+        A .png shows the denoised image if there is one.
 
         Args:
-            path: By its ending .exr or .png.
-            half: EXR: 16 bit colours and normals.
+            path: File name that ends in .exr or .png.
+            half: EXR: store colours as 16-bit floats.
             compression: EXR: none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa or dwab.
-            tile: EXR: edge of tiles in pixels, a multiple of 16; 0: scanlines.
-            split: EXR: a file for each AOV, path.NAME.exr, the beauty in ``path`` itself.
-            exposure: PNG: in stops.
+            tile: EXR: edge of tiles in pixels, a multiple of 16; 0 means scanlines.
+            split: EXR: write one file per AOV, path.NAME.exr, with the beauty in ``path`` itself.
+            exposure: PNG: exposure in stops.
             tone_map: PNG: "clamp" or "neutral".
 
         Returns:
@@ -186,17 +186,17 @@ class Picture:
         raise ValueError(f"{os.fspath(path)}: pictures are saved as .exr or .png")
 
     def save_deep(self, path: str | os.PathLike[str], *, half: bool = False) -> Path:
-        """Writes the deep picture (.exr); whole or not at all.
+        """Writes the deep image (.exr) atomically.
 
         Args:
-            path: Ends in .exr.
-            half: 16 bit colours and alpha.
+            path: File name that ends in .exr.
+            half: Whether to store colours and alpha as 16-bit floats.
 
         >>> picture = wavecomb.render("shot.usd", aovs=["deep"])  # doctest: +SKIP
         >>> picture.save_deep("shot.deep.exr")  # doctest: +SKIP
 
         Raises:
-            WavecombError: There is none, or the name does not end in .exr.
+                WavecombError: There is no deep image, or the name does not end in .exr.
         """
         from wavecomb.errors import WavecombError
 
@@ -206,17 +206,17 @@ class Picture:
         return self.deep.save(path, half=half, metadata=metadata, window=self.window())
 
     def save_learned(self, path: str | os.PathLike[str]) -> None:
-        """Writes what guided the render, for ``learn_from`` of another; whole or not at all.
+        """Writes the guiding field for ``learn_from`` of another render atomically.
 
         Raises:
-            WavecombError: Nothing was learned.
+            WavecombError: No guiding field was trained.
         """
         from wavecomb.run.learned import save_learned
 
         save_learned(path, self.learned)
 
     def shown(self) -> NDArray[Any]:
-        """The colours of a PNG, linear Rec.709: the denoised picture where there is one."""
+        """Returns the colours of a PNG in linear Rec.709: denoised if available."""
         from wavecomb.picture.working_space import to_rec709
 
         shown = self.beauty if self.denoised is None else self.denoised
@@ -228,7 +228,7 @@ class Picture:
         return f"<wavecomb.Picture {facts(self)}; {', '.join(self.layers())}>"
 
     def _repr_png_(self) -> bytes:
-        """In a notebook: the picture, highlights rolled off towards white."""
+        """Returns the image for a notebook, with highlights rolled off towards white."""
         from wavecomb.picture.embedded import encoded
         from wavecomb.picture.notebook import codes
 
@@ -237,17 +237,20 @@ class Picture:
     def _repr_mimebundle_(
         self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
     ) -> dict[str, str]:
-        """In a notebook: the picture, a line about it, and its layers behind a fold."""
+        """Returns the image for a notebook, with a summary line and collapsible layers."""
         from wavecomb.picture.notebook import mime_bundle
 
         return mime_bundle(self, include, exclude)
 
     def window(self) -> tuple[int, int, int, int] | None:
-        """Where the pixels lie, as ``write_exr`` takes it; None: they are what is shown."""
+        """Returns the position of the pixels for ``write_exr``.
+
+        Returns None if they are the displayed image.
+        """
         return window_of(self.stats.get("settings", {}))
 
     def file_metadata(self) -> dict[str, Any]:
-        """Attributes of an EXR file: version, stage, camera, settings, times, matrices."""
+        """Returns attributes of an EXR file: version, stage, camera, settings, times, matrices."""
         from wavecomb.run.stats import picture_metadata
 
         return {**picture_metadata(self.stats), **self.metadata}
@@ -260,13 +263,13 @@ def picture_of(
     scene: Scene | None = None,
     aovs: Sequence[str] = aov_names.DEFAULT,
 ) -> Picture:
-    """A result of the core as a picture.
+    """Converts a result of the core to a picture.
 
     Args:
-        result: Of ``_core.render``.
-        stats: Of ``make_stats``.
-        scene: What was rendered, for the camera's matrices.
-        aovs: Names as ``aovs.expand`` gives them.
+        result: Result of ``_core.render``.
+        stats: Result of ``make_stats``.
+        scene: The rendered scene, for the camera's matrices.
+        aovs: Names from ``aovs.expand``.
     """
     from wavecomb.picture.deep import deep_of
     from wavecomb.picture.output import scene_metadata
@@ -301,9 +304,9 @@ def picture_of(
 def in_world(
     aovs: dict[str, NDArray[np.float32]], origin: Sequence[float]
 ) -> dict[str, NDArray[np.float32]]:
-    """AOVs whose positions are in the world, as precise as floats are.
+    """Returns AOVs with positions in world space, as exact as float32 permits.
 
-    Pixels without a hit keep 0: no surface is at 0, 0, 0 of a scene that has another origin.
+    Pixels without a hit keep 0, since no surface is at (0, 0, 0) of a scene with another origin.
     """
     if "position" not in aovs or not any(origin):
         return aovs
@@ -313,9 +316,9 @@ def in_world(
 
 
 def window_of(settings: Mapping[str, Any]) -> tuple[int, int, int, int] | None:
-    """Column and row of the first pixel in the picture that is shown, and the size of that one.
+    """Returns column and row of the first pixel in the displayed image, and the size of that image.
 
-    None where the pixels are those that are shown: without a crop, and without overscan.
+    Returns None without crop and overscan, since the pixels then are the displayed image.
     """
     is_cropped = settings.get("crop") and settings.get("region") is not None
     beyond = int(settings.get("overscan", 0))

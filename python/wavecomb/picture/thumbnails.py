@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Picture files as a screen shows them, at the size that is asked for."""
+"""Converts image files for display at a given size; contact sheets and wipes."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Look:
-    """How files are shown.
+    """Display options of image files.
 
     Attributes:
-        layer: Of the file; "": its colours.
-        denoised: Whether those are the layer denoised where it is there, and not the beauty.
-        exposure: In stops, of light.
-        tone_map: "clamp" or "neutral", of light.
+        layer: Layer of the file; "" means its colours.
+        denoised: Whether colours are those of the layer denoised, if it exists, instead of beauty.
+        exposure: Exposure of radiance layers in stops.
+        tone_map: Tone mapping of radiance layers, "clamp" or "neutral".
     """
 
     layer: str = ""
@@ -43,11 +43,11 @@ class Look:
     tone_map: Transfer = "clamp"
 
     def codes(self, file: str) -> NDArray[np.uint8]:
-        """A picture file as 8-bit sRGB codes, (height, width, 3).
+        """Reads an image file as 8-bit sRGB codes (height, width, 3).
 
         Raises:
-            WavecombError: It has no such layer.
-            OSError: It cannot be read.
+            WavecombError: The file lacks the layer.
+            OSError: The file cannot be read.
         """
         layers = read_layers(file)
         is_better = self.denoised and "denoised" in layers
@@ -60,22 +60,23 @@ class Look:
         if not (self.layer and not is_light(name)) and pixels.shape[2] >= 3:
             space = str(read_metadata(file).get("wavecomb:working_space", "rec709"))
             return self.of_light(to_rec709(pixels[:, :, :3], space))
-        if not self.layer:  # grey: R alone, or Y
+        # Grey images have only R or Y.
+        if not self.layer:
             return self.of_light(np.repeat(pixels[:, :, :1], 3, axis=2))
         return show_layer(pixels if pixels.shape[2] > 1 else pixels[:, :, 0], name).pixels
 
     def of_light(self, pixels: NDArray[Any]) -> NDArray[np.uint8]:
-        """Linear Rec.709 as codes."""
+        """Converts linear Rec.709 to 8-bit codes."""
         return display(pixels, exposure=self.exposure, tone_map=self.tone_map)
 
 
 def fitted(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """A picture made smaller, in linear light, so that it fits; never larger.
+    """Reduces an image in linear light to fit into a rectangle; never enlarges it.
 
     Args:
-        codes: 8-bit sRGB, (h, w, 3).
-        width: Of the room for it.
-        height: Likewise.
+        codes: 8-bit sRGB (h, w, 3).
+        width: Largest width.
+        height: Largest height.
     """
     import OpenImageIO as oiio
 
@@ -94,34 +95,34 @@ def fitted(codes: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint
     return np.floor(encoded * 255.0 + 0.5).astype(np.uint8)
 
 
-# ---- Contact sheets, and two pictures with a line between them -----------------------------------
+# ---- Contact sheets and wipes --------------------------------------------------------------------
 
 
 Codes = NDArray[np.uint8]
 
 MOST = 2000
-"""Pictures of a sheet."""
+"""Most images of a contact sheet."""
 _PAPER = 24
 _GAP = 12
 _TEXT = 13
 _LABEL = 20
 _SHAPE = 1.6
-"""Width / height that a sheet is near to where nobody says how many columns."""
+"""Approximate aspect ratio of a sheet if the number of columns is not given."""
 
 
 def contact_sheet(
     pictures: Mapping[str, str], look: Look, *, width: int = 240, columns: int = 0
 ) -> Codes:
-    """Small pictures side by side, each with its name below.
+    """Arranges small images in a grid, each with its name below.
 
     Args:
         pictures: Name -> file.
-        look: How they are shown.
-        width: Of each, pixels; the height is that of the highest.
-        columns: How many in a row; 0: so that the sheet is a good deal wider than high.
+        look: Display options.
+        width: Width of each image in pixels; the row height is that of the highest image.
+        columns: Images per row; 0 chooses a sheet that is clearly wider than high.
 
     Returns:
-        8-bit sRGB codes, (height, width, 3).
+        8-bit sRGB codes (height, width, 3).
 
     Raises:
         WavecombError: A file lacks the layer.
@@ -149,13 +150,13 @@ def _columns(count: int, width: int, height: int) -> int:
 
 
 def wipe(a: Codes, b: Codes, at: float = 0.5, names: tuple[str, str] = ("A", "B")) -> Codes:
-    """A to the left of a line, B to its right, with their names.
+    """Shows A to the left of a line and B to its right, with their names.
 
     Args:
-        a: 8-bit sRGB codes, (height, width, 3).
-        b: Of the same size.
-        at: Where the line is, from 0 (left) to 1.
-        names: Of the two.
+        a: 8-bit sRGB codes (height, width, 3).
+        b: Image of the same size.
+        at: Position of the line, from 0 (left) to 1.
+        names: Names of A and B.
     """
     width = a.shape[1]
     column = min(max(round(at * width), 0), width)
@@ -172,7 +173,7 @@ def wipe(a: Codes, b: Codes, at: float = 0.5, names: tuple[str, str] = ("A", "B"
 
 
 def _length(text: str) -> int:
-    """Of a text, in pixels."""
+    """Returns the width of a text in pixels."""
     import OpenImageIO as oiio
 
     return int(oiio.ImageBufAlgo.text_size(text, _TEXT).width)
@@ -181,7 +182,7 @@ def _length(text: str) -> int:
 def _written(
     codes: Codes, texts: Sequence[tuple[int, int, str]], room: int, *, shadow: bool = False
 ) -> Codes:
-    """With words at places (x, baseline); those that do not fit lose their beginning."""
+    """Draws texts at positions (x, baseline); cuts the beginning of texts that do not fit."""
     import OpenImageIO as oiio
 
     canvas = oiio.ImageBuf(np.ascontiguousarray(codes))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The colour spaces that pictures may be computed in.
+"""Colour spaces in which images can be rendered.
 
-Linear Rec.709 (the default), and ACEScg: the primaries AP1 with the white of ACES.
+These are linear Rec.709 (the default) and ACEScg, which has the AP1 primaries and the ACES white
+point.
 """
 
 from __future__ import annotations
@@ -12,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""What red, green and blue of linear Rec.709 weigh in its luminance (ITU-R BT.709)."""
+"""Luminance weights of linear Rec.709 (ITU-R BT.709)."""
 
 CHROMATICITIES = {
     "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
 }
-"""x and y of red, green, blue and white, for headers of EXR files; those of Rec.709 go without."""
+"""Chromaticities x, y of red, green, blue and white for EXR headers; omitted for Rec.709."""
 
-# AP1 to Rec.709, the whites adapted by Bradford's method: S-2014-004, TB-2014-004 (ACES).
+# AP1 to Rec.709 with Bradford adaptation of the white point: S-2014-004, TB-2014-004 (ACES).
 _ACESCG_TO_REC709 = np.array(
     [
         [1.7050509, -0.6217921, -0.0832588],
@@ -30,21 +31,21 @@ _ACESCG_TO_REC709 = np.array(
 
 
 def to_rec709(rgb: NDArray[Any], working: str) -> NDArray[Any]:
-    """Colours (..., 3) of the working space in linear Rec.709."""
+    """Converts colours (..., 3) of the working space to linear Rec.709."""
     if working == "rec709":
         return rgb
     return np.asarray(rgb @ _ACESCG_TO_REC709.T, np.float32)
 
 
 def from_rec709(rgb: NDArray[Any], working: str) -> NDArray[Any]:
-    """The inverse of ``to_rec709``."""
+    """Converts colours (..., 3) of linear Rec.709 to the working space."""
     if working == "rec709":
         return rgb
     return np.asarray(rgb @ np.linalg.inv(_ACESCG_TO_REC709).T, np.float32)
 
 
 def header_of(working: str) -> dict[str, Any]:
-    """Attributes of EXR files of pictures in the working space."""
+    """Returns EXR attributes of images in the working space."""
     if working == "rec709":
         return {}
     return {"chromaticities": CHROMATICITIES[working], "wavecomb:working_space": working}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether two noisy pictures can be of the same scene, given the variance of their pixels."""
+"""Statistical test whether two noisy images have the same expectation, given pixel variances."""
 
 from __future__ import annotations
 
@@ -24,19 +24,21 @@ ROUNDING = 1e-5
 
 @dataclass(frozen=True)
 class ZTest:
-    """What ``z_test`` found.
+    """Result of ``z_test``.
 
     Attributes:
-        agrees: ``p_value`` is at least ``significance``.
-        p_value: The least p-value over tiles, the picture's mean and their channels, times Sidak.
-        tests: How many values that is the least of: (tiles + 1) x channels.
-        significance: The level of ``agrees``.
+        agrees: Whether ``p_value`` is at least ``significance``.
+        p_value: Smallest p-value over tiles, the image mean and all channels, with Sidak's
+            correction.
+        tests: Number of tests: (tiles + 1) x channels.
+        significance: Significance level.
         tile: Side of a tile in pixels.
-        worst_tile: Column and row of the tile with the least p, in pixels; None if it is the mean.
-        mean_z: Deviate of the mean of the whole picture, for each channel.
-        pixels_accepted: Share of pixels and channels with p above Sidak's level for their number.
-        p_pixels: p-values of pixels, (height, width, channels).
-        z_pixels: Their deviates, A - B in standard errors; 0 where neither has noise.
+        worst_tile: Column and row in pixels of the tile with the smallest p-value; None if the
+            image mean has a smaller one.
+        mean_z: Deviate of the image mean per channel.
+        pixels_accepted: Fraction of pixel values with p above the Sidak level for their number.
+        p_pixels: (height, width, channels) p-values of pixels.
+        z_pixels: Their deviates, A - B in standard errors; 0 for pixels without variance.
     """
 
     agrees: bool
@@ -51,13 +53,13 @@ class ZTest:
     z_pixels: Array = field(repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """The figures without those of pixels, for JSON."""
+        """Returns the figures for JSON, without those per pixel."""
         names = [f.name for f in dataclasses.fields(self) if f.repr]
         return {name: getattr(self, name) for name in names}
 
 
 def sidak(p: float, tests: int) -> float:
-    """The chance that the least of so many independent p-values is at most p: 1 - (1 - p)^n.
+    """Returns 1 - (1 - p)^n: the probability that the least of n independent p-values is <= p.
 
     >>> round(sidak(0.01, 5), 6)
     0.04901
@@ -74,26 +76,27 @@ def z_test(
     tile: int = TILE,
     significance: float = SIGNIFICANCE,
 ) -> ZTest:
-    """Tests that A and B have the same expectation.
+    """Tests the hypothesis that A and B have the same expectation.
 
-    z = (A - B) / sqrt(var A + var B), p = 2 (1 - Phi(|z|)), for means over tiles, which see a
-    tile's side less of the noise, and over the picture; Sidak's correction makes one p-value of
-    all. Variances are of each pixel's *mean* (of the picture as it is, not of one sample) and taken
-    as known, so they should come from some 30 independent renders or more. Pixels are taken as
-    independent; a filter wider than a pixel makes the test too strict.
+    z = (A - B) / sqrt(var A + var B), p = 2 (1 - Phi(|z|)), for means over tiles, whose noise is
+    lower by a factor of the tile's side, and over the image; Sidak's correction combines them into
+    one p-value. Variances are those of each pixel's *mean* (of the image itself, not of one sample)
+    and treated as exact, so they should come from about 30 independent renders or more. Pixels are
+    treated as independent; a filter wider than a pixel makes the test too strict.
 
-    Where neither has any noise, a difference of up to 1e-5 of the value is rounding.
+    Where both variances are 0, a relative difference of up to 1e-5 counts as rounding.
 
     Args:
-        a: Picture under test.
-        b: Reference.
-        variance_a: Variance of A's pixels, of its size; None: exact.
-        variance_b: Likewise of B.
-        tile: Side in pixels.
-        significance: Of the verdict.
+        a: Image under test.
+        b: Reference image.
+        variance_a: Variance of A's pixels, in the same size; None means exact pixels.
+        variance_b: Variance of B's pixels, in the same size; None means exact pixels.
+        tile: Side of a tile in pixels.
+        significance: Significance level.
 
     Raises:
-        ValueError: No variance, other sizes, or a variance that is negative or not finite.
+        ValueError: Both variances are missing, sizes differ, or a variance is negative or not
+            finite.
     """
     special = needed("scipy.special", "the z-test")
     if variance_a is None and variance_b is None:
@@ -149,7 +152,7 @@ def _variance(source: Source | None, like: Array, name: str) -> Array:
 
 
 def _tile_sums(values: Array, tile: int) -> Array:
-    """Sums over tiles; those at the right and the bottom may be smaller."""
+    """Returns sums over tiles; tiles at the right and bottom edges may be smaller."""
     rows = np.arange(0, values.shape[0], tile)
     columns = np.arange(0, values.shape[1], tile)
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders from start to end: sequences, checkpoints, progress, statistics, isolation."""
+"""Runs renders: sequences of frames, checkpoints, progress, statistics, isolation."""

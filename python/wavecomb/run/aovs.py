@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of AOVs: what may be asked for, and what the core is asked for then."""
+"""Names of AOVs: validates requested names and selects those that the core renders."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from wavecomb.errors import WavecombError
 from wavecomb.run import expressions
 
 DEFAULT = ("beauty", "albedo", "normal", "depth", "samples")
-"""What a picture holds where nothing is asked for."""
+"""Default layers of an image."""
 
 GUIDES = ("guide_albedo", "guide_normal")
-"""For denoisers: of what is seen, also in mirrors and through clear glass."""
+"""Denoiser guides: features of surfaces seen directly, in mirrors or through clear glass."""
 ERRORS = ("error", "variance")
 DEEP = "deep"
-"""No layer, but a picture of its own: what ``--deep`` writes."""
+"""Not a layer but a separate deep image, which ``--deep`` writes."""
 LIGHT = "light_"
 TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
-"""What each way to find light brought; their sum is the beauty."""
+"""Contributions of each light transport technique; their sum is the beauty."""
 
 
 @dataclass(frozen=True)
 class Aov:
-    """An AOV that the core keeps: a row of its table (core/aov.h).
+    """An AOV of the core: a row of its table (core/aov.h).
 
     Attributes:
-        name: Of ``--aov`` and of the layer.
-        channels: Of its layer; 0 where that is none of numbers, or there are several.
-        kind: How samples become a pixel: "mean", "mean_of_hits", "nearest", "coverage", "groups",
-            "sum" or "median".
-        title: In the window; "" where it does not offer the layer.
+        name: Name for ``--aov`` and of the layer.
+        channels: Number of channels of its layer; 0 if it has no numeric layer or several layers.
+        kind: How samples are combined per pixel: "mean", "mean_of_hits", "nearest", "coverage",
+            "groups", "sum" or "median".
+        title: Title in the window; "" if the window does not offer the layer.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Aov:
 
 @cache
 def core_aovs() -> Mapping[str, Aov]:
-    """Every AOV of the core by name, in the table's order.
+    """Returns every AOV of the core by name, in the table's order.
 
     >>> core_aovs()["depth"].kind
     'mean_of_hits'
@@ -56,7 +56,7 @@ def core_aovs() -> Mapping[str, Aov]:
 
 @cache
 def of_kind(kind: str) -> tuple[str, ...]:
-    """Names of those whose samples become a pixel so.
+    """Returns names of AOVs whose samples are combined in this way.
 
     >>> of_kind("coverage")
     ('crypto_object', 'crypto_material', 'crypto_asset')
@@ -66,7 +66,7 @@ def of_kind(kind: str) -> tuple[str, ...]:
 
 @cache
 def names() -> tuple[str, ...]:
-    """All AOVs; "light_NAME" is a single light group beside them.
+    """Returns the names of all AOVs; "light_NAME" additionally selects a single light group.
 
     >>> names()[:3]
     ('beauty', 'albedo', 'normal')
@@ -75,18 +75,18 @@ def names() -> tuple[str, ...]:
 
 
 def groups() -> dict[str, tuple[str, ...]]:
-    """Names that stand for several."""
+    """Returns names that stand for several AOVs."""
     return {"all": names(), "crypto": of_kind("coverage"), "techniques": TECHNIQUES}
 
 
 def expand(asked: Iterable[str]) -> tuple[str, ...]:
-    """AOVs in the order of ``names``, each once, and what has a name of its own; beauty is in.
+    """Returns AOVs in canonical order without duplicates, followed by named ones; includes beauty.
 
     >>> expand(["depth", "crypto", "light_key"])
     ('beauty', 'depth', 'crypto_object', 'crypto_material', 'crypto_asset', 'light_key')
 
     Raises:
-        WavecombError: There is no AOV of that name.
+        WavecombError: An AOV does not exist.
     """
     all_names, several = names(), groups()
     wanted: dict[str, None] = {"beauty": None}
@@ -107,13 +107,13 @@ def expand(asked: Iterable[str]) -> tuple[str, ...]:
 
 
 def with_others(aovs: tuple[str, ...], others: Iterable[str]) -> tuple[str, ...]:
-    """``aovs`` with what else the core is to keep, such as what a denoiser needs."""
+    """Returns ``aovs`` with additional AOVs that the core must render, such as denoiser guides."""
     missing = [name for name in others if name not in aovs]
     return expand([*aovs, *missing]) if missing else aovs
 
 
 def for_core(aovs: Iterable[str]) -> list[str]:
-    """Those that the core has to make room for."""
+    """Returns the AOVs for which the core allocates memory."""
     return [
         name
         for name in aovs
@@ -125,11 +125,11 @@ _SUM_BYTES = {
     **{"mean": 8, "mean_of_hits": 8, "nearest": 4, "coverage": 0, "groups": 0, "sum": 8},
     "median": 88,
 }
-"""A channel in the film; what has none is counted apart."""
+"""Bytes of a film channel by kind; kinds without a value are counted separately."""
 
 
 def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
-    """Memory of a pixel: sums in the film, and the layers that are handed out (docs/aovs.md)."""
+    """Returns the bytes per pixel of film sums and output layers (docs/aovs.md)."""
     chosen = set(aovs)
     kept = [row for row in core_aovs().values() if row.name in chosen]
     total = 32 + 12 + 4
@@ -145,13 +145,13 @@ def bytes_per_pixel(aovs: Iterable[str], light_groups: int) -> int:
 
 
 def splat_layers(aovs: Iterable[str], light_groups: int) -> int:
-    """Layers beside the beauty that keep what paths from the lights bring by itself."""
+    """Returns the number of non-beauty layers that store light path contributions."""
     chosen = set(aovs)
     return len({"direct", "indirect"} & chosen) + _many_layers(chosen, light_groups)
 
 
 def _many_layers(chosen: set[str], light_groups: int) -> int:
-    """Light groups and light path expressions."""
+    """Returns the number of light groups and light path expressions."""
     groups = light_groups if "light_groups" in chosen else sum(map(_is_light, chosen))
     return groups + sum(map(expressions.is_expression, chosen))
 

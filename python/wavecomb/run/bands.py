@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture in bands of rows from the top, where it is too large to be held whole.
+"""Renders an image in bands of rows, from the top, if it is too large for memory.
 
-A pixel does not depend on what else is rendered, so the bands are, bit for bit, the rows of the
-whole picture. What needs all pixels at once (denoising, adaptive sampling, checkpoints) is not to
-be had.
+Pixels do not depend on which other pixels are rendered, so that bands are bit-identical to rows of
+the whole image. Features that need all pixels at once are not available: denoising, adaptive
+sampling and checkpoints.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from wavecomb.run.watcher import Reporter, Status
 
 STEP = 64
-"""Bands have a multiple of so many rows, or of a tile."""
+"""Band heights are multiples of this, or of the tile height."""
 _ADDED = ("samples_done", "rays", "seconds")
-"""Of a status: what bands before it count for."""
+"""Status entries to which the values of earlier bands are added."""
 _SECONDS = ("render", "build", "denoise")
-"""Of the statistics: what all bands took together."""
+"""Times in the statistics that are summed over all bands."""
 
 
 def band_rows(
@@ -41,19 +41,19 @@ def band_rows(
     tile: int = 0,
     light_groups: int = 1,
 ) -> int | None:
-    """Rows of a band; None where the whole picture is to be held.
+    """Returns the number of rows of a band; None if the whole image fits.
 
     Args:
-        settings: Of the render.
-        aovs: As expanded.
-        megabytes: That film and layers may take, 10^6 bytes; None: half of the machine's memory,
-            and more where the whole is needed.
-        whole: An option that needs the whole picture.
-        tile: Edge of the tiles of the file, 0: it has none.
-        light_groups: Of the scene.
+        settings: Settings of the render.
+        aovs: Expanded AOVs.
+        megabytes: Memory limit of film and layers in units of 10^6 bytes; None allows half of the
+            machine's memory, or more if the whole image is required.
+        whole: Name of an option that requires the whole image.
+        tile: Edge length of the file's tiles; 0 means scanlines.
+        light_groups: Number of light groups of the scene.
 
     Raises:
-        WavecombError: The whole is needed and does not fit.
+        WavecombError: The whole image is required and does not fit.
     """
     machine = machine_limit()
     most = megabytes * 1e6 if megabytes is not None else machine and 0.5 * machine
@@ -77,7 +77,7 @@ def band_rows(
 
 
 def _needs_all(settings: Settings, aovs: Sequence[str]) -> str:
-    """What of the settings needs all pixels at once; empty: nothing."""
+    """Returns the name of a setting that needs all pixels at once, or ""."""
     if settings.time_limit:
         return "--time-limit"
     if settings.allocate != "even":
@@ -99,13 +99,13 @@ def render_bands(
     rows: int,
     reporter: Reporter | None = None,
 ) -> Iterator[Result]:
-    """Renders bands of so many rows, each when it is asked for.
+    """Renders bands of ``rows`` rows, each when the iterator advances.
 
     Args:
-        render: Renders with the settings that it is given, and shows progress there.
-        settings: Of the whole picture.
-        rows: Of a band.
-        reporter: Shows the progress of the whole.
+        render: Renders with the given settings and reports progress to the given reporter.
+        settings: Settings of the whole image.
+        rows: Number of rows of a band.
+        reporter: Receives the progress of the whole image.
     """
     from wavecomb import _core
 
@@ -123,9 +123,9 @@ def render_bands(
 def without_samples(
     render: Callable[[Settings], Picture], settings: Settings, rows: int
 ) -> Picture:
-    """So many rows of the picture that have no samples, with all layers as the core gives them.
+    """Returns ``rows`` rows of an image without samples, with the core's values for all layers.
 
-    ``render``: renders with the settings that it is given.
+    ``render`` renders with the given settings.
     """
     from wavecomb import _core
 
@@ -149,7 +149,7 @@ def without_samples(
 
 
 class _Whole:
-    """Shows bands as parts of one render."""
+    """Reporter that combines the progress of bands."""
 
     def __init__(self, reporter: Reporter, samples: int) -> None:
         self._reporter = reporter
@@ -169,9 +169,10 @@ class _Whole:
 
 
 def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The statistics of bands as those of one render.
+    """Combines the statistics of bands.
 
-    Counts and times are added; means over records are weighed by them; of memory it is the most.
+    Adds counts and times, weights means over records by the number of records, and takes the
+    maximum of memory.
     """
     from wavecomb.run.stats import sort_overhead
 
@@ -212,7 +213,10 @@ def sum_stats(bands: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -
 
 
 def _mean(parts: Sequence[Any], weights: Sequence[float]) -> Any:
-    """Floats weighed, mappings entry by entry; all else is the first's."""
+    """Averages floats with weights, also inside mappings.
+
+    Takes other values from the first band.
+    """
     first = parts[0]
     if isinstance(first, Mapping):
         return {

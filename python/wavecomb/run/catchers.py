@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shadow catchers: three renders of a stage as one picture (docs/visibility.md).
+"""Shadow catchers: combines three renders of a stage to one image (docs/visibility.md).
 
-The picture is rendered with catchers that the camera does not see. Two more renders see nothing
-but the catchers: one lit as they are, one as if nothing else were there. With c the share of a
-pixel that catchers have there, and L, L0 what they reflect in either, both by the same random
-numbers, the shadow covers c (1 - L / L0) of the pixel.
+In the main render the camera does not see the catchers. Two further renders show only the catchers:
+one with all objects casting shadows and one without any. Let c be a pixel's coverage by catchers,
+and L and L0 their reflected luminance in these renders, which use the same random numbers. Then the
+shadow adds the alpha c (1 - L / L0).
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
     from wavecomb.picture.rendered import Picture
 
 LAYER = "alpha"
-"""The AOV that shadows go to."""
+"""The AOV that receives shadows."""
 PASSES: tuple[Mapping[str, str], ...] = (
     {"catch": "lit", "lights": "hidden"},
     {"catch": "bare", "lights": "hidden"},
 )
-"""How the stage is loaded for the two renders of catchers, in place of its own options."""
+"""Load options that replace the stage's options in the two renders of catchers."""
 _LAYERS = ("direct", "indirect", LAYER)
 
 
 def check(settings: Settings, given: Mapping[str, Any]) -> None:
-    """Raises WavecombError for what does not go with catchers.
+    """Raises WavecombError for settings that cannot be combined with catchers.
 
     Args:
-        settings: Of the render.
-        given: Options by name; those that are given are refused.
+        settings: Settings of the render.
+        given: Values of further options by name; options that are set are rejected.
     """
     asked = {name: getattr(settings, name) for name in ("time_limit", "adaptive", "noise")}
     asked["allocate"] = settings.allocate != "even"
@@ -52,7 +52,7 @@ def check(settings: Settings, given: Mapping[str, Any]) -> None:
 
 
 def with_alpha(settings: Settings) -> Settings:
-    """Settings with the layer that shadows go to."""
+    """Returns the settings with the layer that receives shadows."""
     from wavecomb import _core
 
     if LAYER in settings.aovs:
@@ -61,7 +61,7 @@ def with_alpha(settings: Settings) -> Settings:
 
 
 def of_catchers(settings: Settings) -> Settings:
-    """Settings of the two renders of catchers."""
+    """Returns the settings for the two renders of catchers."""
     from wavecomb import _core
 
     own = {"aovs": list(_LAYERS), "light_weights": "power", "error": False, "firefly": "keep"}
@@ -69,12 +69,11 @@ def of_catchers(settings: Settings) -> Settings:
 
 
 def caught(picture: Picture, render: Callable[[Mapping[str, str]], Result]) -> Picture:
-    """A picture with the shadows on its catchers.
+    """Returns the image with the shadows on its catchers.
 
     Args:
-        picture: Rendered without them; it has the AOV alpha.
-        render: Loads the stage with some options in place of its own, and renders it with
-            ``of_catchers``.
+        picture: Image without catchers; it has the AOV alpha.
+        render: Loads the stage with replaced options and renders it with ``of_catchers``.
     """
     lit, bare = (_light_of(render(how)) for how in PASSES)
     alpha = with_shadows(picture.aovs[LAYER], lit[1], lit[0], bare[0])
@@ -82,7 +81,7 @@ def caught(picture: Picture, render: Callable[[Mapping[str, str]], Result]) -> P
 
 
 def _light_of(result: Result) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What catchers reflect, and their share of each pixel."""
+    """Returns the luminance that catchers reflect, and their coverage of each pixel."""
     light = result.aovs["direct"].astype(np.float64) + result.aovs["indirect"]
     return light @ np.array(LUMINANCE), result.aovs[LAYER].astype(np.float64)
 
@@ -93,13 +92,13 @@ def with_shadows(
     lit: NDArray[np.float64],
     bare: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Alpha with shadows: what catchers show of the pixel is covered as far as it is dark.
+    """Adds shadows on catchers to alpha, in proportion to their darkness.
 
     Args:
-        alpha: Of all else. What of it lies behind catchers is not covered twice.
-        share: Of each pixel that catchers have.
-        lit: Luminance that they reflect.
-        bare: The same if nothing else were there.
+        alpha: Alpha of all other objects. Objects behind catchers are not counted twice.
+        share: Coverage of each pixel by catchers.
+        lit: Luminance that catchers reflect with shadows.
+        bare: Luminance that catchers reflect without other objects.
 
     >>> with_shadows(np.zeros(2), np.ones(2), np.array([0.25, 1]), np.ones(2)).tolist()
     [0.75, 0.0]

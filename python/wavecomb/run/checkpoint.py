@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints: all that a render needs to go on as if nothing had stopped it.
+"""Checkpoints, from which a stopped render continues with an identical result.
 
-A file is a NumPy archive (.npz, not compressed): ``header``, JSON as bytes, and the arrays of a
-``Snapshot.state()``. It is written beside its name and renamed when it is on the disk, so that
-whatever happens there is a whole one; the archive's checksums find damage.
+A file is an uncompressed NumPy archive (.npz) with ``header``, JSON as bytes, and the arrays of
+``Snapshot.state()``. It is written under a temporary name and renamed when it is on disk, so that a
+complete file always exists; the archive's checksums detect damage.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _OPTIONS = {"width": "size", "height": "size", "filter_width": "filter-width"}
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What a file holds."""
+    """Content of a checkpoint file."""
 
     path: str
     header: dict[str, Any]
@@ -43,29 +43,29 @@ class Checkpoint:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of the render, those of the picture only: see ``picture_settings``."""
+        """Settings of the render that affect the image; see ``picture_settings``."""
         return dict(self.header["settings"])
 
     @property
     def source(self) -> dict[str, Any]:
-        """How the stage was loaded: camera, frame, purposes, variants."""
+        """Options with which the stage was loaded: camera, frame, purposes, variants."""
         return dict(self.header["source"])
 
     @property
     def aovs(self) -> tuple[str, ...]:
-        """AOVs of the picture, as ``aovs.expand`` gives them."""
+        """AOVs of the image, in the form of ``aovs.expand``."""
         return tuple(self.header["aovs"])
 
     @property
     def seconds(self) -> float:
-        """Rendered so far, in all runs."""
+        """Render time of all runs so far, in seconds."""
         return float(self.header["seconds"])
 
 
 def picture_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings that decide over the picture.
+    """Returns the settings that affect the image.
 
-    A time limit does not: it decides how much of it there is.
+    A time limit is excluded, since it affects only the number of samples.
     """
     rows = known_settings()
     chosen = {
@@ -91,7 +91,7 @@ def make_header(
     source: Mapping[str, Any],
     aovs: Sequence[str],
 ) -> dict[str, Any]:
-    """What is the same for all checkpoints of a render."""
+    """Returns the header that all checkpoints of a render share."""
     from wavecomb import _core
 
     return {
@@ -108,7 +108,7 @@ def make_header(
 
 
 def _fingerprint(scene: Scene, settings: Settings) -> dict[str, str]:
-    """That of what shows in the picture: names do in a Cryptomatte only."""
+    """Returns the fingerprint of image-relevant parts; names matter only for Cryptomattes."""
     parts = dict(scene.fingerprint())
     if not any(name.startswith("crypto_") for name in settings.aovs):
         parts.pop("names", None)
@@ -118,7 +118,7 @@ def _fingerprint(scene: Scene, settings: Settings) -> dict[str, str]:
 def save_checkpoint(
     path: str | os.PathLike[str], header: Mapping[str, Any], state: Mapping[str, Any]
 ) -> None:
-    """Writes a file: on the disk and whole when it has its name."""
+    """Writes a file, which gets its name only when it is complete and on disk."""
     write_archive(path, header, state, durable=True)
 
 
@@ -126,8 +126,8 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     """Reads a file.
 
     Raises:
-        OSError: It cannot be read.
-        WavecombError: It is no checkpoint, damaged, or of another format.
+        OSError: The file cannot be read.
+        WavecombError: The file is not a checkpoint, is damaged, or has another format.
     """
     name = os.fspath(path)
     try:
@@ -153,15 +153,15 @@ _PARTS: dict[str, tuple[type, ...]] = {
 
 
 def _check_header(header: dict[str, Any]) -> None:
-    """Raises ArchiveError unless all parts are there, and of their types."""
+    """Raises ArchiveError unless all header entries exist with valid types."""
     for key, types in _PARTS.items():
         if not isinstance(header.get(key, ()), types):
-            raise ArchiveError(f"its {key} is no good")
+            raise ArchiveError(f"its {key} is invalid")
     texts = [*header["aovs"], *header["scene"].values()]
     if not all(isinstance(text, str) for text in texts):
-        raise ArchiveError("its names are no text")
+        raise ArchiveError("its names are not text")
     if not 0 <= header["seconds"] < math.inf:
-        raise ArchiveError("its seconds are no time")
+        raise ArchiveError("its seconds are invalid")
     from wavecomb import _core
 
     settings = header["settings"]
@@ -179,24 +179,24 @@ def _check_header(header: dict[str, Any]) -> None:
         aov_names.expand(header["aovs"])
         _core.Settings(**settings).check()
     except (TypeError, ValueError, OverflowError, RuntimeError, WavecombError) as error:
-        raise ArchiveError(f"its settings are no good: {error}") from error
+        raise ArchiveError(f"its settings are invalid: {error}") from error
 
 
 def _check_state(state: dict[str, Any]) -> int:
-    """The pass that was under way; raises ArchiveError unless arrays are as they are saved."""
+    """Returns the current pass; raises ArchiveError unless arrays have the saved form."""
     if not {"pass.target", "pass.active"} <= state.keys():
-        raise ArchiveError("it lacks a part")
+        raise ArchiveError("an entry is missing")
     target = state["pass.target"]
     if target.shape != () or target.dtype.kind not in "iu" or not 0 <= int(target) < 1 << 32:
-        raise ArchiveError("its pass is no number")
+        raise ArchiveError("its pass is not a number")
     for name, array in state.items():
         if name != "pass.target" and (array.dtype != np.uint8 or array.ndim != 1):
-            raise ArchiveError(f"its {name} is no row of bytes")
+            raise ArchiveError(f"its {name} is not an array of bytes")
     return int(target)
 
 
 def check_replaceable(path: str | os.PathLike[str]) -> None:
-    """Raises WavecombError where a checkpoint would replace a file that is none."""
+    """Raises WavecombError if a checkpoint would replace a file that is not a checkpoint."""
     target = Path(path)
     if not target.is_file() or target.stat().st_size == 0:
         return
@@ -204,23 +204,23 @@ def check_replaceable(path: str | os.PathLike[str]) -> None:
         load_checkpoint(target)
     except WavecombError:
         raise WavecombError(
-            f"{os.fspath(path)}: is there and is no checkpoint; give --checkpoint another name"
+            f"{os.fspath(path)}: exists and is not a checkpoint; give --checkpoint another name"
         ) from None
 
 
 def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
-    """Raises WavecombError that names the difference unless a render can go on from a checkpoint.
+    """Raises WavecombError that names the difference if a render cannot continue a checkpoint.
 
     Args:
-        checkpoint: Of the file.
-        header: Of the render that is to go on.
+        checkpoint: The checkpoint.
+        header: Header of the render that is to continue.
     """
     name, old = checkpoint.path, checkpoint.header
     parts = [part for part, key in header["scene"].items() if old["scene"].get(part) != key]
     if parts:
         what = ", ".join(parts[:-1]) + " and " * (len(parts) > 1) + parts[-1]
         raise WavecombError(
-            f"{name}: was made of {old['stage'] or 'a scene'} when it looked otherwise: "
+            f"{name}: was made of {old['stage'] or 'a scene'} in another state: "
             f"{what} differ{'s' * (len(parts) == 1)}; give the stage as it was, or start anew"
         )
     before, now = dict(old["settings"]), dict(header["settings"])
@@ -240,7 +240,7 @@ def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
 
 
 def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
-    """A warning where another build made the checkpoint: right, but not bit for bit."""
+    """Returns a warning if another build made the checkpoint, so that last bits may differ."""
     for key in ("version", "library"):
         if checkpoint.header[key] != header[key]:
             return (
@@ -251,7 +251,7 @@ def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
 
 
 def _take_more_samples(checkpoint: Checkpoint, before: dict[str, Any], now: dict[str, Any]) -> None:
-    """A render that is even and not adaptive may go on to another number of samples."""
+    """Allows an even, non-adaptive render to continue with another number of samples."""
     if any(before.get(name) for name in ("adaptive", "noise", "allocate")):
         return
     if now["spp"] >= checkpoint.state["pass.target"]:

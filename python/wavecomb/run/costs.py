@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost profiles: what shading a record of each material took, for a later render to start from."""
+"""Cost profiles: shading time per record of each material, as initial values for later renders."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def load_costs(path: str | os.PathLike[str]) -> Profile:
     """Reads a cost profile: {"materials": {name: ns}, "textures": {name: ns}}.
 
     Raises:
-        WavecombError: It is none; one line that names the file.
-        OSError: It is not a regular file.
+        WavecombError: The file is not a cost profile.
+        OSError: The file is not a regular file.
     """
     name = os.fspath(path)
     check_regular(path)
@@ -39,10 +39,10 @@ def load_costs(path: str | os.PathLike[str]) -> Profile:
 
 
 def check_costs(profile: Mapping[str, Any], name: str = "costs") -> Profile:
-    """The profile with plain floats.
+    """Returns the profile with plain floats.
 
     Raises:
-        WavecombError: Its form or a number is no good.
+        WavecombError: The structure or a number is invalid.
     """
     checked: Profile = {}
     for kind in ("materials", "textures"):
@@ -62,7 +62,7 @@ def check_costs(profile: Mapping[str, Any], name: str = "costs") -> Profile:
 
 
 def save_costs(path: str | os.PathLike[str], profile: Mapping[str, Mapping[str, float]]) -> None:
-    """Writes a cost profile, whole or not at all.
+    """Writes a cost profile atomically.
 
     >>> save_costs("mixed-costs.json", picture.costs)  # doctest: +SKIP
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions as AOVs, ``lpe:NAME=EXPRESSION``, and other renderers' names for some.
+"""Light path expressions as AOVs, ``lpe:NAME=EXPRESSION``, and names for common ones.
 
 docs/light-path-expressions.md has the grammar.
 """
@@ -10,9 +10,9 @@ import re
 from types import MappingProxyType
 
 PREFIX = "lpe:"
-"""Before an expression among AOVs."""
+"""Prefix of light path expressions among AOVs."""
 LAYER = "lpe_"
-"""Before its name among layers."""
+"""Prefix of their layer names."""
 
 _ANY_LIGHT = "[LO]"
 NAMED = MappingProxyType(
@@ -51,16 +51,16 @@ NAMED = MappingProxyType(
         "combinedvolume": f"CV.*{_ANY_LIGHT}",
     }
 )
-"""Names of Arnold's and Karma's own AOVs, as expressions."""
+"""Names of Arnold's and Karma's AOVs -> light path expressions."""
 
 
 def is_expression(aov: str) -> bool:
-    """Whether an AOV is a light path expression, spelled out."""
+    """Returns whether an AOV is a light path expression."""
     return aov.startswith(PREFIX)
 
 
 def spelled(aov: str) -> str:
-    """An AOV, spelled out where it is one of ``NAMED``.
+    """Replaces a name in ``NAMED`` by its full expression.
 
     >>> spelled("lpe:background"), spelled("lpe:a=C.*"), spelled("depth")
     ('lpe:background=CB', 'lpe:a=C.*', 'depth')
@@ -72,7 +72,7 @@ def spelled(aov: str) -> str:
 
 
 def layer_of(aov: str) -> str:
-    """The layer of an AOV.
+    """Returns the layer name of an AOV.
 
     >>> layer_of("lpe:key=C.*<L.'key'>"), layer_of("depth")
     ('lpe_key', 'depth')
@@ -83,7 +83,7 @@ def layer_of(aov: str) -> str:
 
 
 def as_aov(text: str, name: str) -> str:
-    """An expression as an AOV, by a name that layers can have.
+    """Converts an expression to an AOV whose name is valid for layers.
 
     >>> as_aov("C<RD> L", "direct diffuse")
     'lpe:direct_diffuse=C<RD>L'

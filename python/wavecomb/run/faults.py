@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exceptions as people see them."""
+"""Converts exceptions to messages for users."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from wavecomb.run.isolate.memory import describe_limit
 
 
 def describe(error: Exception) -> str:
-    """An exception as one line for a user."""
+    """Returns an exception as one line for the user."""
     core = sys.modules.get("wavecomb._core")
     if isinstance(error, WavecombError) or (core is not None and isinstance(error, core.Error)):
         return str(error)

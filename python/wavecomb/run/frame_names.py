@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames as people write them, and names of files for each."""
+"""Parses frame ranges, and fills frame numbers into file names."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _PLACE = re.compile(
 
 
 def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
-    """Frames in the order they are named, each once.
+    """Returns frames in the given order without duplicates.
 
     Args:
-        text: Frames and ranges, with commas between them: ``1-48``, ``1-48x2`` (every second),
-            ``48-1`` (backwards), ``1,5,9``, ``-10--2``, ``1-2x0.25``; or numbers.
+        text: Numbers, or a comma-separated list of frames and ranges: ``1-48``, ``1-48x2`` (every
+            second), ``48-1`` (backwards), ``1,5,9``, ``-10--2``, ``1-2x0.25``.
 
     >>> parse_frames("1-7x3,-2--1,0.5")
     (1.0, 4.0, 7.0, -2.0, -1.0, 0.5)
 
     Raises:
-        WavecombError: It is none of these.
+        WavecombError: The text is invalid.
     """
     if not isinstance(text, str):
         text = ",".join(f"{float(frame):f}" for frame in text)
@@ -45,7 +45,7 @@ def parse_frames(text: str | Iterable[float]) -> tuple[float, ...]:
 
 
 def _range(part: str, text: str) -> Iterable[Decimal]:
-    """The frames of one part, exact to the last decimal."""
+    """Yields the frames of one item in exact decimal arithmetic."""
     match = _RANGE.fullmatch(part)
     if match is None:
         raise WavecombError(
@@ -74,7 +74,7 @@ def _range(part: str, text: str) -> Iterable[Decimal]:
 
 
 def frame_text(frame: float) -> str:
-    """A frame as people write it.
+    """Formats a frame number.
 
     >>> frame_text(7.0), frame_text(-0.25)
     ('7', '-0.25')
@@ -84,14 +84,15 @@ def frame_text(frame: float) -> str:
 
 
 def has_place(pattern: str) -> bool:
-    """Whether a file name says where its frame goes."""
+    """Returns whether a file name contains a placeholder for the frame."""
     return _PLACE.search(os.path.basename(pattern)) is not None
 
 
 def matching(pattern: str) -> dict[float, str]:
-    """The files that are there of a name with a place for the frame, in the order of frames.
+    """Returns the existing files that match a name with a frame placeholder, sorted by frame.
 
-    Of two names of one frame (``a.7.exr``, ``a.0007.exr``) the one that ``fill`` gives counts.
+    If two files have the same frame (``a.7.exr``, ``a.0007.exr``), uses the name that ``fill``
+    gives.
 
     Raises:
         OSError: The folder cannot be read.
@@ -114,12 +115,11 @@ def matching(pattern: str) -> dict[float, str]:
 
 
 def fill(pattern: str, frame: float) -> str:
-    """The name of the file of a frame.
+    """Returns the file name of a frame.
 
-    In the last part of the name, ``####`` is the frame with at least so many digits, ``%04d`` with
-    at least so many characters, ``<frame>`` without zeros before it; ``$F4``, ``${F4}`` and ``$F``
-    are Houdini's names of ``####`` and ``<frame>``. A frame that is not whole has its decimals at
-    its end.
+    In the last path element, ``####`` is the frame with at least that many digits, ``%04d`` with at
+    least that many characters, and ``<frame>`` without padding. ``$F4``, ``${F4}`` and ``$F`` are
+    Houdini's forms of ``####`` and ``<frame>``. Fractional frames keep their decimals.
 
     >>> fill("out/a.####.exr", 7), fill("a%04d.png", -7), fill("a_<frame>.exr", 1.5)
     ('out/a.0007.exr', 'a-007.png', 'a_1.5.exr')

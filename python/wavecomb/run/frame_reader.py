@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads frames of one stage, which stays open between them."""
+"""Reads frames of a stage that stays open between frames."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Seen:
-    """What another frame shows of the scene of the one before.
+    """Camera and metadata of another frame, for a scene that is otherwise unchanged.
 
     Attributes:
-        camera: For ``Renderer.edit``; None: it stays.
-        camera_path: As of a ``LoadedStage``, like what follows.
-        shutter: Likewise.
-        render: Likewise.
-        frame: Likewise.
+        camera: Camera arguments of ``Renderer.edit``; None if the camera is unchanged.
+        camera_path: ``LoadedStage.camera_path`` at the frame.
+        shutter: ``LoadedStage.shutter`` at the frame.
+        render: ``LoadedStage.render`` at the frame.
+        frame: ``LoadedStage.frame`` at the frame.
     """
 
     camera: dict[str, Any] | None
@@ -50,18 +50,18 @@ class Seen:
     frame: float | None
 
     def as_dict(self) -> dict[str, Any]:
-        """Its attributes by name."""
+        """Returns the attributes by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 class FrameReader:
-    """The stage, open, and what frames of it share.
+    """An open stage with data that its frames share.
 
-    Contract: files of the stage must not change meanwhile, but for images.
+    Contract: files of the stage must not change, except images.
     """
 
     def __init__(self, path: Path, options: LoadOptions) -> None:
-        """Opens the stage. Raises WavecombError."""
+        """Opens the stage; raises WavecombError for errors."""
         check_view(options)
         opening = LoadReport()
         layer = None if options.session_layer is None else Path(options.session_layer)
@@ -75,23 +75,23 @@ class FrameReader:
         self._before: LoadedStage | None = None
 
     def read(self, options: LoadOptions, **how: Any) -> LoadedStage:
-        """The stage at a frame.
+        """Reads the stage at a frame.
 
         Args:
-            options: With the frame.
-            **how: Of ``load_stage``, beside options.
+            options: Load options with the frame.
+            **how: Further arguments of ``load_stage``.
 
         Raises:
-            WavecombError: It cannot be rendered.
+            WavecombError: The stage cannot be rendered.
         """
         self._before = None
-        # Those were chosen when it was opened.
+        # These options applied when the stage was opened.
         here = replace(options, mask=(), payloads=(), session_layer=None, variants=None)
         self._before = load_stage(self._stage, here, cache=self._cache, **how)
         return self._before
 
     def look(self, options: LoadOptions) -> Seen | None:
-        """What is other at a frame, where that is the camera at most; None where more may be."""
+        """Returns the changes at a frame if at most the camera changes; None otherwise."""
         before, when = self._before, time_code(self._stage, options.frame)
         if before is None:
             return None
@@ -106,18 +106,21 @@ class FrameReader:
         if not self._cache.varying.is_view_only and before.frame != number:
             return None
         if before.leaves_out_levels:
-            return None  # another view shows other textures near
+            # Another view needs other mip levels of textures.
+            return None
         told = LoadReport()
         seen = seen_on(self._stage, options, told)
         if before.camera_path is None or seen.camera is None:
-            # What is drawn is framed; not where a camera is no good.
+            # The default view frames the geometry; it does not apply if an authored camera is
+            # invalid.
             is_same = before.camera_path is None and seen.camera is None
             if not is_same or before.render != seen.choice:
                 return None
             return Seen(None, before.camera_path, before.shutter, before.render, number)
         origin = find_origin(self._stage, when, seen.camera, seen.purposes)
         if origin != before.origin:
-            return None  # the scene is built around another point
+            # The scene would be built around another point.
+            return None
         to_world = np.array(UsdGeom.XformCache(when).GetLocalToWorldTransform(seen.camera))
         to_world = moved_to(to_world, origin)
         view = read_camera(seen.camera, to_world, when, told, seen.lens)

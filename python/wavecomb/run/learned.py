@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a render has learned of where light comes from, for a later render to start from.
+"""Guiding field of a render, saved as the starting point of later renders.
 
-A file holds the field that guides bounces, as checkpoints hold it. It fits scenes with as many
-materials; of one that is moved or lit otherwise it is a worse guess, and no picture is biased.
+A file holds the guiding field in the form of checkpoints. It fits scenes with the same number of
+materials. After changes of geometry or lighting it is less accurate, but never biases the image.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from wavecomb._core import Settings
 
 BEFORE = "before"
-"""In place of a file: each frame starts from what the frame before it has learned."""
+"""Value in place of a file: each frame starts from the guiding field of the previous frame."""
 ENDING = ".learned"
 _KIND = "wavecomb-learned"
 _FORMAT = 1
@@ -31,12 +31,12 @@ class _HasLearned(Protocol):
 
 @dataclass
 class Learning:
-    """Where the pictures of a command start from.
+    """The initial guiding field of the renders of a command.
 
     Attributes:
-        given: What was learned before; None: nothing.
-        follows: Each picture starts from what the one before it has learned.
-        last: What the last picture has learned, or had been given.
+        given: The initial guiding field; None starts without one.
+        follows: Whether each render starts from the result of the previous render.
+        last: Guiding field of the last render, or its initial field.
     """
 
     given: bytes | None = None
@@ -44,25 +44,27 @@ class Learning:
     last: bytes = b""
 
     def take(self, result: _HasLearned) -> None:
-        """Notes what a render has learned."""
+        """Stores the guiding field of a render."""
         self.last = result.learned or self.last
         if self.follows and result.learned:
             self.given = result.learned
 
 
 def check_taught(settings: Settings, option: str) -> None:
-    """Raises WavecombError where a render with such settings learns nothing."""
+    """Raises WavecombError if a render with these settings trains no guiding field."""
     chosen = settings.to_dict()
     if chosen["guiding"] == "off" and chosen["roulette"] != "efficient":
-        raise WavecombError(f"{option}: nothing is learned here; give --guiding auto or on, too")
+        raise WavecombError(
+            f"{option}: this render trains no guiding field; give --guiding auto or on as well"
+        )
 
 
 def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
-    """Writes what a render has learned.
+    """Writes the guiding field of a render.
 
     Raises:
-        OSError: It cannot be written.
-        WavecombError: There is nothing: the render was not guided, or too short to learn.
+        OSError: The file cannot be written.
+        WavecombError: There is no field: the render was not guided, or too short for training.
     """
     if not learned:
         raise WavecombError(
@@ -78,11 +80,11 @@ def save_learned(path: str | os.PathLike[str], learned: bytes) -> None:
 
 
 def load_learned(path: str | os.PathLike[str]) -> bytes:
-    """Reads what ``save_learned`` wrote.
+    """Reads a file of ``save_learned``.
 
     Raises:
-        OSError: It cannot be read.
-        WavecombError: It is none, damaged, or of another format.
+        OSError: The file cannot be read.
+        WavecombError: The file has another kind or format, or is damaged.
     """
     import numpy as np
 
@@ -90,18 +92,18 @@ def load_learned(path: str | os.PathLike[str]) -> bytes:
 
     name = os.fspath(path)
     try:
-        advice = "learn anew, by --learn-to"
+        advice = "create it again with --learn-to"
         _, arrays = read_kind(name, _KIND, _FORMAT, "--learn-to", advice)
         field = arrays.get("field")
         if field is None or field.dtype != np.uint8 or field.ndim != 1:
             raise ArchiveError("it has no field")
     except ArchiveError as error:
-        raise WavecombError(f"{name}: holds nothing learned, or is damaged: {error}") from error
+        raise WavecombError(f"{name}: holds no guiding field, or is damaged: {error}") from error
     return field.tobytes()
 
 
 def learned_of(source: str | os.PathLike[str] | bytes | _HasLearned | None) -> bytes | None:
-    """What is in a file, or what a picture has learned; None of None."""
+    """Returns the guiding field of a file or picture; None for None."""
     if source is None or isinstance(source, bytes):
         return source
     return load_learned(source) if isinstance(source, (str, os.PathLike)) else source.learned

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A render as it goes on, in a notebook: a bar, figures, and the picture so far.
+"""Live view of a render in a notebook: a progress bar, figures, and the current image.
 
-Where the library ipywidgets is there, its widgets; else what IPython itself can show anew.
+Uses ipywidgets if it is installed, otherwise IPython's updatable output.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from wavecomb._core import Snapshot
 
 PICTURE_EDGE = 480
-"""Pixels of the longer edge of the picture so far."""
+"""Longer edge of the live image in pixels."""
 FIRST_S, EVERY_S = 1.0, 2.0
-"""A render that ends within the first shows a bar alone; then a picture so often."""
+"""Delay of the first image and interval of later ones in seconds; short renders show only a bar."""
 BAR_EVERY_S = 0.25
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Who shows a render: for ``Watcher``."""
+    """Progress displays of a render, for ``Watcher``."""
 
     reporter: Silent
     sinks: Sequence[Sink] = ()
@@ -37,11 +37,11 @@ class Shown:
 
 @contextlib.contextmanager
 def watching(asked: bool | None, space: str = "rec709") -> Iterator[Shown | None]:
-    """Shows a render while it is entered; gives None where nobody would see it.
+    """Shows a render inside the block; yields None if there is no display.
 
     Args:
-        asked: True: in a notebook and on a terminal; None: in a notebook; False: nowhere.
-        space: The working space of the picture.
+        asked: True shows it in a notebook or terminal, None only in a notebook, False nowhere.
+        space: Working colour space of the image.
     """
     shown = None
     if asked is not False:
@@ -58,27 +58,27 @@ def watching(asked: bool | None, space: str = "rec709") -> Iterator[Shown | None
 
 
 def in_notebook() -> bool:
-    """Whether this process is a kernel of Jupyter's, whose outputs are a page."""
+    """Returns whether this process is a Jupyter kernel."""
     ipython = sys.modules.get("IPython")
     shell = ipython.get_ipython() if ipython is not None else None
     return getattr(shell, "kernel", None) is not None
 
 
 class View(Protocol):
-    """Where a notebook shows what goes on."""
+    """Interface of a live view in a notebook."""
 
     def bar(self, share: float, text: str) -> None:
-        """How much is done, from 0 to 1, and figures."""
+        """Shows the completed fraction, from 0 to 1, and figures."""
 
     def picture(self, png: bytes) -> None:
-        """The picture so far."""
+        """Shows the current image."""
 
     def close(self) -> None:
-        """Takes all of it away: what was rendered takes its place."""
+        """Removes the view, which the final image replaces."""
 
 
 class Widgets:
-    """Widgets of ipywidgets."""
+    """Live view made of ipywidgets."""
 
     def __init__(self) -> None:
         import ipywidgets
@@ -92,21 +92,21 @@ class Widgets:
         display(self._all)
 
     def bar(self, share: float, text: str) -> None:
-        """As ``View``."""
+        """Shows the completed fraction and figures."""
         self._bar.value, self._text.value = share, text
 
     def picture(self, png: bytes) -> None:
-        """As ``View``."""
+        """Shows the current image."""
         self._image.value = png
         self._image.layout.display = ""
 
     def close(self) -> None:
-        """As ``View``."""
+        """Removes the view."""
         self._all.close()
 
 
 class Plain:
-    """An output of IPython's that is written anew."""
+    """Live view made of IPython's updatable output."""
 
     def __init__(self) -> None:
         from IPython.display import HTML, display
@@ -116,7 +116,7 @@ class Plain:
         self._bar = self._picture = ""
 
     def bar(self, share: float, text: str) -> None:
-        """As ``View``."""
+        """Shows the completed fraction and figures."""
         self._bar = (
             f"<progress max='1' value='{share:.4f}' style='width:20em'></progress> "
             f"{html.escape(text)}"
@@ -124,7 +124,7 @@ class Plain:
         self._show(self._bar + self._picture)
 
     def picture(self, png: bytes) -> None:
-        """As ``View``."""
+        """Shows the current image."""
         from wavecomb.picture.embedded import base64_text
 
         source = f"data:image/png;base64,{base64_text(png)}"
@@ -132,7 +132,7 @@ class Plain:
         self._show(self._bar + self._picture)
 
     def close(self) -> None:
-        """As ``View``."""
+        """Removes the view."""
         self._show("")
 
     def _show(self, markup: str) -> None:
@@ -141,14 +141,14 @@ class Plain:
 
 
 def make_view() -> View:
-    """The best that is there."""
+    """Returns the best view that is available."""
     with contextlib.suppress(ImportError):
         return Widgets()
     return Plain()
 
 
 class LiveProgress(Silent):
-    """The bar: a reporter of ``Watcher``."""
+    """Reporter that shows a progress bar in a live view."""
 
     def __init__(self, view: View) -> None:
         self._view = view
@@ -158,7 +158,7 @@ class LiveProgress(Silent):
         self._view.close()
 
     def show(self, status: Mapping[str, Any]) -> None:
-        """Moves it, a few times a second."""
+        """Updates the bar a few times per second."""
         now = time.monotonic()
         if now < self._next:
             return
@@ -169,7 +169,7 @@ class LiveProgress(Silent):
 
 
 class LivePicture(Sink):
-    """The picture so far: a sink of ``Watcher``."""
+    """Sink that shows the current image in a live view."""
 
     def __init__(self, view: View, working_space: str = "rec709") -> None:
         super().__init__("the picture so far", FIRST_S)
@@ -178,7 +178,7 @@ class LivePicture(Sink):
         self._working = working_space
 
     def write(self, snapshot: Snapshot) -> None:
-        """Shows it; at the end there is the picture itself."""
+        """Shows the image unless the render has finished, since the final image follows."""
         if snapshot.finished:
             return
         from wavecomb.picture.embedded import encoded, smaller

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress on a terminal or for programs, and Ctrl-C that keeps what is done."""
+"""Progress on a terminal or as JSON, and handling of Ctrl-C that keeps finished work."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FORCED = ("FORCE_COLOR", "TTY_COMPATIBLE")
 
 
 def count_text(value: float) -> str:
-    """A count in three digits with a unit.
+    """Formats a count with three digits and a unit.
 
     >>> count_text(1234567), count_text(999), count_text(0.5)
     ('1.23 M', '999', '0.5')
@@ -35,7 +35,7 @@ def count_text(value: float) -> str:
 
 
 def time_text(seconds: float) -> str:
-    """A duration.
+    """Formats a duration.
 
     >>> time_text(0.0123), time_text(59.94), time_text(61), time_text(7322)
     ('0.012 s', '59.9 s', '1 min 01 s', '2 h 02 min')
@@ -51,13 +51,13 @@ def time_text(seconds: float) -> str:
 
 
 def speed(status: Mapping[str, Any]) -> dict[str, Any]:
-    """Samples and rays per second of a run, and the seconds left at that speed.
+    """Returns samples and rays per second of a run, and the remaining time at that speed.
 
     Args:
-        status: The keys of ``Snapshot.status`` in _core.pyi.
+        status: Values of ``Snapshot.status`` in _core.pyi.
 
     Returns:
-        ``samples_per_s``, ``rays_per_s``, ``seconds_left`` (None: not known yet).
+        ``samples_per_s``, ``rays_per_s`` and ``seconds_left`` (None if unknown).
     """
     done, seconds = status["samples_done"], status["seconds"]
     rate = (done - status["resumed_samples"]) / seconds if seconds > 0.0 else 0.0
@@ -69,14 +69,14 @@ def speed(status: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _earlier: list[int] = []
-"""The Ctrl-C that ``keep_interrupts`` saw, if any."""
+"""Signals that ``keep_interrupts`` recorded and no ``Interrupt`` has handled."""
 
 
 def keep_interrupts() -> None:
-    """From now on a Ctrl-C that nobody heeds is heeded by the next ``Interrupt``.
+    """Records Ctrl-C signals, so that the next ``Interrupt`` handles those that were lost.
 
-    ``KeyboardInterrupt`` is lost where it is raised in a callback of a library that prints
-    exceptions and goes on. For programs that such an exception ends: commands, not a window.
+    ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
+    and continues. Use this in commands, which such an exception ends, but not in a window.
     """
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -89,24 +89,24 @@ def keep_interrupts() -> None:
 
 
 def was_interrupted() -> bool:
-    """Whether ``keep_interrupts`` saw a Ctrl-C that no ``Interrupt`` took."""
+    """Returns whether a recorded Ctrl-C has not been handled yet."""
     return bool(_earlier)
 
 
 class Interrupt:
-    """While it is entered, the first Ctrl-C or SIGTERM is only noted; the next acts as always.
+    """Context manager that records the first Ctrl-C or SIGTERM; further ones act as usual.
 
-    Contract: takes the signals on the main thread only; elsewhere it does nothing.
+    Contract: handles signals on the main thread only; on other threads it does nothing.
     """
 
     def __init__(self) -> None:
         self.signal: int | None = None
-        """The number of the one that came."""
+        """Number of the recorded signal."""
         self._before: dict[int, Any] = {}
 
     @property
     def requested(self) -> bool:
-        """Whether somebody wants this to end."""
+        """Whether a stop was requested."""
         return self.signal is not None
 
     def __enter__(self) -> Interrupt:
@@ -136,10 +136,10 @@ class Interrupt:
 
 
 def progress_console(*, quiet: bool = False) -> Console | None:
-    """The terminal to show progress on: standard error, or None where nobody would see it.
+    """Returns the console for progress (standard error), or None if it is not visible.
 
-    Rich decides what a terminal is. It is not loaded where it could only say no: standard error is
-    none, and no variable that Rich goes by claims that it is.
+    Rich decides whether it is a terminal. It is loaded only if standard error is a terminal or an
+    environment variable that Rich respects claims so.
     """
     is_terminal = sys.stderr is not None and sys.stderr.isatty()
     if quiet or not (is_terminal or any(name in os.environ for name in _FORCED)):
@@ -149,26 +149,26 @@ def progress_console(*, quiet: bool = False) -> Console | None:
 
 
 class Silent:
-    """No progress at all."""
+    """Reporter that shows nothing."""
 
     def __enter__(self) -> Silent:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Nothing to tidy."""
+        """Does nothing."""
 
     def show(self, status: Mapping[str, Any]) -> None:
-        """Shows nothing."""
+        """Does nothing."""
 
     def wrote(self, path: str) -> None:
-        """Says nothing."""
+        """Does nothing."""
 
 
 def figures(status: Mapping[str, Any]) -> list[str]:
-    """What is said beside a bar: passes, rates, error, time left.
+    """Returns the figures next to a bar: passes, rates, error, time left.
 
     Args:
-        status: The keys of ``Snapshot.status`` in _core.pyi.
+        status: Values of ``Snapshot.status`` in _core.pyi.
     """
     rates = speed(status)
     said = [
@@ -184,7 +184,7 @@ def figures(status: Mapping[str, Any]) -> list[str]:
 
 
 class ProgressBar(Silent):
-    """A bar with passes, samples and rays per second, error and time left.
+    """Progress bar with passes, samples and rays per second, error and time left.
 
     Use as a context manager.
     """
@@ -227,12 +227,12 @@ class ProgressBar(Silent):
 
 
 LoadProgress = Callable[[int, int], None]
-"""Called as progress(prims read, prims found so far)."""
+"""Progress callback: progress(prims read, prims found so far)."""
 
 
 @contextlib.contextmanager
 def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
-    """A bar while a stage is read; it pulses until the first call, so small stages show no more."""
+    """Shows a progress bar while a stage is read; it pulses until the first callback."""
     from rich.progress import BarColumn, Progress, TextColumn
 
     bar = Progress(
@@ -255,7 +255,7 @@ def loading_bar(console: Console, title: str) -> Iterator[LoadProgress]:
 
 
 class ProgressLines(Silent):
-    """A line of JSON about once a second, and for each file: for programs that wrap this one."""
+    """Reporter that writes JSON lines about once per second and per file, for wrapper programs."""
 
     def __init__(self, write: Callable[[str], None], *, every: float = 1.0) -> None:
         self._write = write
@@ -263,7 +263,7 @@ class ProgressLines(Silent):
         self._next = 0.0
 
     def show(self, status: Mapping[str, Any]) -> None:
-        """A line {"event": "progress", ...}, if it is time for one."""
+        """Writes {"event": "progress", ...} if the interval has passed."""
         is_done = status["samples_done"] >= status["samples_total"]
         if time.monotonic() < self._next and not is_done:
             return
@@ -271,9 +271,9 @@ class ProgressLines(Silent):
         self.event("progress", **status, **speed(status))
 
     def wrote(self, path: str) -> None:
-        """A line {"event": "wrote", "file": path}."""
+        """Writes {"event": "wrote", "file": path}."""
         self.event("wrote", file=path)
 
     def event(self, name: str, **values: Any) -> None:
-        """A line of any kind."""
+        """Writes a line with any event."""
         self._write(json.dumps({"event": name, **values}))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of one stage, which stays open between them."""
+"""Renders frames of a stage that stays open between frames."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ if TYPE_CHECKING:
 
 
 class Frames:
-    """Reads and renders frames of a stage; each is, bit for bit, what it is alone.
+    """Frames of an open stage; each image is bit-identical to that of a separate render.
 
-    Where only views change, the scene and its hierarchy stay and the camera is read. Else the stage
-    is walked again; meshes that do not change, and textures, are those of the frame before.
+    If only views change, keeps the scene with its acceleration structures and reads the camera.
+    Otherwise traverses the stage again, but reuses unchanged meshes and textures of the previous
+    frame.
 
-    Contract: files of the stage must not change meanwhile, but for images.
+    Contract: files of the stage must not change, except images.
     """
 
     def __init__(
@@ -45,11 +46,11 @@ class Frames:
 
         Args:
             path: .usd, .usda, .usdc or .usdz.
-            options: How it is read.
-            **changes: Fields of ``LoadOptions``, in place of those of ``options``.
+            options: Load options.
+            **changes: Fields of ``LoadOptions`` that replace those of ``options``.
 
         Raises:
-            WavecombError: It cannot be opened.
+            WavecombError: The stage cannot be opened.
         """
         self._path = Path(path)
         self._options = LoadOptions.of(options, changes)
@@ -64,24 +65,25 @@ class Frames:
         self._opening_s = time.perf_counter() - started
 
     def load(self, frame: float | None, *, progress: Any = None, **changes: Any) -> LoadedStage:
-        """The stage at a frame; None: its start, else default values.
+        """Loads the stage at a frame.
 
         Args:
-            frame: Time code.
-            progress: As of ``wavecomb.load``.
-            **changes: Fields of ``LoadOptions``, in place of those that were given at first.
+            frame: Time code; None means the stage's start, else default values.
+            progress: Progress callback as in ``wavecomb.load``.
+            **changes: Fields of ``LoadOptions`` that replace the initial options.
 
         Raises:
-            WavecombError: It cannot be rendered.
+            WavecombError: The stage cannot be rendered.
         """
         started = time.perf_counter()
         options = LoadOptions.of(self._options, {**changes, "frame": frame})
-        # Another render of a stage with catchers sees other prims.
+        # Different renders of a stage with catchers see different prims.
         is_same = self._renderer is not None and options.catch == self._caught
         self._caught = options.catch
         loaded = self._seen_anew(options) if is_same else None
         if loaded is None:
-            # Let go of first: two hierarchies at a time would be twice the memory.
+            # Release these first, since two sets of acceleration structures would double the
+            # memory.
             self._renderer, self._loaded = None, None
             loaded = self._reader.read(options, progress=progress)
         seconds = time.perf_counter() - started + self._opening_s
@@ -90,7 +92,10 @@ class Frames:
         return self._loaded
 
     def _seen_anew(self, options: LoadOptions) -> LoadedStage | None:
-        """The scene that is there with its camera at a frame; None where more may be other."""
+        """Returns the current scene with its camera at a frame.
+
+        Returns None if more than the camera changes.
+        """
         before, renderer = self._loaded, self._renderer
         assert before is not None and renderer is not None
         seen = self._reader.look(options)
@@ -113,7 +118,7 @@ class Frames:
         state: Any = None,
         learned: bytes | None = None,
     ) -> Result:
-        """Renders what was loaded last; the arguments are those of ``_core.render``."""
+        """Renders the loaded frame; the arguments are the same as for ``_core.render``."""
         assert self._loaded is not None
         self._is_built = self._renderer is None
         if self._renderer is None:
@@ -123,7 +128,7 @@ class Frames:
         )
 
     def stats(self, result: Result, **options: Any) -> dict[str, Any]:
-        """``make_stats`` of what was rendered last; options: further ones of it."""
+        """Returns ``make_stats`` of the last render; ``options`` are its further arguments."""
         options |= {"loaded": self._loaded, "is_built": self._is_built}
         return make_stats(result, stage=os.fspath(self._path), **options)
 
@@ -141,30 +146,30 @@ def render_frames(
     isolate: bool | None = None,
     **options: Any,
 ) -> Iterator[tuple[float, Picture]]:
-    """Renders frames of a stage one after another, and shares between them what does not change.
+    """Renders frames of a stage one after another and shares unchanged data between them.
 
-    Each picture is, bit for bit, what ``render(path, frame=...)`` gives.
+    Each image is bit-identical to that of ``render(path, frame=...)``.
 
     Args:
         path: .usd, .usda, .usdc or .usdz.
         frames: "1-48", "1-48x2", "1,5,9", or numbers.
-        size: As in ``render``, like spp, progress, policy, costs and aovs.
-        spp: Likewise.
-        progress: As in ``render``, for each frame.
-        policy: Likewise.
-        costs: Likewise; every frame starts from the same.
-        aovs: Likewise.
+        size: Width and height in pixels, as in ``render``.
+        spp: Samples per pixel, as in ``render``.
+        progress: Progress callback of each frame, as in ``render``.
+        policy: Scheduling policy, as in ``render``.
+        costs: Cost profile, as in ``render``; every frame starts from the same profile.
+        aovs: AOVs, as in ``render``.
         isolate: Deprecated and without effect, as in ``load``.
-        **options: Fields of ``LoadOptions`` but the frame, and of ``wavecomb.Settings``.
+        **options: Fields of ``LoadOptions`` except the frame, and of ``wavecomb.Settings``.
 
     Returns:
-        An iterator of (frame, picture); each is rendered when it is asked for.
+        An iterator of (frame, picture); each frame is rendered when the iterator advances.
 
     >>> for frame, picture in wavecomb.render_frames("shot.usd", "1-48"):  # doctest: +SKIP
     ...     picture.save(f"shot.{int(frame):04d}.exr")
 
     Raises:
-        WavecombError: Frames, options or the stage are no good.
+        WavecombError: Frames, options or the stage are invalid.
     """
     from wavecomb.api import warn_deprecated
 

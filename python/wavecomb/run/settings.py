@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a render is asked for, checked: settings, policy, costs, AOVs, memory."""
+"""Validates settings, scheduling policy, costs, AOVs and memory of a render."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 DEFAULT_SIZE = (600, 600)
 MAX_EDGE = 65536
 MAX_SPP = 1 << 24
-# Of an adaptive render: sums and layers of errors, and what measuring them takes.
+# Adaptive renders: sums and layers of errors, and buffers to estimate them.
 _ERROR_BYTES_PER_PIXEL = 100
-# Of a reweighted one: its cascades, and the unbiased layer.
+# Firefly reweighting: its cascades and the unbiased layer.
 _CASCADE_BYTES_PER_PIXEL = 96 + 12
-# Of sums of splats, for the beauty and each layer that has some.
+# Light splats: sums for the beauty and for each layer that receives splats.
 _SPLAT_BYTES_PER_PIXEL = 48
-# Of what light paths are merged with: its row, and its places in the grid.
+# Merging of light paths: the visible point and its entries in the grid.
 _VISIBLE_BYTES_PER_PIXEL = 64 + 48
-# Of a deep one, at most: sums in the film, and samples in the picture.
+# Upper bound of deep images: sums in the film and samples in the image.
 _DEEP_BYTES_PER_PIXEL = 1 + 4
 _DEEP_BYTES_PER_SAMPLE = 40 + 24
 
@@ -37,7 +37,10 @@ def prepare(
     aovs: Iterable[str] | None,
     settings: dict[str, Any],
 ) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
-    """Checked arguments of ``render``: a policy of the caller's, a profile, AOVs, settings."""
+    """Validates arguments of ``render``.
+
+    Returns a custom policy, cost profile, AOVs and settings.
+    """
     own: Any = None
     if isinstance(policy, str):
         settings["policy"] = policy
@@ -59,15 +62,15 @@ def prepare(
 
 
 def check_options(size: tuple[int, int] | None, spp: int, settings: Mapping[str, Any]) -> None:
-    """Raises an error for settings that are wrong whatever the stage asks for.
+    """Raises an error for settings that are invalid for every stage.
 
-    To be called before a stage is opened. Regions, and memory, are checked by ``make_settings``
-    when the size is known for certain.
+    Call this before a stage is opened. ``make_settings`` checks regions and memory once the image
+    size is known.
 
     Args:
-        size: Width and height; None: the stage says.
+        size: Width and height; None if the stage defines them.
         spp: Samples per pixel.
-        settings: Others.
+        settings: Further settings.
     """
     known = {name: value for name, value in settings.items() if name not in ("region", "crop")}
     make_settings(size or DEFAULT_SIZE, spp, fits=lambda chosen, aovs: None, **known)
@@ -81,12 +84,10 @@ def make_settings(
     fits: Callable[[Settings, Sequence[str]], Any] | None = None,
     **settings: Any,
 ) -> Settings:
-    """Checked settings; raises WavecombError or _core.Error in one line. aovs: as expanded.
+    """Returns validated settings; raises WavecombError or _core.Error with a one-line message.
 
-    ``size`` is that of the picture without the overscan that settings may ask for.
-
-    Checks what the core cannot know: whether the picture fits in the memory of this machine, by
-    ``check_memory`` unless ``fits`` is given.
+    ``size`` is the image size without overscan, and ``aovs`` are expanded. Also checks that the
+    image fits into this machine's memory, by ``check_memory`` unless ``fits`` is given.
     """
     from wavecomb import _core
     from wavecomb.errors import WavecombError
@@ -111,12 +112,12 @@ def make_settings(
 
 
 def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> None:
-    """Raises WavecombError unless the film and the picture fit in the memory of this machine.
+    """Raises WavecombError unless film and image fit into the memory of this machine.
 
     Args:
-        settings: Of the render.
-        aovs: As expanded.
-        light_groups: Of the scene; to be checked again once that is known.
+        settings: Settings of the render.
+        aovs: Expanded AOVs.
+        light_groups: Number of light groups of the scene; repeat the check once it is known.
     """
     from wavecomb.errors import WavecombError
 
@@ -129,14 +130,15 @@ def check_memory(settings: Settings, aovs: Sequence[str], light_groups: int = 1)
 
 
 def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) -> int:
-    """Memory of film and picture; the arguments are those of ``check_memory``."""
+    """Returns the bytes of film and image; the arguments are the same as for ``check_memory``."""
     others = [name for name in aovs if name not in aov_names.ERRORS]
     each = aov_names.bytes_per_pixel(others, light_groups)
     each += _ERROR_BYTES_PER_PIXEL * keeps_error(settings)
     each += _CASCADE_BYTES_PER_PIXEL * (settings.firefly != "keep")
     if settings.transport != "path":
         sums = 1 + keeps_error(settings) + aov_names.splat_layers(aovs, light_groups)
-        each += _SPLAT_BYTES_PER_PIXEL * sums + 4  # and the samples of a light path
+        # Each pixel also stores the samples of its light path.
+        each += _SPLAT_BYTES_PER_PIXEL * sums + 4
         each += _VISIBLE_BYTES_PER_PIXEL * (settings.merge_radius > 0)
     if aov_names.DEEP in settings.aovs:
         each += _DEEP_BYTES_PER_PIXEL + _DEEP_BYTES_PER_SAMPLE * settings.deep_samples
@@ -145,7 +147,7 @@ def picture_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1
 
 
 def picture_size(settings: Settings) -> tuple[int, int]:
-    """Width and height of the picture, which may be cropped."""
+    """Returns width and height of the image, which may be cropped."""
     if not settings.crop or settings.region is None:
         return settings.width, settings.height
     x0, y0, x1, y1 = settings.region
@@ -153,7 +155,7 @@ def picture_size(settings: Settings) -> tuple[int, int]:
 
 
 def keeps_error(settings: Settings) -> bool:
-    """Whether a render with these settings has the layers error and variance."""
+    """Returns whether a render with these settings has the layers error and variance."""
     return bool(
         settings.adaptive or settings.noise or settings.error or settings.allocate != "even"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The statistics of a render: docs/statistics.md has the schema."""
+"""Statistics of a render; docs/statistics.md has the schema."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PHASES = (
     "metrics",
 )
 SORTING = ("keys", "sort", "materialize")
-"""Phases that are paid for an order of shading."""
+"""Phases that exist only to sort records before shading."""
 COUNTS = ("samples", "rays", "shadow_rays", "records")
 DEPTHS = ("rays", "shadow_rays", "records", "paths_ended")
 MEMORY = ("accelerator", "meshes", "textures", "records", "waves", "film", "picture")
@@ -49,13 +49,13 @@ def make_stats(
     resumed_s: float = 0.0,
     is_built: bool = True,
 ) -> dict[str, Any]:
-    """The statistics of a result, with what the core does not know: stage, load time, machine.
+    """Returns the statistics of a result, including stage, load time and machine.
 
-    ``resumed_s`` is what was spent on rendering before this run took over; without ``is_built`` the
-    hierarchy was there, and building it took no time.
+    ``resumed_s`` is the render time before this run continued from a checkpoint. Without
+    ``is_built`` the acceleration structures already existed, so that their build time is 0.
 
-    Every key of the schema is there; a figure that the core did not give is 0. What the core gives
-    beyond the schema is passed on.
+    Every key of the schema exists; figures that the core does not provide are 0. Additional values
+    of the core are included.
     """
     core = dict(result.stats)
     seconds = dict(core.pop("seconds", {}))
@@ -129,7 +129,7 @@ def make_stats(
 
 
 def rendered_pixels(settings: Mapping[str, Any]) -> int:
-    """Pixels that a render with these settings has samples for."""
+    """Returns the number of pixels for which a render with these settings has samples."""
     if settings.get("region") is None:
         return int(settings["width"] * settings["height"])
     x0, y0, x1, y1 = settings["region"]
@@ -137,9 +137,10 @@ def rendered_pixels(settings: Mapping[str, Any]) -> int:
 
 
 def sort_overhead(phases: Mapping[str, float]) -> float:
-    """The share of ordered shading that went into the order.
+    """Returns the fraction of ordered shading time that was spent on sorting.
 
-    (keys + sort + materialize) / (keys + sort + materialize + shade); 0 where nothing was shaded.
+    This is (keys + sort + materialize) / (keys + sort + materialize + shade); 0 if nothing was
+    shaded.
 
     >>> sort_overhead({"keys": 1.0, "sort": 2.0, "materialize": 0.0, "shade": 27.0})
     0.1
@@ -150,7 +151,7 @@ def sort_overhead(phases: Mapping[str, float]) -> float:
 
 
 def machine() -> dict[str, Any]:
-    """What the figures were made on; nothing that names the machine or its user."""
+    """Returns a description of the machine that identifies neither it nor its user."""
     return {
         "cpu": _cpu_name(),
         "cores": usable_cores(),
@@ -162,14 +163,14 @@ def machine() -> dict[str, Any]:
 
 
 def write_stats(path: str | os.PathLike[str], stats: Mapping[str, Any]) -> None:
-    """Writes statistics as JSON, whole or not at all; NaN and infinities become null."""
+    """Writes statistics as JSON atomically; NaN and infinities become null."""
     text = json.dumps(plain(stats), indent=2, allow_nan=False) + "\n"
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
 def picture_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
-    """What of the statistics goes into the header of a picture."""
+    """Returns the statistics that are stored in the header of an image."""
     number = stats["version"] if "version" in stats else version()
     metadata: dict[str, Any] = {"Software": f"Wavecomb {number}"}
     if stats.get("stage"):
@@ -180,14 +181,15 @@ def picture_metadata(stats: Mapping[str, Any]) -> dict[str, Any]:
     if stats.get("settings"):
         metadata["wavecomb:settings"] = json.dumps(plain(stats["settings"]), sort_keys=True)
     if "seconds" in stats:
-        seconds = stats["seconds"]  # in all runs of a render that was resumed
+        # This is the time of all runs of a resumed render.
+        seconds = stats["seconds"]
         rendered = seconds.get("render", 0.0) + seconds.get("resumed", 0.0)
         metadata["wavecomb:render_seconds"] = float(rendered)
     return metadata
 
 
 def plain(value: Any) -> Any:
-    """Only what JSON has."""
+    """Converts a value to types that JSON supports."""
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What happens while a render goes on: progress, checkpoints, previews, the wish to stop."""
+"""Callbacks during a render: progress, checkpoints, previews, stop requests."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from wavecomb.picture.image import Transfer
 
 Status = Mapping[str, Any]
-"""Where a render stands; the keys of ``Snapshot.status`` in _core.pyi."""
+"""State of a render; the keys are those of ``Snapshot.status`` in _core.pyi."""
 
 
 class Sink:
-    """Something that is made of a render every so many seconds, and at its end.
+    """Base of outputs that are written at intervals and at the end of a render.
 
-    A failure to write is no reason to lose the render: it is reported, and tried again.
+    An error while writing does not stop the render; it is reported, and writing is tried again.
     """
 
     def __init__(self, path: str | os.PathLike[str], every: float) -> None:
@@ -29,11 +29,11 @@ class Sink:
         self._next = time.monotonic() + every
 
     def is_due(self) -> bool:
-        """Whether its time has come."""
+        """Returns whether the interval has passed."""
         return time.monotonic() >= self._next
 
     def take(self, snapshot: Snapshot) -> str | None:
-        """Writes the file. Returns a warning where that fails."""
+        """Writes the file; returns a warning if that fails."""
         self._next = time.monotonic() + self.every
         try:
             self.write(snapshot)
@@ -48,7 +48,7 @@ class Sink:
 
 
 class CheckpointSink(Sink):
-    """Saves a checkpoint; ``seconds`` were rendered before this run."""
+    """Sink that saves checkpoints; ``seconds`` is the render time of earlier runs."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class CheckpointSink(Sink):
         self._seconds = seconds
 
     def write(self, snapshot: Snapshot) -> None:
-        """All that the render holds."""
+        """Writes the complete state of the render."""
         from wavecomb.run.checkpoint import save_checkpoint
 
         seconds = self._seconds + snapshot.status["seconds"]
@@ -70,7 +70,7 @@ class CheckpointSink(Sink):
 
 
 class PreviewSink(Sink):
-    """Saves the picture as it is, for display."""
+    """Sink that saves the current image for display."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class PreviewSink(Sink):
         self._working = working_space
 
     def write(self, snapshot: Snapshot) -> None:
-        """The beauty as a PNG."""
+        """Writes the beauty as PNG."""
         from wavecomb.picture.image import write_png
         from wavecomb.picture.working_space import to_rec709
 
@@ -96,23 +96,23 @@ class PreviewSink(Sink):
 
 
 class Reporter(Protocol):
-    """Shows how far a render is."""
+    """Interface that shows the progress of a render."""
 
     def show(self, status: Status) -> None:
-        """Called some ten times a second."""
+        """Shows the progress; called about ten times per second."""
 
     def wrote(self, path: str) -> None:
-        """A checkpoint or a preview was written."""
+        """Reports that a checkpoint or preview was written."""
 
 
 class Watcher:
-    """What ``_core.render`` asks while it works, and gives its snapshots to.
+    """Callbacks that ``_core.render`` calls during a render.
 
     Args:
-        sinks: Asked when they are due; each gets the last snapshot, too.
+        sinks: Outputs that receive snapshots when they are due, and the last snapshot.
         reporter: Shows progress.
-        is_stopped: Whether somebody wants the render to end.
-        warn: Gets each warning once.
+        is_stopped: Returns whether a stop was requested.
+        warn: Receives each warning once.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Watcher:
         self._warned: set[str] = set()
 
     def progress(self, status: Status) -> str | None:
-        """Asks for a stop or a snapshot, or for nothing."""
+        """Returns "stop", "snapshot" or None for the render to continue."""
         if self._reporter is not None:
             self._reporter.show(status)
         if self._is_stopped():
@@ -138,12 +138,13 @@ class Watcher:
         return "snapshot" if any(sink.is_due() for sink in self._sinks) else None
 
     def snapshot(self, snapshot: Snapshot) -> None:
-        """Gives a render that stands still to whoever waits for it."""
+        """Passes a snapshot of the paused render to all sinks that are due."""
         for sink in self._sinks:
             if not (snapshot.finished or sink.is_due()):
                 continue
             if not snapshot.status["samples_done"]:
-                continue  # stopped before there was anything
+                # The render was stopped before it had any sample.
+                continue
             warning = sink.take(snapshot)
             if warning is None:
                 if self._reporter is not None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Procedural USD stages: test scenes of our own that need no download.
+"""Procedural USD stages, for tests and examples that need no download.
 
-``write_scene("mixed", Path("mixed.usdc"))`` writes a stage, and textures beside it.
+``write_scene("mixed", Path("mixed.usdc"))`` writes a stage, with its textures beside it.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ __all__ = ["SCENES", "SceneError", "SceneInfo", "SceneOptions", "write_scene"]
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """A scene that can be written.
+    """A scene that ``write_scene`` can write.
 
     Attributes:
-        summary: One line for a list.
-        metres_per_unit: Length of a scene unit.
-        build: Fills a stage.
+        summary: Description in one line, for a list.
+        metres_per_unit: Length of a scene unit, in metres.
+        build: Function that fills a stage.
     """
 
     summary: str
@@ -62,15 +62,15 @@ SCENES: dict[str, SceneInfo] = {
     "heavy": SceneInfo("the field with layered MaterialX materials", 0.1, build_heavy),
     "studio": SceneInfo("90 objects, a key, a fill and a dim dome", 0.1, build_studio),
     "room": SceneInfo("a dining room, lit through a door ajar", 1.0, build_room),
-    "kitchen": SceneInfo("a kitchen where nearly all is glossy", 1.0, build_kitchen),
-    "smoke": SceneInfo("smoke over an ember, a grid: see --voxels", 1.0, build_smoke),
-    "clouds": SceneInfo("clouds over the sea, a grid: see --voxels", 100.0, build_clouds),
-    "fog": SceneInfo("a street lamp in even fog", 1.0, build_fog),
-    "candles": SceneInfo("wax and marble, below whose surfaces light walks", 0.01, build_candles),
-    "drinks": SceneInfo("glasses of what absorbs and scatters", 0.01, build_drinks),
-    "caustics": SceneInfo("a glass ball and a gold ring before a small lamp", 0.1, build_caustics),
+    "kitchen": SceneInfo("a kitchen with mostly glossy materials", 1.0, build_kitchen),
+    "smoke": SceneInfo("a grid of smoke over an ember: see --voxels", 1.0, build_smoke),
+    "clouds": SceneInfo("a grid of clouds over the sea: see --voxels", 100.0, build_clouds),
+    "fog": SceneInfo("a street lamp in homogeneous fog", 1.0, build_fog),
+    "candles": SceneInfo("wax and marble with subsurface scattering", 0.01, build_candles),
+    "drinks": SceneInfo("glasses of absorbing and scattering drinks", 0.01, build_drinks),
+    "caustics": SceneInfo("a glass ball and a gold ring under a small light", 0.1, build_caustics),
     "pool": SceneInfo("waves on a pool under the sun", 1.0, build_pool),
-    "lens": SceneInfo("a lens that shows a small lamp on a wall", 0.1, build_lens),
+    "lens": SceneInfo("a lens that images a small light on a wall", 0.1, build_lens),
     "prism": SceneInfo("a prism in the sun beside a matt wall", 0.1, build_prism),
     "landscape": SceneInfo("a glass ring in wide hills in the sun", 1.0, build_landscape),
     "fur": SceneInfo("a striped, furry egg: see --strands", 0.1, build_fur),
@@ -78,20 +78,20 @@ SCENES: dict[str, SceneInfo] = {
     "splats": SceneInfo("a dragon of Gaussian splats: see --splats", 0.1, build_splats),
     "lights": SceneInfo("a street at night with 1000 lights: see --lights", 1.0, build_lights),
 }
-"""Every scene by name."""
+"""All scenes by name."""
 
 
 def write_scene(name: str, path: Path, **options: Any) -> None:
-    """Writes a procedural stage; textures and grids go to folders ``<stem>_...`` beside it.
+    """Writes a procedural stage, with textures and volumes in folders ``<stem>_...`` beside it.
 
     Args:
         name: A key of ``SCENES``.
-        path: File to write, by its ending .usda (text), .usdc or .usd (binary).
+        path: File to write: .usda (text), .usdc or .usd (binary).
         **options: Fields of ``SceneOptions``.
 
     Raises:
-        SceneError: The name, the file's ending, an option or an imported mesh is no good, or a
-            file cannot be written. It is a ValueError, too.
+        SceneError: The name, the file's ending, an option or an imported mesh is invalid, or a file
+            cannot be written. SceneError is also a ValueError.
     """
     if name not in SCENES:
         raise SceneError(f"no scene {name!r}; there are {', '.join(SCENES)}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Three burning candles and a marble ball on a table: light walks below all of their surfaces."""
+"""Three burning candles and a marble ball on a table, for subsurface scattering."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _CANDLES = (
     ("Middle", (1.2, 0.0, -2.6), 3.1, 10.5),
     ("Low", (4.4, 0.0, 2.6), 3.4, 5.6),
 )
-"""Names, places, radii and heights in centimetres."""
+"""Name, position, radius and height of each candle, in centimetres."""
 
 
 def below_surface(
     writer: StageWriter, name: str, colour: Colour, radius: Colour, **inputs: float
 ) -> str:
-    """An OpenPBR surface below which light walks.
+    """Adds an OpenPBR material with subsurface scattering and returns its name.
 
     Args:
-        writer: Of the stage.
-        name: Of the material.
-        colour: Of a flat wall of it.
-        radius: Mean free paths by channel, in units of the stage.
-        **inputs: Numbers of the shader.
+        writer: Writer of the stage.
+        name: Name of the material.
+        colour: Diffuse reflectance of a flat surface of the material.
+        radius: Mean free path of each colour channel, in scene units.
+        **inputs: Further inputs of the OpenPBR surface.
     """
     net = Network(writer.stage, f"/World/Looks/{name}")
     longest = max(radius)
@@ -49,7 +49,7 @@ def below_surface(
 
 def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radius: float,
             height: float, columns: int) -> None:  # fmt: skip
-    """Wax with a rim about a shallow pool, a wick, and a flame that is a lamp, too."""
+    """Adds wax with a rim around a shallow pool, a wick, and a flame that is also a light."""
     rim = 0.12 * radius
     profile = np.array([
         (0.0, 0.0), (0.97 * radius, 0.0), (radius, 0.03 * radius), (radius, height - rim),
@@ -71,7 +71,7 @@ def _candle(writer: StageWriter, name: str, at: tuple[float, float, float], radi
 
 
 def build_candles(writer: StageWriter, options: SceneOptions) -> None:
-    """The table, the candles and the ball, in a dim room."""
+    """Builds the table, the candles and the ball, in a dim room."""
     writer.material("Table", looks.plastic((0.17, 0.08, 0.045), 0.3))
     writer.material("Wick", looks.diffuse((0.03, 0.025, 0.02)))
     writer.material("Flame", looks.emissive(_FLAME))

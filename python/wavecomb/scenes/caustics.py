@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A glass ball and a gold ring under a small lamp, on a matt floor.
+"""Scenes with caustics, such as a glass ball and a gold ring under a small light.
 
-Paths from the camera hardly find the light that comes by way of them.
+Paths from the camera rarely find the light that these objects focus.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _HALF = 6.0
 
 
 def ball(radius: float, level: int) -> Mesh:
-    """A sphere about the origin, of 4 ``level`` cells from pole to pole."""
+    """Makes a sphere about the origin, with ``4 * level`` cells from pole to pole."""
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 4 * level + 1)
     profile = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
     profile[[0, -1], 0] = 0.0
@@ -30,7 +30,7 @@ def ball(radius: float, level: int) -> Mesh:
 
 
 def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
-    """A finger ring on y = 0: an ellipse, ``thickness`` wide, turned about y at ``radius``."""
+    """Makes a finger ring on y = 0: an ellipse ``thickness`` wide, revolved about y."""
     across, around = 2 * level, 8 * level
     a = np.linspace(0.0, 2.0 * np.pi, across + 1)
     b = np.linspace(0.0, 2.0 * np.pi, around + 1)
@@ -43,7 +43,7 @@ def ring(radius: float, thickness: float, height: float, level: int) -> Mesh:
 
 
 def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
-    """Floor and wall, ball and ring, and the lamp."""
+    """Builds a floor and a wall, a ball and a ring, and a small light."""
     writer.material("Floor", looks.diffuse((0.62, 0.60, 0.57)))
     writer.material("Wall", looks.diffuse((0.35, 0.42, 0.50)))
     h = _HALF
@@ -62,17 +62,19 @@ def build_caustics(writer: StageWriter, options: SceneOptions) -> None:
     writer.camera((0.0, 4.2, 6.4), (0.0, 0.35, 0.1), 40.0, options.aspect or 1.0)
 
 
-# ---- Light through clear things: waves on a pool, a lens, a prism, a ring in a wide landscape ----
+# ---- Caustics through glass and water: waves on a pool, a lens, a prism, a ring in a landscape
+# ----
 
 
 _SUN_ANGLE = 0.53
 _WATER_IOR = 1.333
 
 _POOL = (3.0, 2.0)
-"""Half of its length along x and z, metres; it is ``_DEPTH`` deep, with its water at y = 0."""
+"""Half extent of the pool along x and z, in metres. The pool is ``_DEPTH`` deep, with water at y =
+0."""
 _DEPTH, _RIM = 1.3, 0.12
 _WAVES = (
-    # direction in degrees, length and height in metres, phase
+    # direction in degrees, wavelength and height in metres, phase
     (20.0, 1.30, 0.020, 0.4),
     (75.0, 0.85, 0.012, 1.9),
     (-35.0, 0.62, 0.008, 3.1),
@@ -80,16 +82,16 @@ _WAVES = (
 )
 
 LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
-"""Of the thin lens, and half its width: the lamp stands at twice its focus, and its picture is as
-far on the other side, as large as it is."""
+"""Focal length and half width of the lens, in scene units. The light is at twice the focal length,
+so its image is equally far on the other side, and of equal size."""
 
 _LAND = 100.0
-"""Half of the landscape's length along x and z; the ring in it is one wide."""
+"""Half extent of the landscape along x and z. The ring in it has radius 1."""
 _HILL = 6.0
 
 
 def land(cells: int) -> Mesh:
-    """Hills, flat around the middle, of ``cells`` cells along each side."""
+    """Makes hills that are flat in the middle, with ``cells`` cells along each side."""
     x, z = np.meshgrid(*[np.linspace(-_LAND, _LAND, cells + 1)] * 2)
     far = np.clip(np.hypot(x, z) / (0.3 * _LAND) - 0.3, 0.0, 1.0)
     waves = 1.0 + np.sin(0.11 * x + 0.7) * np.cos(0.083 * z - 0.4)
@@ -99,9 +101,9 @@ def land(cells: int) -> Mesh:
 
 
 def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
-    """Wide hills in the sun, and a glass ring on the ground, which the camera is close to.
+    """Builds wide hills in the sun, and a glass ring on the ground near the camera.
 
-    Nearly all light of the sun comes down where the camera does not look.
+    Nearly all light of the sun falls outside of the camera's view.
     """
     writer.material("Soil", looks.diffuse((0.45, 0.40, 0.33)))
     writer.material("Glass", looks.CLEAR_GLASS)
@@ -116,7 +118,7 @@ def build_landscape(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def water(level: int) -> Mesh:
-    """Waves over the pool, of ``level`` cells for each metre, with the normals of their formula."""
+    """Makes the water surface, with ``level`` cells per metre and analytic normals of the waves."""
     x0, z0 = _POOL
     columns, rows = 2 * round(x0 * level) + 1, 2 * round(z0 * level) + 1
     x, z = np.meshgrid(np.linspace(-x0, x0, columns), np.linspace(-z0, z0, rows))
@@ -133,7 +135,7 @@ def water(level: int) -> Mesh:
 
 
 def _basin() -> tuple[FloatArray, list[list[int]]]:
-    """Floor and walls, seen from within, and the rim around."""
+    """Returns points and faces of the pool's floor and walls, facing inwards, and of its rim."""
     (x, z), low, high, out = _POOL, -_DEPTH, _RIM, 0.6
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     points = [(sx * x, low, sz * z) for sx, sz in corners]
@@ -149,9 +151,11 @@ def _basin() -> tuple[FloatArray, list[list[int]]]:
 
 
 def build_pool(writer: StageWriter, options: SceneOptions) -> None:
-    """A pool with waves, and the sun, seen from under the water.
+    """Builds a pool with waves in the sun, seen from under water.
 
-    From above the light on the floor would come by way of the water twice, which no path finds.
+    Seen from above, light on the floor would refract at the water twice, once on its way from the
+    sun and once towards the camera. Neither camera paths nor light paths can sample such a
+    connection.
     """
     writer.material("Stone", looks.diffuse((0.55, 0.53, 0.50)))
     writer.material("Tiles", looks.diffuse((0.35, 0.62, 0.68)))
@@ -166,9 +170,9 @@ def build_pool(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def lens(level: int) -> Mesh:
-    """A lens about the origin whose axis is x: two caps of spheres of radius ``LENS_FOCUS``.
+    """Makes a lens about the origin with axis x, from two caps of spheres of radius ``LENS_FOCUS``.
 
-    With an index of 1.5 that is its focal length, too: 1 / f = (n - 1) 2 / r.
+    With an index of refraction of 1.5, the radius is also the focal length: 1 / f = (n - 1) 2 / r.
     """
     r, a = LENS_FOCUS, _LENS_RADIUS
     rings, columns = 2 * level, 8 * level
@@ -190,7 +194,7 @@ def lens(level: int) -> Mesh:
 
 
 def build_lens(writer: StageWriter, options: SceneOptions) -> None:
-    """A lens between a small lamp and a wall, in a stop; a floor."""
+    """Builds a lens between a small light and a wall, and a floor."""
     writer.material("Matt", looks.diffuse((0.6, 0.6, 0.6)))
     writer.material("Dark", looks.diffuse((0.04, 0.04, 0.04)))
     writer.material("Glass", looks.CLEAR_GLASS)
@@ -206,7 +210,7 @@ def build_lens(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def build_prism(writer: StageWriter, options: SceneOptions) -> None:
-    """An upright prism on a floor, a wall behind it, and the sun."""
+    """Builds an upright prism on a floor, a wall behind it, and the sun."""
     writer.material("Matt", looks.diffuse((0.6, 0.58, 0.55)))
     writer.material("Glass", looks.CLEAR_GLASS)
     h = 6.0

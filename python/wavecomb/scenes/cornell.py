@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Cornell box, from the measured data of the original, and one with a dragon in it.
+"""The Cornell box from the measured data of the original, and a variant with a dragon.
 
 Source: Cornell University Program of Computer Graphics, "The Cornell Box", 1998 (geometry in
-millimetres, camera at (278, 273, -800), lens 35 mm over a film of 25 mm); colours are the usual
+millimetres, camera at (278, 273, -800), lens 35 mm over a film of 25 mm). Colours are the usual
 conversions of the measured spectra to linear RGB.
 """
 
@@ -22,7 +22,7 @@ _RED = looks.diffuse((0.63, 0.065, 0.05))
 _GREEN = looks.diffuse((0.14, 0.45, 0.091))
 _RADIANCE = (17.0, 12.0, 4.0)
 _LIGHT_GAP = 0.5
-"""The light hangs this far under the ceiling (the original ceiling has a hole for it), mm."""
+"""Distance of the light from the ceiling, in mm. The original ceiling has a hole for the light."""
 
 _QUADS: dict[str, tuple[str, list[list[float]]]] = {
     "Floor": ("White", [[552.8, 0, 0], [0, 0, 0], [0, 0, 559.2], [549.6, 0, 559.2]]),
@@ -41,7 +41,7 @@ _BLOCKS: dict[str, tuple[float, list[list[float]]]] = {
 
 
 def _box(writer: StageWriter, aspect: float) -> None:
-    """The walls, the light and the camera."""
+    """Adds the walls, the light and the camera."""
     writer.material("White", _WHITE)
     writer.material("Red", _RED)
     writer.material("Green", _GREEN)
@@ -53,7 +53,10 @@ def _box(writer: StageWriter, aspect: float) -> None:
 
 
 def _block(writer: StageWriter, name: str) -> None:
-    """One of the two blocks: a top and four sides; it stands on the floor, so it has no bottom."""
+    """Adds one of the two blocks: a top and four sides.
+
+    It stands on the floor, without a bottom.
+    """
     height, foot = _BLOCKS[name]
     corners = [[x, height, z] for x, z in foot] + [[x, 0.0, z] for x, z in foot]
     sides = [[k, k + 4, (k + 1) % 4 + 4, (k + 1) % 4] for k in range(4)]
@@ -61,7 +64,7 @@ def _block(writer: StageWriter, name: str) -> None:
 
 
 def build_cornell(writer: StageWriter, options: SceneOptions) -> None:
-    """The box with its two blocks."""
+    """Builds the box with its two blocks."""
     _box(writer, options.aspect or 1.0)
     for name in _BLOCKS:
         _block(writer, name)
@@ -76,7 +79,7 @@ DRAGON_MATERIALS = {
 
 
 def build_cornell_dragon(writer: StageWriter, options: SceneOptions) -> None:
-    """The box with a dragon on its floor."""
+    """Builds the box with a dragon on its floor."""
     if options.material not in DRAGON_MATERIALS:
         raise SceneError(
             f"dragon material must be one of {', '.join(DRAGON_MATERIALS)}, "
@@ -86,5 +89,5 @@ def build_cornell_dragon(writer: StageWriter, options: SceneOptions) -> None:
     mesh = options.dragon_mesh()
     writer.material("Dragon", DRAGON_MATERIALS[options.material])
     prototype = writer.prototype("Dragon", mesh)
-    # The dragon faces +x; the camera looks along +z, with x growing to the left.
+    # The dragon faces +x. The camera looks along +z, with x to the left.
     writer.instance("/World/Objects/Dragon", prototype, "Dragon", (278.0, 0.0, 280.0), 152.0, 195.0)

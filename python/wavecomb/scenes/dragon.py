@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A procedural dragon of our own, with any number of triangles.
+"""A procedural dragon with any number of triangles.
 
-An eastern dragon, wingless, its scaly body in an S over the ground, head raised: a stand-in for the
-Stanford XYZRGB dragon, which may not be shipped. It is a union of closed tubes that run into one
-another (see ``sweep``): body, head, jaw, limbs, claws, horns, fins. Relief is evaluated at the
+An eastern dragon without wings, its scaly body in an S above the ground, head raised. It replaces
+the Stanford XYZRGB dragon, whose licence forbids shipping it. It is a union of closed, overlapping
+tubes (see ``sweep``): body, head, jaw, limbs, claws, horns, fins. Relief is evaluated at the
 resolution of the mesh, so more triangles show finer detail: scales first, then their keels and
 growth rings, then grain.
 
-Units: about 2.4 long, 1.6 high; Y up, standing on y = 0, facing +x.
+Size in scene units: about 2.4 long, 1.6 high; Y up, standing on y = 0, facing +x.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from wavecomb.scenes.sweep import Tube, spline, tube_extent, tube_mesh
 MIN_TRIANGLES = 10_000
 MAX_TRIANGLES = 20_000_000
 
-# The body from the tail's tip to the nape: x, y, z, half width, half height, direction of the back.
+# The body from the tail's tip to the nape: x, y, z, half width, half height, up direction of the
+# back.
 _BODY = np.array(
     [
         [-0.80, 0.86, -0.10, 0.004, 0.004, 0.2, 1.0, 0.2],
@@ -62,7 +63,7 @@ _SCALES_AROUND = 24
 
 
 def _placed(tube: Tube, scale: float, rotation: FloatArray, offset: FloatArray) -> Tube:
-    """A tube under a similarity: rotation (3, 3), offset (3,)."""
+    """Applies a similarity transform to a tube: rotation (3, 3), offset (3,)."""
     return Tube(
         tube.points @ rotation.T * scale + offset,
         tube.width * scale,
@@ -77,14 +78,14 @@ def _placed(tube: Tube, scale: float, rotation: FloatArray, offset: FloatArray) 
 def _leg(
     hip: FloatArray, knee: FloatArray, ankle: FloatArray, foot: FloatArray, yaw: float, thigh: float
 ) -> list[Tube]:
-    """A leg with foot, toes and claws.
+    """Makes a leg with foot, toes and claws.
 
     Args:
         hip: Start, inside the body, (3,).
         knee: Knee or elbow, (3,).
         ankle: Ankle or wrist, (3,).
-        foot: Middle of the foot, about 0.05 over the ground, (3,).
-        yaw: Direction of the toes about Y, radians from +x.
+        foot: Middle of the foot, about 0.05 above the ground, (3,).
+        yaw: Direction of the toes about Y, in radians from +x.
         thigh: Radius of the thigh.
     """
     path = np.array([hip, 0.6 * hip + 0.4 * knee, knee, 0.5 * (knee + ankle), ankle, foot])
@@ -117,7 +118,7 @@ def _leg(
 
 
 def _legs() -> list[Tube]:
-    """The four legs; feet on the ground under the body's arches."""
+    """Makes the four legs, with feet on the ground under the body's arches."""
     parts = []
     for *joints, yaw, thigh in _LEGS:
         hip, knee, ankle, foot = np.array(joints)
@@ -126,7 +127,7 @@ def _legs() -> list[Tube]:
 
 
 def _fins() -> list[Tube]:
-    """Fins along the back, lower to both ends, and the flame at the tail's tip."""
+    """Makes fins along the back, lower towards both ends, and the flame at the tail's tip."""
     parts = []
     t = np.linspace(0.06, 0.955, 58)
     place = spline(_BODY[:, :5], t)
@@ -168,7 +169,7 @@ def _fins() -> list[Tube]:
 
 
 def dragon_tubes() -> list[Tube]:
-    """All parts of the dragon; the body comes first."""
+    """Returns all parts of the dragon, the body first."""
     points, width, height, up = _BODY[:, :3], _BODY[:, 3], _BODY[:, 4], _BODY[:, 5:]
     body = Tube(points, width, height, up, scaly(_SCALES_AROUND, 0.13, 0.13), 0.94)
     c, s = np.cos(_HEAD_PITCH), np.sin(_HEAD_PITCH)
@@ -178,7 +179,7 @@ def dragon_tubes() -> list[Tube]:
 
 
 def _grids(tubes: list[Tube], triangles: int) -> list[tuple[int, int]]:
-    """Rings and columns for each tube, so that the total comes close to ``triangles``."""
+    """Chooses rings and columns for each tube, so that the total is close to ``triangles``."""
     extents = [tube_extent(tube) for tube in tubes]
     low, high = 0.0, 4.0 * triangles / sum(extent.weight for extent in extents)
     grids = [(4, 5)] * len(tubes)
@@ -199,13 +200,14 @@ def dragon(triangles: int = 250_000) -> Mesh:
     """Makes the dragon.
 
     Args:
-        triangles: How many to make, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``; met to a percent.
+        triangles: Number of triangles, from ``MIN_TRIANGLES`` to ``MAX_TRIANGLES``. The result is
+            within one percent.
 
     Returns:
-        Closed, outward parts that run into one another, with smooth normals and uv.
+        A mesh of closed, overlapping parts with outward faces, smooth normals and uv.
 
     Raises:
-        SceneError: The count is out of range.
+        SceneError: The number is out of range.
     """
     if not MIN_TRIANGLES <= triangles <= MAX_TRIANGLES:
         raise SceneError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dragon's head, and the spikes and balls that other parts of it use too."""
+"""The dragon's head, and spikes and balls that are also used for other parts."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def spike(
     relief: Relief | None = None,
     bulge: float = 1.0,
 ) -> Tube:
-    """A tapering horn, claw, tooth or blade from ``root`` through ``path``.
+    """Makes a tapering horn, claw, tooth or blade from ``root`` through ``path``.
 
     Args:
-        root: Where it starts.
-        *path: Further control points; the last is the tip.
+        root: Start point.
+        *path: Further control points; the last one is the tip.
         radius: Half width along ``up`` at the root.
         flat: Half width across as a fraction of ``radius``.
         up: Direction of the broad side.
@@ -42,7 +42,7 @@ def spike(
 
 
 def ball(centre: Sequence[float] | FloatArray, radius: float, detail: float = 1.0) -> Tube:
-    """A sphere."""
+    """Makes a sphere."""
     c = np.array(centre, np.float64)
     axis = np.array([radius, 0.0, 0.0])
     points = np.stack([c - axis, c, c + axis])
@@ -57,13 +57,14 @@ def tube(
     detail: float = 1.0,
     side: float = 1.0,
 ) -> Tube:
-    """A tube from a table.
+    """Makes a tube from a table of control points.
 
     Args:
-        rows: Control points: x, y, z, half width, half height; without the last they are round.
+        rows: Control points: x, y, z, half width, half height. Without the half height, the section
+            is round.
         relief: Displacement.
-        belly: As of ``Tube``.
-        detail: As of ``Tube``.
+        belly: As in ``Tube``.
+        detail: As in ``Tube``.
         side: -1 mirrors the tube in z = 0.
     """
     table = np.array(rows)
@@ -88,7 +89,7 @@ _TONGUE = (
     (0.2, -0.14, 0.0, 0.08, 0.03), (0.45, -0.21, 0.0, 0.07, 0.025),
     (0.7, -0.24, 0.02, 0.05, 0.02), (0.95, -0.14, 0.03, 0.005, 0.004),
 )  # fmt: skip
-# Parts of both sides, with z away from the middle.
+# Parts that exist on both sides, with z pointing away from the middle.
 _BROW = (
     (0.56, 0.09, 0.09, 0.02, 0.02), (0.45, 0.20, 0.17, 0.045, 0.04),
     (0.33, 0.235, 0.215, 0.055, 0.045), (0.20, 0.24, 0.25, 0.05, 0.045),
@@ -120,11 +121,11 @@ _LOWER_TEETH = (
     (0.86, 0.13, 0.024), (0.76, 0.07, 0.018), (0.67, 0.065, 0.017), (0.58, 0.06, 0.016),
     (0.49, 0.05, 0.015),
 )  # fmt: skip
-"""x, length and radius of each tooth."""
+"""x coordinate, length and radius of each tooth."""
 
 
 def head_tubes() -> list[Tube]:
-    """The head's tubes in its own frame: unit length, muzzle along +x, nape at the origin."""
+    """Makes the head in a local frame: unit length, muzzle along +x, nape at the origin."""
     snout = scaly(22, 0.07, 0.0, lambda a: 1.0 - 0.75 * ramp(a, 0.5, 0.9))
     parts = [
         tube(_SKULL, snout, 0.62, 2.0),
@@ -146,7 +147,7 @@ def head_tubes() -> list[Tube]:
 
 
 def _head_side(side: float) -> list[Tube]:
-    """Eye, brow, nostril, horn, whisker, teeth and mane of one side of the head."""
+    """Makes eye, brow, nostril, horn, whisker, teeth and mane of one side of the head."""
 
     def at(*xyz: float) -> FloatArray:
         return np.array(xyz) * np.array([1.0, 1.0, side])

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Three glasses on a table, whose drinks reach into the glass: its priority says where they end."""
+"""Three glasses on a table, for nested dielectrics.
+
+Each drink overlaps its glass, and the priorities of the materials determine the boundary.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,14 @@ from wavecomb.scenes.stage import StageWriter
 
 _RADIUS, _HEIGHT, _WALL, _FOOT = 3.0, 10.5, 0.32, 1.0
 _OVERLAP = 0.1
-"""How far a drink reaches into the glass, in centimetres."""
+"""Overlap of drink and glass, in centimetres."""
 _DRINKS: tuple[tuple[str, tuple[float, float, float], float, Colour, Colour, float], ...] = (
     ("Cordial", (-8.0, 0.0, -1.0), 8.2, (0.0, 0.0, 0.0), (0.08, 0.9, 0.75), 0.0),
     ("Juice", (0.0, 0.0, 0.5), 8.8, (1.6, 1.3, 0.7), (0.01, 0.16, 1.3), 0.6),
     ("Milk", (8.0, 0.0, -1.0), 7.0, (4.0, 4.2, 4.5), (0.001, 0.003, 0.012), 0.5),
 )
-"""Names, places, levels; how much they scatter and absorb a centimetre, and the mean cosine."""
+"""Name, position and level of each drink, its scattering and absorption per centimetre, and its
+mean cosine."""
 
 
 def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, object]) -> None:
@@ -36,12 +40,12 @@ def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, obj
 
 
 def _wall(height: float, inwards: float) -> tuple[float, float]:
-    """A point of the tumbler's side, which leans a little, so far inside of its outer one."""
+    """Returns a point of the tumbler's inclined side, ``inwards`` from its outer surface."""
     return (_RADIUS * (0.86 + 0.14 * height / _HEIGHT) - inwards, height)
 
 
 def _rounded(corners: list[tuple[float, float]], radius: float) -> FloatArray:
-    """A line whose inner corners are round, with straight parts that follow it to its ends."""
+    """Rounds the inner corners of a polyline with curves of a radius."""
     points = np.array(corners)
     line = [points[0]]
     for before, here, after in zip(points, points[1:], points[2:], strict=False):
@@ -64,7 +68,7 @@ def _turn(
 def _serve(
     writer: StageWriter, name: str, at: tuple[float, float, float], level: float, columns: int
 ) -> None:
-    """A tumbler with a thick foot, and what fills it and a little of its wall."""
+    """Adds a tumbler with a thick foot, and a drink that fills it and overlaps its wall."""
     outside = [(0.0, 0.0), _wall(0.0, 0.0), _wall(_HEIGHT, 0.0)]
     inside = [_wall(_HEIGHT, _WALL), _wall(_FOOT, _WALL), (0.0, _FOOT)]
     _turn(writer, f"{name}_Glass", outside + inside, 0.3, at, columns, "Glass")
@@ -75,7 +79,7 @@ def _serve(
 
 
 def build_drinks(writer: StageWriter, options: SceneOptions) -> None:
-    """The glasses before a window."""
+    """Builds the glasses in front of a window."""
     writer.material("Table", looks.plastic((0.32, 0.26, 0.2), 0.35))
     writer.material("Wall", looks.diffuse((0.5, 0.52, 0.55)))
     _glassy(writer, "Glass", 1.52, dielectric_priority=("integer", 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scene generator refuses."""
+"""Errors of the scene generators."""
 
 from __future__ import annotations
 
@@ -7,4 +7,4 @@ from wavecomb.errors import WavecombError
 
 
 class SceneError(WavecombError, ValueError):
-    """A request or an imported file that is no good: one line that says what to do."""
+    """Error about an invalid option or imported file, with one line that says what to do."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objects of several meshes, each with a material of its own, and instances of them."""
+"""Objects of several meshes with different materials, and instances of such objects."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def add_object(
     position: Sequence[float] = (0.0, 0.0, 0.0),
     turn_degrees: float = 0.0,
 ) -> None:
-    """Adds an Xform, turned about Y, with one mesh for each material of its parts."""
+    """Adds an Xform, rotated about Y, with one mesh for each material of its parts."""
     _place(UsdGeom.Xform.Define(writer.stage, path), position, turn_degrees)
     _fill(writer, path, parts)
 
@@ -41,7 +41,7 @@ def add_instance(
     position: Sequence[float],
     turn_degrees: float = 0.0,
 ) -> None:
-    """Adds a native instance of what ``add_prototype`` made."""
+    """Adds a native instance of a prototype from ``add_prototype``."""
     xform = UsdGeom.Xform.Define(writer.stage, path)
     _place(xform, position, turn_degrees)
     xform.GetPrim().GetReferences().AddInternalReference(prototype)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fur and hair: strands that grow on smooth bodies, combed and bent, as cubic curves.
+"""Fur and hair: strands on smooth bodies, combed and bent, as cubic curves.
 
-All strands of a body grow at once, step by step, in numbers; 100,000 take about a second.
+NumPy grows all strands of a body together, point by point; 100,000 strands take about a second.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from wavecomb.scenes.shapes import turned
 from wavecomb.scenes.stage import StageWriter
 
 HEAD_LEVEL = 96
-"""Cells from pole to pole."""
+"""Number of cells from pole to pole."""
 
 _AXES = (0.78, 1.12, 0.98)
 _BUMPS = (
@@ -36,11 +36,11 @@ _BUMPS = (
     ((1.0, -0.05, -0.05), 0.16, 0.10),  # ears
     ((-1.0, -0.05, -0.05), 0.16, 0.10),
 )
-"""Direction, width and height of what stands out or in."""
+"""Direction, angular width and height of each bump or dent."""
 
 
 def head_radius(d: FloatArray) -> FloatArray:
-    """(n,) From the middle to the surface in unit directions (n, 3)."""
+    """Returns the radius (n,) of the head in unit directions (n, 3)."""
     jaw = ramp(-d[:, 1], 0.1, 1.0)
     x, y, z = d[:, 0] / (_AXES[0] - 0.20 * jaw), d[:, 1] / _AXES[1], d[:, 2] / _AXES[2]
     radius = 1.0 / np.sqrt(x * x + y * y + z * z)
@@ -51,13 +51,16 @@ def head_radius(d: FloatArray) -> FloatArray:
 
 
 def is_scalp(d: FloatArray, chance: FloatArray) -> NDArray[np.bool_]:
-    """Where hair grows: above a line from the brow round to the neck, sparser along it."""
+    """Returns whether hair grows in unit directions (n, 3), as (n,).
+
+    It grows above a line from brow to neck, and sparser near the line.
+    """
     line = -0.50 + 1.08 * ramp(d[:, 2], -0.5, 0.75)
     return chance < ramp(d[:, 1] - line, 0.0, 0.12)
 
 
 def head_mesh(level: int) -> Mesh:
-    """The form as a mesh of ``level`` cells from pole to pole."""
+    """Makes the head as a mesh of ``level`` cells from pole to pole."""
     columns = 2 * level
     up = np.linspace(-0.5 * np.pi, 0.5 * np.pi, level + 1)
     turn = np.linspace(0.0, 2.0 * np.pi, columns + 1)
@@ -83,7 +86,7 @@ def _sphere(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def _waves(p: FloatArray, frequency: float, seed: float) -> FloatArray:
-    """A smooth field of vectors about 0, (n, 3)."""
+    """Evaluates a smooth vector field around 0 at points ``p``, (n, 3)."""
     turns = np.array([[1.0, 0.7, -0.4], [-0.6, 1.1, 0.5], [0.3, -0.8, 1.2]]) * frequency
     return np.sin(p @ turns.T + seed * np.array([1.0, 2.3, 4.1]))
 
@@ -96,15 +99,16 @@ def add_strands(
     material: str,
     primvars: dict[str, tuple[str, FloatArray]],
 ) -> None:
-    """Adds strands (n, points, 3), root first, that run out into points.
+    """Adds strands that taper towards their tips.
 
     Args:
-        writer: Of the stage.
-        path: Of the curves.
-        strands: Their points.
-        width: At the root.
-        material: That they wear.
-        primvars: By name, interpolation (uniform or varying) and values: numbers, or colours.
+        writer: Writer of the stage.
+        path: Path of the prim.
+        strands: Points of the strands, (n, points, 3), root first.
+        width: Width at the root, in scene units.
+        material: Name of the bound material.
+        primvars: By name, interpolation (uniform or varying) and values, which are numbers or
+            colours.
     """
     count, points = strands.shape[:2]
     flat = strands.reshape(-1, 3).astype(np.float32)
@@ -131,7 +135,7 @@ def add_strands(
 
 
 def _lamps(writer: StageWriter, strength: float) -> None:
-    """A key light, and one from behind that shines through hair."""
+    """Adds a key light, and a light from behind that shines through the hair."""
     key, rim = (x * strength for x in (26.0, 30.0))
     writer.rect_light("Key", (-3.0, 5.5, 5.0), 2.4, 2.4, (key, 0.95 * key, 0.88 * key), -48.0)
     writer.rect_light("Rim", (2.2, 4.4, -4.6), 2.6, 2.6, (0.9 * rim, 0.95 * rim, rim), -136.0)
@@ -144,12 +148,12 @@ def _floor(writer: StageWriter, height: float) -> None:
 
 
 def _egg(d: FloatArray) -> FloatArray:
-    """Points of an egg about the origin in directions ``d``."""
+    """Returns the points of an egg about the origin in directions ``d``."""
     return d * np.array([0.95, 1.15, 0.95]) * (1.0 + 0.12 * d[..., 1:2] * (d[..., 1:2] - 1.0))
 
 
 def fur_strands(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
-    """Strands of the egg, (count, points, 3), and the directions that they stand in."""
+    """Returns the strands of the egg, (count, points, 3), and their root directions."""
     d = _sphere(rng, count)
     p = _egg(d)
     length = 0.22 * rng.uniform(0.7, 1.15, (count, 1))
@@ -167,7 +171,7 @@ def fur_strands(rng: np.random.Generator, count: int) -> tuple[FloatArray, Float
 
 
 def build_fur(writer: StageWriter, options: SceneOptions) -> None:
-    """An egg with stripes of dark and light fur, lighter at the tips."""
+    """Builds an egg with stripes of dark and light fur, lighter at the tips."""
     rng = np.random.default_rng([options.seed, 21])
     writer.material("Skin", looks.diffuse((0.16, 0.10, 0.07)))
     angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 65)
@@ -197,7 +201,7 @@ def build_fur(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _fur(writer: StageWriter) -> str:
-    """Its colour of each strand, paler towards the tip."""
+    """Adds a hair material with the colour of each strand, paler towards the tip."""
     net = Network(writer.stage, "/World/Looks/Fur")
     own = net.node(
         "geompropvalue", "color3",
@@ -216,7 +220,7 @@ def _fur(writer: StageWriter) -> str:
 
 
 def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
-    """Strands of the head, (count, points, 3): parted, combed to both sides, hanging."""
+    """Returns strands on the head, (count, points, 3): parted, combed to both sides, hanging."""
     roots = np.zeros((0, 3))
     while len(roots) < count:
         d = _sphere(rng, 2 * count)
@@ -239,7 +243,7 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
         curl = 0.30 * t * np.sin(2.2 * math.pi * t + phase) * waves
         heading = normalized(heading) + np.array([0.0, -0.8, 0.0]) + 0.3 * comb * (1.0 - t)
         q = p + step * normalized(heading + curl + frizz)
-        # Outside of the head, and not far from it; below, as wide as it is.
+        # Keep the strand close outside of the head and, below the head, no wider than the head.
         out = np.linalg.norm(q, axis=1, keepdims=True)
         way = q / np.maximum(out, 1e-9)
         near = head_radius(way)[:, None] * (lift if k else 1.0 + 0.5 * (lift - 1.0))
@@ -254,9 +258,9 @@ def hair_strands(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def build_head(writer: StageWriter, options: SceneOptions) -> None:
-    """A smooth head without a face to speak of, and its hair."""
+    """Builds a smooth head, without a detailed face, and its hair."""
     rng = np.random.default_rng([options.seed, 22])
-    # Skin under a thin film of grease; mean free paths in decimetres.
+    # Skin under a thin film of oil. Mean free paths are in decimetres.
     skin = {"specular_roughness": 0.48, "specular_ior": 1.4, "coat_weight": 0.25,
             "coat_roughness": 0.3, "coat_ior": 1.45}  # fmt: skip
     below_surface(writer, "Head", (0.76, 0.5, 0.38), (0.037, 0.014, 0.007), **skin)
@@ -282,7 +286,7 @@ def build_head(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _brown(writer: StageWriter) -> str:
-    """Melanin of each strand."""
+    """Adds a hair material that reads the melanin of each strand."""
     net = Network(writer.stage, "/World/Looks/Hair")
     melanin = net.node(
         "geompropvalue", "float", geomprop=("string", "melanin"), default=("float", 0.5)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A field of stones with materials as heavy and as different as those of a production.
+"""A field of stones with materials as complex and as diverse as those of a production.
 
-Each material is a network of MaterialX nodes: images of its own, mixed by fractals in space and
-graded, in front of a surface of eight kinds, from plain paint to all lobes at once. The first reads
-one image and is done; the last mixes eight layers. So materials differ in program, lobes, textures
-and time, and none of it is made up by repeating work.
+Each material is a network of MaterialX nodes: separate images, mixed by fractals in space and
+graded, which drive one of eight kinds of surface, from plain paint to all lobes at once. The first
+material reads one image; the last one mixes eight layers. The materials thus differ in shading
+program, lobes, textures and cost, without repeating work artificially.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from wavecomb.scenes.textures import TextureInfo
 MAX_MATERIALS = 1024
 MAX_TEXTURE_MB = 8192.0
 LAYERS = 8
-"""Layers of the heaviest material."""
+"""Number of layers of the most complex material."""
 _BYTES_PER_TEXEL = (4.0 + 4.0 + 1.0) * 4.0 / 3.0
-"""Memory for a texel of a material: two colour maps and one of roughness, 8 bits, mip levels."""
+"""Bytes per texel of a material: two colour maps and a roughness map of 8 bits, with mip levels."""
 
 Inputs = dict[str, Any]
 
 
 def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
-    """Fills the stage; ``SceneOptions`` says with how many materials and how large textures."""
+    """Builds the field with the number of materials and the texture memory in ``SceneOptions``."""
     if options.plain:
         raise SceneError(
             "heavy has no plain form: UsdPreviewSurface cannot say what its MaterialX networks do"
@@ -47,7 +47,7 @@ def build_heavy(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def layers(options: SceneOptions, index: int) -> int:
-    """Layers of material ``index``: none on the first ninth of them, ``LAYERS`` on the last."""
+    """Returns the layers of material ``index``: 0 in the first ninth, ``LAYERS`` for the last."""
     share = index / max(options.materials - 1, 1)
     return min(int((LAYERS + 1) * share), LAYERS)
 
@@ -68,8 +68,9 @@ _KINDS: tuple[dict[str, float | tuple[float, float]], ...] = (
         "fuzz_weight": 0.3,
     },
 )
-"""Inputs of OpenPBR surfaces, in turn after a UsdPreviewSurface that is diffuse alone: paint,
-metal, lacquer, cloth, thin film, glass, and all lobes. A pair is a range to draw from."""
+"""Inputs of OpenPBR surfaces: paint, metal, lacquer, cloth, thin film, glass, and all lobes. The
+materials use these kinds in turn, after a diffuse UsdPreviewSurface. A pair is a range for a random
+value."""
 
 
 def _inputs(kind: dict[str, float | tuple[float, float]], rng: np.random.Generator) -> Inputs:
@@ -107,7 +108,7 @@ def _material(
 def _define(
     writer: StageWriter, name: str, edge: int, index: int, colour: np.ndarray | None
 ) -> str:
-    """A texture's name: a pattern in a colour, or one of roughness."""
+    """Defines a pattern in a colour, or a roughness map, and returns its texture name."""
 
     def made(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)
@@ -126,7 +127,7 @@ def _layered(
     count: int,
     rng: np.random.Generator,
 ) -> UsdShade.Output:
-    """Colour of so many layers, each laid over those below where a fractal in space says so."""
+    """Mixes ``count`` layers of colour, each weighted by a fractal in world space."""
 
     def image(which: str) -> UsdShade.Output:
         return net.node("image", "color3", file=("filename", writer.texture_file(maps[which])))

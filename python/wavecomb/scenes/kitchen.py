@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A kitchen, where nearly everything is glossy: lacquer, glaze, marble, steel, copper, glass.
+"""A kitchen with mostly glossy materials: lacquer, glaze, marble, steel, copper, glass.
 
-Lamps below the wall cupboards, three pendants and the sky in a window light it. Lengths are metres,
-materials are UsdPreviewSurface without a program, as of any exporter.
+Light comes from strips below the wall cupboards, three pendants and the sky in a window. Lengths
+are metres. Materials are UsdPreviewSurface without a Wavecomb program, as most exporters write
+them.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ _TOP = 0.92
 _SLAB, _COUNTER = 0.03, 0.62
 """Thickness and depth of the worktop."""
 _SHELF, _HIGH = 1.45, 2.25
-"""Wall cupboards: from and to."""
+"""Lower and upper edge of the wall cupboards."""
 _CUPBOARD = 0.34
 _WINDOW = (1.35, 2.55, 1.12, 2.12)
-"""x from and to, y from and to."""
+"""Extent of the window: x from, x to, y from, y to."""
 _TILE, _GAP = 0.10, 0.003
 _OBJECTS = "/World/Objects"
 _TEAPOT_SCALE = 0.036
@@ -40,7 +41,7 @@ _FRIDGE = 0.72
 
 @dataclass(frozen=True)
 class _Run:
-    """A row of cupboards along a wall: where it begins, how it is turned about Y."""
+    """A row of cupboards along a wall, with its position and rotation about Y in degrees."""
 
     name: str
     place: tuple[float, float, float]
@@ -52,7 +53,7 @@ _LEFT = _Run("Left", (0.0, 0.0, _DEPTH), 90.0)
 
 
 def build_kitchen(writer: StageWriter, options: SceneOptions) -> None:
-    """Fills the stage; ``teapot_level`` says how finely what is turned is cut."""
+    """Builds the kitchen. ``teapot_level`` sets the resolution of bodies of revolution."""
     rng = np.random.default_rng([options.seed, 7])
     columns = max(12, 4 * options.teapot_level)
     write_textures(writer, options)
@@ -68,7 +69,7 @@ def build_kitchen(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _walls(writer: StageWriter) -> None:
-    """Solids that reach into each other, a floor of slabs, and the window's frame."""
+    """Adds walls as overlapping solids, a floor of slabs, and the window's frame."""
     t, into = _THICK, _INTO
     x0, x1, y0, y1 = _WINDOW
     boxes: dict[str, tuple[tuple[float, ...], tuple[float, ...], str]] = {
@@ -108,7 +109,7 @@ def _walls(writer: StageWriter) -> None:
 
 
 def _tiles(writer: StageWriter, rng: np.random.Generator) -> None:
-    """Glazed tiles between worktop and cupboards, each laid a little askew."""
+    """Adds glazed tiles between worktop and wall cupboards, each slightly tilted at random."""
     half = 0.5 * (_TILE - _GAP)
     body = rounded_box((-half, -half, -0.004), (half, half, 0.005), 0.0018, 2)
     kinds = [add_prototype(writer, name, [(body, name)]) for name in TILES]
@@ -129,7 +130,7 @@ def _tiles(writer: StageWriter, rng: np.random.Generator) -> None:
 
 
 def _on(run: _Run, at: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A place by what a run's front shows: along it, height, out of the wall."""
+    """Converts a position along a row's front, upwards and out of the wall to world space."""
     turned = turn_about(1, run.turn) @ np.array(at)
     x, y, z = turned + np.array(run.place)
     return float(x), float(y), float(z)
@@ -142,7 +143,7 @@ def _put(writer: StageWriter, name: str, run: _Run, parts: list[Part]) -> None:
 def _front(
     x0: float, x1: float, y0: float, y1: float, z: float, look: str, grip: str
 ) -> list[Part]:
-    """A door or drawer before a cupboard whose front is at z, with its handle."""
+    """Makes a door or drawer, with handle, for a cupboard whose front is at z."""
     gap = 0.002
     door = rounded_box((x0 + gap, y0 + gap, z - 0.002), (x1 - gap, y1 - gap, z + 0.02), 0.004, 3)
     wide = x1 - x0
@@ -157,7 +158,7 @@ def _front(
 
 
 def _low(x0: float, x1: float, fronts: int, look: str) -> list[Part]:
-    """A floor cupboard: one door, or some drawers."""
+    """Makes a floor cupboard with one door or several drawers."""
     deep, foot = _COUNTER - 0.04, 0.1
     body = rounded_box((x0, foot, 0.0), (x1, _TOP - _SLAB, deep - 0.002), 0.001, 1)
     plinth = rounded_box((x0, -0.002, 0.0), (x1, foot, deep - 0.06), 0.001, 1)
@@ -173,13 +174,13 @@ def _low(x0: float, x1: float, fronts: int, look: str) -> list[Part]:
 
 
 def _high(x0: float, x1: float, look: str, grip: str) -> list[Part]:
-    """A wall cupboard with a door."""
+    """Makes a wall cupboard with a door."""
     body = rounded_box((x0, _SHELF, 0.0), (x1, _HIGH, _CUPBOARD), 0.001, 1)
     return [(body, "WhitePaint"), *_front(x0, x1, _SHELF, _HIGH, _CUPBOARD, look, grip)]
 
 
 def _cupboards(writer: StageWriter) -> None:
-    """Cupboards, worktops and the sink in one of them."""
+    """Adds cupboards, worktops, and the sink in one of the worktops."""
     low: list[Part] = []
     for x0, x1, fronts in ((0.62, 1.22, 3), (1.22, 1.62, 1), (1.62, 2.30, 2), (2.30, 2.98, 3)):
         low += _low(x0, x1, fronts, "LacquerBlue")
@@ -222,7 +223,7 @@ def _cupboards(writer: StageWriter) -> None:
 
 
 def _appliances(writer: StageWriter, columns: int) -> None:
-    """Stove and hood in the left run, refrigerator in the corner, tap."""
+    """Adds stove and hood in the left row, the refrigerator in the corner, and the tap."""
     x0, x1, deep = 1.75, 2.35, _COUNTER
     stove: list[Part] = [
         (rounded_box((x0, 0.06, 0.0), (x1, _TOP - _SLAB, deep - 0.03), 0.002), "SatinSteel"),
@@ -260,7 +261,7 @@ def _appliances(writer: StageWriter, columns: int) -> None:
 
 
 def _things(writer: StageWriter, columns: int, options: SceneOptions) -> None:
-    """What stands on the worktops and hangs on the wall."""
+    """Adds the objects on the worktops and on the wall."""
 
     def put(
         name: str, parts: list[Part], run: _Run, x: float, z: float, turn: float = 0.0,
@@ -305,7 +306,7 @@ def _things(writer: StageWriter, columns: int, options: SceneOptions) -> None:
 
 
 def _lamps(writer: StageWriter, columns: int) -> None:
-    """Strips below the wall cupboards, pendants over the floor, and the sky outside."""
+    """Adds light strips below the wall cupboards, pendants, and the sky outside."""
     warm, white = (75.0, 62.0, 46.0), (60.0, 52.0, 40.0)
     strips = ((0.80, 0.0), (2.83, 0.0))
     for k, (x, _) in enumerate(strips):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of the kitchen: nearly all of them glossy, UsdPreviewSurface without a program."""
+"""Materials of the kitchen, mostly glossy: UsdPreviewSurface without a Wavecomb program."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from wavecomb.scenes.room_looks import LOOKS as ROOM_LOOKS
 from wavecomb.scenes.room_looks import coated
 
 MARBLE_METRES = 0.9
-"""Edge of the surface that the image ``marble`` shows here."""
+"""Edge of the area that the image ``marble`` covers in this scene, in metres."""
 TILES = ("TileIvory", "TileMint", "TileJade")
-"""Glazes of the tiles on the wall."""
+"""Glaze materials of the wall tiles."""
 JARS = ("Flour", "Lentils", "Paprika", "Coffee")
-"""What is in the jars."""
+"""Materials of the jars' contents."""
 
 
 def _metal(colour: Colour, roughness: float) -> MaterialInfo:
@@ -62,4 +62,4 @@ LOOKS: dict[str, MaterialInfo] = {
     "Bakelite": _gloss((0.02, 0.018, 0.017), 0.12),
     "Shade": _gloss((0.75, 0.72, 0.66), 0.08),
 }
-"""Every material of the kitchen by name."""
+"""All materials of the kitchen by name."""

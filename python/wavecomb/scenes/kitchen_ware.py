@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands and hangs in the kitchen. Each is a list of parts that stands on y = 0."""
+"""Objects of the kitchen.
+
+Each function returns a list of parts that stand on y = 0 or hang from it.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ HANGER = 0.045
 
 
 def jar(columns: int, content: str) -> list[Part]:
-    """A jar of glass, two thirds full, with a lid of steel."""
+    """Makes a glass jar, two thirds full, with a steel lid."""
     profile = [
         (0, 0), (0.044, 0), (0.044, 0), (0.047, 0.003), (0.047, 0.12), (0.042, 0.138),
         (0.042, 0.145), (0.039, 0.145), (0.039, 0.137), (0.0445, 0.12), (0.0445, 0.006),
@@ -31,7 +34,7 @@ def jar(columns: int, content: str) -> list[Part]:
 
 
 def pot(columns: int, radius: float, material: str) -> list[Part]:
-    """A pot with two ears and a lid with a knob."""
+    """Makes a pot with two handles and a lid with a knob."""
     r, d = radius, POT_DEPTH * radius / 0.11
     body = [(0, 0), (r - 0.01, 0), (r - 0.004, 0.004), (r, 0.015), (r, d), (r + 0.003, d + 0.003),
             (r - 0.002, d + 0.004), (r - 0.004, d), (r - 0.004, 0.012), (0, 0.006)]  # fmt: skip
@@ -51,7 +54,7 @@ def pot(columns: int, radius: float, material: str) -> list[Part]:
 
 
 def hanging_pan(columns: int, radius: float, material: str) -> list[Part]:
-    """A pan that hangs from y = 0 by a hook, its inside towards +z."""
+    """Makes a pan that hangs from y = 0 by a hook, its inside towards +z."""
     r = radius
     body = [(0, 0), (r - 0.012, 0), (r - 0.004, 0.004), (r, 0.045), (r + 0.003, 0.05),
             (r - 0.003, 0.05), (r - 0.008, 0.006), (0, 0.003)]  # fmt: skip
@@ -70,7 +73,7 @@ def hanging_pan(columns: int, radius: float, material: str) -> list[Part]:
 
 
 def bottle(columns: int) -> list[Part]:
-    """A bottle of oil with a cork."""
+    """Makes an oil bottle with a cork."""
     profile = [
         (0, 0.004), (0.03, 0), (0.035, 0.004), (0.036, 0.02), (0.036, 0.15), (0.033, 0.18),
         (0.014, 0.215), (0.013, 0.27), (0.016, 0.272), (0.016, 0.282), (0.012, 0.283), (0, 0.283),
@@ -80,7 +83,7 @@ def bottle(columns: int) -> list[Part]:
 
 
 def plates(columns: int, count: int) -> list[Part]:
-    """A pile of plates."""
+    """Makes a pile of plates."""
     profile = [
         (0, 0.003), (0.05, 0.003), (0.052, 0), (0.058, 0), (0.06, 0.004), (0.10, 0.014),
         (0.118, 0.02), (0.12, 0.022), (0.117, 0.023), (0.098, 0.018), (0.06, 0.008), (0, 0.007),
@@ -90,7 +93,7 @@ def plates(columns: int, count: int) -> list[Part]:
 
 
 def toaster() -> list[Part]:
-    """A toaster of chrome on a foot of bakelite."""
+    """Makes a chrome toaster on a bakelite foot."""
     box = rounded_box((-0.14, 0.015, -0.085), (0.14, 0.19, 0.085), 0.035, 6)
     foot = rounded_box((-0.13, 0.0, -0.075), (0.13, 0.03, 0.075), 0.008)
     slots = [
@@ -103,7 +106,7 @@ def toaster() -> list[Part]:
 
 
 def knives() -> list[Part]:
-    """A block with five knives, which leans back."""
+    """Makes a tilted block with five knives."""
     lean = turn_about(0, -18.0)
     block = placed(rounded_box((-0.05, 0.0, -0.06), (0.05, 0.20, 0.06), 0.006), turn=lean)
     parts: list[Part] = [(block, "Board")]
@@ -118,7 +121,7 @@ def knives() -> list[Part]:
 
 
 def faucet(columns: int) -> list[Part]:
-    """A tall tap that bends towards +z, and its lever."""
+    """Makes a tall tap that bends towards +z, and its lever."""
     neck = [(0, 0.0, 0), (0, 0.20, 0), (0, 0.30, 0.03), (0, 0.31, 0.10), (0, 0.27, 0.15),
             (0, 0.22, 0.155)]  # fmt: skip
     base = turned([(0, 0), (0.026, 0), (0.026, 0.004), (0.018, 0.03), (0, 0.032)], columns)
@@ -128,7 +131,10 @@ def faucet(columns: int) -> list[Part]:
 
 
 def pendant(columns: int, cord: float) -> list[Part]:
-    """A shade of enamel that hangs from y = 0, so far down; its lamp is within, 0.11 lower."""
+    """Makes an enamel lampshade that hangs from y = 0 on a cord.
+
+    Its light belongs 0.11 m below the end of the cord.
+    """
     shade = [
         (0, -0.005),
         (0.02, -0.008),
@@ -147,7 +153,7 @@ def pendant(columns: int, cord: float) -> list[Part]:
 
 
 def handle(length: float) -> Mesh:
-    """A bar that stands out towards +z, along x."""
+    """Makes a handle along x that protrudes towards +z."""
     half = 0.5 * length
     bow = [(-half, 0, 0), (-half, 0, 0.02), (-half + 0.012, 0, 0.03), (0, 0, 0.032),
            (half - 0.012, 0, 0.03), (half, 0, 0.02), (half, 0, 0)]  # fmt: skip

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages for measuring how a light is chosen: a street at night, and a studio.
+"""Stages for measuring light selection: a street at night, and a studio.
 
-The street has as many lights as are asked for. Its length and the strength of its light do not
-depend on their number: more lights are smaller ones. The lights are of five kinds in turn, and
-their powers differ by a factor of up to a hundred:
+The street has a chosen number of lights. Its length and total power do not depend on that number;
+with more lights, each is smaller. The lights are of five kinds in turn, and their powers differ by
+a factor of up to 100:
 
-- windows: rectangles on the facades, which face the street;
-- lamps: disks that shine down;
+- windows: rectangles on the facades, facing the street;
+- lamps: disks that emit downwards;
 - bulbs: spheres on strings across the street;
-- signs: emissive boxes of 12 triangles that stand out from the facades;
+- signs: emissive boxes of 12 triangles at the facades;
 - strips: emissive quads at the kerbs, of 2 triangles.
 """
 
@@ -28,13 +28,13 @@ from wavecomb.scenes.teapot import teapot
 
 MAX_LIGHTS = 200_000
 _LENGTH, _HALF_WIDTH, _HEIGHT = 60.0, 5.0, 12.0
-_POWER = 3000.0  # of all lights together, W
+_POWER = 3000.0  # of all lights together, in W
 _SIGN_COLOURS = 16
 _KINDS = ("Window", "Lamp", "Bulb", "Sign", "Strip")
 
 
 def build_lights(writer: StageWriter, options: SceneOptions) -> None:
-    """Fills a stage with ``options.lights`` lights."""
+    """Builds a street with ``options.lights`` lights."""
     if not 1 <= options.lights <= MAX_LIGHTS:
         raise SceneError(f"lights: lights must be from 1 to {MAX_LIGHTS}, not {options.lights}")
     rng = np.random.default_rng([options.seed, 1001])
@@ -62,7 +62,7 @@ _PLACES = {
     "Sign": lambda rng, z: (rng.choice([-1, 1]) * rng.uniform(4.0, 4.5), rng.uniform(2.5, 8), z),
     "Strip": lambda rng, z: (rng.choice([-1, 1]) * rng.uniform(3.0, 4.9), 0.02, z),
 }
-"""Where a kind of light hangs: x, y, z."""
+"""Functions that choose a random position (x, y, z) for each kind of light."""
 
 
 def _light(
@@ -73,7 +73,7 @@ def _light(
     size: float,
     power: NDArray[np.float64],
 ) -> None:
-    """A light of UsdLux that gives off ``power`` (3,) W."""
+    """Adds a UsdLux light with a power of ``power`` (3,) W."""
     path = f"/World/Lights/{name}"
     if kind == "Window":
         light = UsdLux.RectLight.Define(writer.stage, path)
@@ -93,7 +93,7 @@ def _light(
     light.CreateColorAttr(Gf.Vec3f(*(float(v) / peak for v in radiance)))
     xform = UsdGeom.XformCommonAPI(light)
     xform.SetTranslate(tuple(float(v) for v in place))
-    # A light shines along its -Z: windows into the street, lamps down.
+    # UsdLux lights emit along their -Z axis. Windows are turned into the street, lamps down.
     if kind == "Window":
         xform.SetRotate((0.0, 90.0 if place[0] > 0 else -90.0, 0.0))
     elif kind == "Lamp":
@@ -109,11 +109,11 @@ def _mesh(
     power: float,
     rng: np.random.Generator,
 ) -> None:
-    """An emissive mesh that gives off about ``power`` W, one of a few radiances."""
+    """Adds an emissive mesh of about ``power`` W, rounded to one of a few radiances."""
     half = np.array([0.25, 0.4, 0.03]) if kind == "Sign" else np.array([0.04, 0.0, 0.6])
     half = half * size
     area = 8.0 * (half[0] * half[1] + half[1] * half[2] + half[0] * half[2])
-    # Both sides of a triangle shine; those inside a box light nothing.
+    # Both sides of a triangle emit, but the inner sides of a box illuminate nothing.
     wanted = power / (np.pi * area * (1.0 if kind == "Sign" else 0.5))
     step = round(2.0 * np.log2(wanted))
     hue = int(rng.integers(_SIGN_COLOURS))
@@ -129,7 +129,7 @@ def _mesh(
 
 
 def _street(writer: StageWriter, rng: np.random.Generator) -> None:
-    """Ground, facades with bays, and the end of the street."""
+    """Adds the ground, facades with bays, and the end of the street."""
     writer.material("Asphalt", looks.diffuse((0.22, 0.22, 0.24)))
     far = _LENGTH + 2.0
     ground: list[list[float]] = [[-30, 0, 8], [30, 0, 8], [30, 0, -far], [-30, 0, -far]]
@@ -166,10 +166,10 @@ _LOOKS = {
 
 
 def build_studio(writer: StageWriter, options: SceneOptions) -> None:
-    """90 objects in rows on a matt floor, a key lamp, a fill lamp and a dim, even dome.
+    """Builds 90 objects in rows on a matt floor, with key light, fill light and a dim, even dome.
 
-    The dome emits most of the power, as it is computed over the whole stage, and little of the
-    light in the picture, which bounces find as well.
+    Computed over the whole stage, the dome has most of the power. It contributes little light to
+    the image, which BSDF sampling finds as well.
     """
     rng = np.random.default_rng([options.seed, 3])
     writer.material("Floor", looks.diffuse((0.35, 0.34, 0.33)))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of the generated stages: UsdPreviewSurface plus the name of a Wavecomb program.
+"""Materials of the generated stages: UsdPreviewSurface, with the name of a Wavecomb program.
 
-``wavecomb:program`` on the Material says which shading program to run. The UsdPreviewSurface inputs
-give its parameters, set so that other renderers show something alike:
+``wavecomb:program`` on the Material selects the shading program. The UsdPreviewSurface inputs are
+its parameters, with values that look similar in other renderers:
 
 - diffuse: ``diffuseColor``.
 - metal: ``diffuseColor`` is the reflectance at normal incidence, ``roughness``, optional
@@ -10,9 +10,10 @@ give its parameters, set so that other renderers show something alike:
 - dielectric: ``ior``, ``roughness``, ``diffuseColor`` tints transmission.
 - plastic: ``diffuseColor`` under a coat of ``ior`` and ``roughness``.
 - emissive: ``emissiveColor``, radiance.
-- principled: everything.
+- principled: all inputs.
 
-``plain`` gives the form that other people's exporters write: no program, and the metallic workflow.
+``plain`` returns the form that third-party exporters write: the metallic workflow without a
+program.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ PROGRAMS = ("diffuse", "metal", "dielectric", "plastic", "emissive", "principled
 
 @dataclass(frozen=True)
 class MaterialInfo:
-    """One material.
+    """A material.
 
     Attributes:
-        program: One of ``PROGRAMS``, or None for a UsdPreviewSurface that names no program.
+        program: One of ``PROGRAMS``, or None for a UsdPreviewSurface without a program.
         inputs: Values of UsdPreviewSurface inputs by name.
         textures: Names in ``textures.TEXTURES`` by input.
-        repeat: Texture repeats for each unit of uv.
+        repeat: Texture repeats per unit of uv.
     """
 
     program: str | None
@@ -45,7 +46,7 @@ class MaterialInfo:
 
 
 def diffuse(colour: Colour, texture: str | None = None, repeat: float = 1.0) -> MaterialInfo:
-    """A matt surface; specular reflection is switched off as far as UsdPreviewSurface can."""
+    """Makes a matt surface, with as little specular reflection as UsdPreviewSurface allows."""
     inputs: dict[str, float | int | Colour] = {
         "diffuseColor": colour,
         "useSpecularWorkflow": 1,
@@ -63,7 +64,7 @@ def metal(
     edge: Colour | None = None,
     textures: dict[str, str] | None = None,
 ) -> MaterialInfo:
-    """A conductor with its reflectance at normal incidence."""
+    """Makes a conductor from its reflectance at normal incidence."""
     inputs: dict[str, float | int | Colour] = {
         "diffuseColor": colour,
         "metallic": 1.0,
@@ -75,7 +76,7 @@ def metal(
 
 
 def dielectric(colour: Colour, roughness: float, ior: float = 1.5) -> MaterialInfo:
-    """Glass; the low opacity is what shows it as glass elsewhere."""
+    """Makes glass. The low opacity makes it look like glass in other renderers."""
     return MaterialInfo(
         "dielectric",
         {"diffuseColor": colour, "roughness": roughness, "ior": ior, "opacity": 0.1},
@@ -85,7 +86,7 @@ def dielectric(colour: Colour, roughness: float, ior: float = 1.5) -> MaterialIn
 def plastic(
     colour: Colour, roughness: float, texture: str | None = None, repeat: float = 1.0
 ) -> MaterialInfo:
-    """A diffuse base under a clear coat of index 1.5."""
+    """Makes a diffuse base under a clear coat of index 1.5."""
     return MaterialInfo(
         "plastic",
         {"diffuseColor": colour, "roughness": roughness, "ior": 1.5, "metallic": 0.0},
@@ -95,7 +96,7 @@ def plastic(
 
 
 def emissive(radiance: Colour) -> MaterialInfo:
-    """A surface that glows and reflects nothing."""
+    """Makes a surface that emits light and reflects nothing."""
     return MaterialInfo(
         "emissive",
         {
@@ -113,7 +114,7 @@ def principled(
     textures: dict[str, str] | None = None,
     repeat: float = 1.0,
 ) -> MaterialInfo:
-    """All of UsdPreviewSurface."""
+    """Makes a material with all inputs of UsdPreviewSurface."""
     return MaterialInfo("principled", inputs, textures or {}, repeat)
 
 
@@ -122,22 +123,22 @@ def preview(
     textures: dict[str, str] | None = None,
     repeat: float = 1.0,
 ) -> MaterialInfo:
-    """A UsdPreviewSurface as anybody writes it: no program is named."""
+    """Makes a UsdPreviewSurface without a Wavecomb program."""
     return MaterialInfo(None, inputs, textures or {}, repeat)
 
 
 _SPECULAR_WORKFLOW = ("useSpecularWorkflow", "specularColor")
 _TINT_OPACITY = 0.4
-"""Opacity of plain glass whose colour is pure."""
+"""Opacity of plain glass with a fully saturated colour."""
 
 
 def plain(info: MaterialInfo) -> MaterialInfo:
-    """The same material without a program, in the metallic workflow.
+    """Returns the same material without a program, in the metallic workflow.
 
-    Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics, metals
-    lose the tint of their edges. Glass is all specular reflection and lets light pass straight on:
-    UsdPreviewSurface knows no refraction, and no tint but by opacity, so that coloured glass is
-    covered a little by its colour.
+    Matt surfaces get the specular reflection that UsdPreviewSurface gives all dielectrics. Metals
+    lose the tint of their edges. Glass becomes specular reflection with straight transmission,
+    because UsdPreviewSurface has no refraction. Its only tint is opacity, so coloured glass is
+    partly covered by its colour.
     """
     inputs = {key: value for key, value in info.inputs.items() if key not in _SPECULAR_WORKFLOW}
     if info.program == "dielectric":

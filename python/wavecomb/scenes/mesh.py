@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Triangle meshes as NumPy arrays, and the few operations that the scene generators share."""
+"""Triangle meshes as NumPy arrays, and common operations of the scene generators."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-"""Any float64 array; the docstring of each function gives the shape."""
+"""Any float64 array. The docstring of each function states the shape."""
 
 _CHUNK_FACES = 1 << 20
 
@@ -40,13 +40,13 @@ class Mesh:
         )
 
     def moved(self, scale: float, offset: FloatArray) -> Mesh:
-        """Returns the mesh scaled by a positive factor about the origin, then shifted (3,)."""
+        """Returns the mesh scaled by a positive factor, then translated by (3,)."""
         points = self.points.astype(np.float64) * scale + offset
         return Mesh(points.astype(np.float32), self.faces, self.normals, self.uv)
 
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
-    """Concatenates meshes; vertices are not welded."""
+    """Concatenates meshes without welding vertices."""
     parts = list(meshes)
     offsets = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
     return Mesh(
@@ -60,14 +60,14 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
 
 
 def face_areas(points: NDArray[np.floating], faces: NDArray[np.integer]) -> FloatArray:
-    """Areas of triangles: points (n, 3), faces (m, 3) -> float64 (m,)."""
+    """Computes areas of triangles: points (n, 3), faces (m, 3) -> float64 (m,)."""
     corners = points.astype(np.float64)
     a, b, c = (corners[faces[:, k]] for k in range(3))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
 
 def signed_volume(points: NDArray[np.floating], faces: NDArray[np.integer]) -> float:
-    """Volume enclosed by outward-facing triangles, by the divergence theorem."""
+    """Computes the volume enclosed by outward-facing triangles, by the divergence theorem."""
     corners = points.astype(np.float64)
     corners = corners - corners.mean(axis=0)
     a, b, c = (corners[faces[:, k]] for k in range(3))
@@ -75,14 +75,14 @@ def signed_volume(points: NDArray[np.floating], faces: NDArray[np.integer]) -> f
 
 
 def normalized(vectors: FloatArray) -> FloatArray:
-    """Unit vectors along the last axis; zero vectors become (0, 1, 0)."""
+    """Returns unit vectors along the last axis; zero vectors become (0, 1, 0)."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     unit = vectors / np.where(length > 0.0, length, 1.0)
     return np.where(length > 0.0, unit, np.array([0.0, 1.0, 0.0]))
 
 
 def smooth_normals(points: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.float32]:
-    """Area-weighted unit vertex normals, float32 (n, 3).
+    """Computes area-weighted unit vertex normals, float32 (n, 3).
 
     Vertices at bitwise equal positions share one normal, so texture seams stay invisible.
     """
@@ -105,10 +105,10 @@ def smooth_normals(points: NDArray[np.floating], faces: NDArray[np.integer]) -> 
 
 
 def grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
-    """Two triangles for each cell of a vertex grid of rows x columns, int32 (m, 3).
+    """Returns two triangles for each cell of a vertex grid of rows x columns, int32 (m, 3).
 
-    Vertex (i, j) has index ``i * columns + j``; the face normal is along
-    (next row) x (next column).
+    Vertex (i, j) has index ``i * columns + j``; the face normal points along (next row) x (next
+    column).
     """
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
     a = (i * columns + j).ravel()
@@ -124,13 +124,13 @@ def grid_mesh(
     *,
     reverse: bool = False,
 ) -> Mesh:
-    """The mesh of a grid of vertices.
+    """Makes the mesh of a grid of vertices.
 
     Args:
-        points: (rows, columns, 3).
-        uv: (rows, columns, 2).
-        normals: (rows, columns, 3); None: smooth ones of the faces.
-        reverse: The face normal is along (next column) x (next row).
+        points: Positions, (rows, columns, 3).
+        uv: Texture coordinates, (rows, columns, 2).
+        normals: Normals, (rows, columns, 3); None computes smooth normals.
+        reverse: Whether the face normal points along (next column) x (next row).
     """
     faces = grid_faces(*points.shape[:2])
     if reverse:
@@ -144,7 +144,10 @@ def grid_mesh(
 
 
 def without_flat_faces(mesh: Mesh, tolerance: float = 1e-14) -> Mesh:
-    """Drops faces whose area is at most ``tolerance`` times the squared size, and unused points."""
+    """Drops degenerate faces and unused points.
+
+    A face is degenerate if its area is at most ``tolerance`` times the squared size of the mesh.
+    """
     low, high = mesh.bounds
     limit = tolerance * float(((high - low) ** 2).sum())
     keep = face_areas(mesh.points, mesh.faces) > limit

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a triangle mesh from OBJ, PLY (ASCII or binary, also .gz) or USD, to stand for the dragon.
+"""Reads a triangle mesh from OBJ, PLY (ASCII or binary, also .gz) or USD, to replace the dragon.
 
-Whoever has the Stanford XYZRGB dragon, which we may not ship, brings it in this way.
+This allows using the Stanford XYZRGB dragon, which Wavecomb may not ship.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from wavecomb.scenes.mesh import (
 from wavecomb.scenes.ply import RawMesh, fans, read_ply
 
 TARGET_DIAGONAL = 3.05
-"""Diagonal of our dragon's bounding box, scene units; imported meshes are scaled to it."""
+"""Diagonal of the built-in dragon's bounding box, in scene units. Imported meshes are scaled to
+it."""
 
 _TEXTURE_LENGTH = 0.5
 _USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 MAX_UNPACKED = 1 << 31
-"""Bytes that a .gz may hold: ten times the largest dragon."""
+"""Largest number of bytes in a .gz after unpacking, ten times the largest dragon."""
 
 
 def load_dragon(path: Path) -> Mesh:
-    """Reads a mesh and makes it fit where our dragon would stand.
+    """Reads a mesh and fits it into the place of the built-in dragon.
 
-    It is scaled to our dragon's size, centred over the origin, set on y = 0 and given smooth
-    normals; where it has no uv it gets a cylindrical projection about Y.
+    The mesh is scaled to the dragon's size, centred over the origin, put on y = 0 and given smooth
+    normals. A mesh without uv gets a cylindrical projection about Y.
 
     Args:
-        path: .obj, .ply, either with .gz, or .usd, .usda, .usdc, .usdz.
+        path: .obj, .ply, either also with .gz, or .usd, .usda, .usdc, .usdz.
 
     Raises:
         SceneError: The file is missing, broken, empty or of another kind.
@@ -47,7 +48,7 @@ def load_dragon(path: Path) -> Mesh:
     if not path.is_file():
         raise SceneError(f"{path}: no such mesh file")
     try:
-        with np.errstate(invalid="ignore"):  # an index that is no number: _check finds it
+        with np.errstate(invalid="ignore"):  # _check reports an index that is not a number
             raw = _read(path)
         _check(raw)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, OverflowError) as error:
@@ -66,7 +67,7 @@ def load_dragon(path: Path) -> Mesh:
     mesh = without_flat_faces(Mesh(points, faces, empty, uv.astype(np.float32)))
     if not len(mesh.faces):
         raise SceneError(f"{path}: not a usable mesh: all its faces have no area")
-    # Removing flat faces may drop the points that spanned the bounds: stand it on the ground.
+    # Removing flat faces may drop the lowest points, so put the mesh on the ground again.
     points = mesh.points - np.array([0.0, mesh.points[:, 1].min(), 0.0], np.float32)
     return Mesh(points, mesh.faces, smooth_normals(points, mesh.faces), mesh.uv)
 
@@ -108,16 +109,16 @@ def _check(raw: RawMesh) -> None:
 
 
 def _cylinder(points: np.ndarray) -> FloatArray:
-    """Cylindrical projection about Y, (n, 2), about one repeat for each half unit."""
+    """Computes a cylindrical projection about Y, (n, 2), with about one repeat per half unit."""
     radius = float(np.hypot(points[:, 0], points[:, 2]).mean())
     repeats = max(1, round(2.0 * np.pi * radius / _TEXTURE_LENGTH))
-    # A triangle wave has no seam to tear a triangle that crosses it.
+    # A triangle wave has no seam, so no triangle spans the whole texture.
     turn = np.abs(np.arctan2(points[:, 2], points[:, 0])) / np.pi
     return np.stack([turn * repeats, points[:, 1] / _TEXTURE_LENGTH], axis=1)
 
 
 def _read_obj(data: bytes) -> RawMesh:
-    """Wavefront OBJ: v, vt and f; a vertex is split where its texture coordinates differ."""
+    """Reads Wavefront OBJ (v, vt and f); splits vertices whose texture coordinates differ."""
     positions: list[bytes] = []
     textures: list[bytes] = []
     corners: list[bytes] = []
@@ -158,7 +159,10 @@ def _read_obj(data: bytes) -> RawMesh:
 
 
 def _read_usd(path: Path) -> RawMesh:
-    """All meshes of a USD stage in world space, Y up; uv where every mesh has vertex ``st``."""
+    """Reads all meshes of a USD stage in world space, Y up.
+
+    The result has uv if every mesh has a primvar ``st`` with vertex interpolation.
+    """
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two experiment stages: 90 instanced objects and a mirror in the evening sun.
+"""The two stages of the experiments: 90 instanced objects and a mirror in the evening sun.
 
-Or, with ``SceneOptions.lamps``, lit as most stages are: a key, a fill, and a dim, even dome.
+``SceneOptions.lamps`` lights them with a key, a fill, and a dim, even dome instead.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.teapot import teapot
 
 _ROW_SIZES = (14, 13, 12, 11, 10, 9, 8, 7, 6)
-"""Objects in each row, from the back: a fan that fills the camera's view, 90 in all."""
+"""Number of objects in each row, from the back: a fan of 90 that fills the camera's view."""
 _PITCH_X = 2.65
 _PITCH_Z = 2.55
 _TEAPOT_SCALE = 0.36
@@ -55,7 +55,7 @@ _DRAGON_LOOKS: dict[str, MaterialInfo] = {
 
 
 def _dealt(names: list[str], count: int, rng: np.random.Generator) -> list[str]:
-    """``count`` names, each as often as the others, shuffled hand by hand."""
+    """Returns ``count`` names in random order, each equally often."""
     dealt: list[str] = []
     while len(dealt) < count:
         dealt += [names[k] for k in rng.permutation(len(names))]
@@ -63,7 +63,7 @@ def _dealt(names: list[str], count: int, rng: np.random.Generator) -> list[str]:
 
 
 def _set(writer: StageWriter, options: SceneOptions) -> None:
-    """Ground, mirror, lights and camera."""
+    """Adds the ground, the mirror, lights and camera."""
     writer.material("Floor", looks.FLOOR)
     half = _GROUND_HALF
     uv = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
@@ -90,7 +90,7 @@ def _set(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
-    """Four bars around the mirror, (4, 3) corners, and a back board: boxes along its edges."""
+    """Adds four boxes around the mirror, (4, 3) corners, and a back board."""
     right = mirror[1] - mirror[0]
     rise = mirror[3] - mirror[0]
     right, rise = right / np.linalg.norm(right), rise / np.linalg.norm(rise)
@@ -100,7 +100,7 @@ def _frame(writer: StageWriter, mirror: np.ndarray) -> None:
         start, end = mirror[index], mirror[(index + 1) % 4]
         along = (end - start) / np.linalg.norm(end - start)
         out = np.cross(along, normal)
-        # The long bars cover the corners: faces that lie in one another would be seen by chance.
+        # The long bars cover the corners, because coincident faces would be visible at random.
         cover = bar if index % 2 == 0 else 0.0
         a, b = start - along * cover, end + along * cover
         section = [
@@ -155,7 +155,7 @@ def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> No
                 _TEAPOT_SCALE * scale,
             )
         else:
-            # Heads turn to the camera's side, most of them to the right.
+            # Heads are turned towards the camera, most of them to the right.
             turn = -38.0 + rng.uniform(-40.0, 40.0) - (104.0 if rng.random() < 0.35 else 0.0)
             writer.instance(
                 f"/World/Objects/Dragon_{index:02d}", dragon, dragon_hand.pop(), place, turn, scale
@@ -163,10 +163,10 @@ def _build(writer: StageWriter, options: SceneOptions, with_teapots: bool) -> No
 
 
 def build_mixed(writer: StageWriter, options: SceneOptions) -> None:
-    """45 teapots and 45 dragons."""
+    """Builds 45 teapots and 45 dragons."""
     _build(writer, options, with_teapots=True)
 
 
 def build_dragon(writer: StageWriter, options: SceneOptions) -> None:
-    """90 dragons."""
+    """Builds 90 dragons."""
     _build(writer, options, with_teapots=False)

@@ -17,15 +17,15 @@ _TYPES = {
     "vector2": Sdf.ValueTypeNames.Float2,
     "vector3": Sdf.ValueTypeNames.Float3,
 }
-"""USD's types by MaterialX's names."""
+"""Value types of USD by the names of MaterialX types."""
 _TOKEN = Sdf.ValueTypeNames.Token
 
 
 class Network:
-    """One material of MaterialX nodes."""
+    """A material of MaterialX nodes."""
 
     def __init__(self, stage: Usd.Stage, path: str) -> None:
-        """Defines the material ``path``."""
+        """Defines the material at ``path``."""
         self._stage = stage
         self._path = path
         self._count = 0
@@ -36,7 +36,7 @@ class Network:
 
         Args:
             kind: Category of the node, such as "mix".
-            output: Its type, such as "color3", or "color3FA" where one operand is a number.
+            output: Type of its output, such as "color3", or "color3FA" if one operand is a float.
             **inputs: Outputs to connect, or (type, value) pairs; "in" is spelt ``in_``.
         """
         self._count += 1
@@ -48,20 +48,20 @@ class Network:
         return self._shader(name, definition, inputs).CreateOutput("out", _TOKEN)
 
     def surface(self, definition: str, **inputs: Any) -> None:
-        """Ends the network in a surface shader, such as ``ND_open_pbr_surface_surfaceshader``."""
+        """Adds the final surface shader, such as ``ND_open_pbr_surface_surfaceshader``."""
         out = self.closure("Surface", definition, **inputs)
         self.material.CreateSurfaceOutput("mtlx").ConnectToSource(out)
 
     def openpbr(self, **inputs: Any) -> None:
-        """Ends the network in an OpenPBR surface."""
+        """Adds an OpenPBR surface as the final shader."""
         self.surface("ND_open_pbr_surface_surfaceshader", **inputs)
 
     def hair(self, absorption: str, roughness: dict[str, Any], **inputs: Any) -> None:
-        """Ends the network in hair.
+        """Adds a hair BSDF as the final shader.
 
         Args:
-            absorption: The node that gives it, without types: ``chiang_hair_absorption_from_color``
-                or ``deon_hair_absorption_from_melanin``.
+            absorption: Node that computes absorption, without types:
+                ``chiang_hair_absorption_from_color`` or ``deon_hair_absorption_from_melanin``.
             roughness: Inputs of ``chiang_hair_roughness``, as ``node`` takes them.
             **inputs: Inputs of the absorption node.
         """

@@ -13,34 +13,34 @@ from wavecomb.scenes.mesh import Mesh
 
 @dataclass(frozen=True)
 class SceneOptions:
-    """What ``write_scene`` takes; a scene ignores what it has no use for.
+    """Options of ``write_scene``. A scene ignores options that it has no use for.
 
     Attributes:
-        dragon: OBJ, PLY or USD file to stand in for our dragon, or None.
-        triangles: Triangles of our dragon; of all stones of ``spread`` and ``heavy`` together.
-        teapot_level: Cells along each edge of the teapot's 32 patches; whatever is turned in
-            ``room`` has four times as many around.
-        seed: Of the layout and of the texture patterns.
-        texture_size: Edge of the largest textures, texels; the others shrink in proportion.
-        aspect: Width / height of the picture that the camera frames.
-        material: Of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
-        materials: How many ``spread`` and ``heavy`` have.
-        programs: How many kinds of material ``spread`` uses, 1 to 5.
-        texture_mb: Memory of all textures of ``spread`` and ``heavy``, 1e6 bytes; 0 is none.
-        shader_cost: Octaves of noise on the dearest material of ``spread``; on the others from 1,
-            which is none, geometrically.
-        lights: How many ``lights`` has.
-        lamps: Whether ``mixed`` and ``dragon`` are lit by a key, a fill and a dim dome.
-        strands: How many ``fur`` and ``head`` have.
-        splats: How many ``splats`` has.
-        capture: PLY file of 3D Gaussian splats that ``splats`` holds in place of all else, or None.
-        capture_linear: Whether its colours are linear light; else they are in sRGB, as captures are
-            mostly trained.
-        voxels: Along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
-        plain: Whether materials are as other people's exporters write them: UsdPreviewSurface in
-            the metallic workflow, no program named. ``heavy`` has no such form, nor has hair,
-            ``spread`` none of
-            a ``shader_cost`` above 1.
+        dragon: OBJ, PLY or USD file that replaces the built-in dragon, or None.
+        triangles: Triangles of the built-in dragon, or of all stones of ``spread`` or ``heavy``.
+        teapot_level: Cells along each edge of the teapot's 32 patches. Bodies of revolution in
+            ``room`` have four times as many cells around their axis.
+        seed: Random seed of the layout and of texture patterns.
+        texture_size: Edge of the largest textures, in texels; all others shrink in proportion.
+        aspect: Width / height of the image that the camera frames; None uses the scene's value.
+        material: Material of the dragon in ``cornell-dragon``: gold, copper, glass or jade.
+        materials: Number of materials in ``spread`` and ``heavy``.
+        programs: Number of kinds of material in ``spread``, 1 to 5.
+        texture_mb: Memory of all textures of ``spread`` or ``heavy``, in 1e6 bytes; 0 means no
+            textures.
+        shader_cost: Octaves of noise on the most expensive material of ``spread``. The octaves of
+            the materials grow geometrically from 1, which means no noise.
+        lights: Number of lights in ``lights``.
+        lamps: Whether a key, a fill and a dim dome light ``mixed`` and ``dragon``.
+        strands: Number of strands in ``fur`` and ``head``.
+        splats: Number of splats in ``splats``.
+        capture: PLY file of 3D Gaussian splats that replaces the contents of ``splats``, or None.
+        capture_linear: Whether the capture's colours are linear. By default they are sRGB, in which
+            most captures are trained.
+        voxels: Voxels along the longest edge of the grids of ``smoke`` and ``clouds``, at least 16.
+        plain: Whether materials are written as by third-party exporters: UsdPreviewSurface in the
+            metallic workflow, without a program. Not available for ``heavy``, for hair, and for
+            ``spread`` with a ``shader_cost`` above 1.
     """
 
     dragon: Path | str | None = None
@@ -64,7 +64,7 @@ class SceneOptions:
     plain: bool = False
 
     def __post_init__(self) -> None:
-        """Refuses what no scene can use."""
+        """Raises SceneError for values that are invalid in all scenes."""
         if self.aspect is not None and not 0.01 <= self.aspect <= 100.0:
             raise SceneError(f"aspect must be from 0.01 to 100, not {self.aspect}")
         if not 16 <= self.voxels <= 4096:
@@ -77,7 +77,7 @@ class SceneOptions:
             raise SceneError(f"seed must not be negative: {self.seed}")
 
     def dragon_mesh(self) -> Mesh:
-        """The dragon to use: ours, or the file's, normalised to our size."""
+        """Returns the dragon to use: the built-in one, or the file's mesh scaled to its size."""
         if self.dragon is None:
             return dragon(self.triangles)
         from wavecomb.scenes.meshfile import load_dragon

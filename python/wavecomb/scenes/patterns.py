@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What procedural images are made of: tileable noise, ramps and mixtures.
+"""Components of procedural images: tileable noise, ramps and mixtures.
 
-Images are float32 arrays (height, width, channels), values (height, width), row 0 on top.
+Images are float32 arrays (height, width, channels), values are (height, width). Row 0 is on top.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ Image = NDArray[np.float32]
 
 
 def grid(size: int) -> tuple[Image, Image]:
-    """Texel centres x (1, size) and y (size, 1) in 0 to 1; y grows downwards."""
+    """Returns texel centres x (1, size) and y (size, 1) in 0 to 1; y grows downwards."""
     t = ((np.arange(size) + 0.5) / size).astype(np.float32)
     return t[None, :], t[:, None]
 
 
 def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Image]:
-    """Lattice neighbours of places 0 to 1, wrapped, and the eased weight of the second."""
+    """Returns the two lattice neighbours of positions 0 to 1, and the weight of the second."""
     place = t * cells
     low = np.floor(place)
     f = (place - low).astype(np.float32)
@@ -31,14 +31,14 @@ def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], 
 def value_noise(
     x: Image, y: Image, cells: int, rng: np.random.Generator, rows: int | None = None
 ) -> Image:
-    """Tileable value noise, 0 to 1, with ``cells`` lattice cells to the unit.
+    """Evaluates tileable value noise, 0 to 1, with ``cells`` lattice cells per unit.
 
     Args:
-        x: Places across, any shape; (1, w) together with y (h, 1) is a grid and much faster.
-        y: Places down.
-        cells: Lattice cells to the unit.
+        x: Horizontal positions, of any shape; (1, w) with y (h, 1) is a grid, which is much faster.
+        y: Vertical positions.
+        cells: Lattice cells per unit.
         rng: Source of the lattice values.
-        rows: Lattice cells down, where they are others than across.
+        rows: Vertical lattice cells, if different.
     """
     rows = rows or cells
     lattice = rng.random((rows, cells)).astype(np.float32)
@@ -61,7 +61,7 @@ def fractal(
     gain: float = 0.5,
     rows: int | None = None,
 ) -> Image:
-    """Sum of octaves of tileable value noise, 0 to 1; ``rows`` as of ``value_noise``."""
+    """Sums octaves of tileable value noise, scaled to 0 to 1; ``rows`` is as in ``value_noise``."""
     rows = rows or cells
     total = np.zeros(np.broadcast(x, y).shape, np.float32)
     weight = 1.0
@@ -74,7 +74,7 @@ def fractal(
 
 
 def shifted(image: Image, dx: Image, dy: Image) -> Image:
-    """Bilinear lookup of a tileable (n, n) image, each texel moved by dx, dy (in image widths)."""
+    """Looks up a tileable (n, n) image bilinearly at texels offset by dx, dy (in image widths)."""
     size = image.shape[0]
     columns = np.arange(size, dtype=np.float32)[None, :] + dx * size
     rows = np.arange(size, dtype=np.float32)[:, None] + dy * size
@@ -87,7 +87,7 @@ def shifted(image: Image, dx: Image, dy: Image) -> Image:
 
 
 def ramp(t: Image, stops: list[tuple[float, tuple[float, float, float]]]) -> Image:
-    """Colours (h, w, 3) of values (h, w) by linear interpolation between stops."""
+    """Maps values (h, w) to colours (h, w, 3) by linear interpolation between stops."""
     places = [place for place, _ in stops]
     return np.stack(
         [np.interp(t, places, [colour[k] for _, colour in stops]) for k in range(3)], axis=2
@@ -95,12 +95,12 @@ def ramp(t: Image, stops: list[tuple[float, tuple[float, float, float]]]) -> Ima
 
 
 def mix(a: Image, b: Image, weight: Image) -> Image:
-    """From a to b, (h, w, 3), by a weight (h, w)."""
+    """Interpolates from a to b, (h, w, 3), by a weight (h, w)."""
     return a + (b - a) * weight[..., None]
 
 
 def flat(colour: tuple[float, float, float]) -> Image:
-    """An image of one texel."""
+    """Makes an image of one texel."""
     return np.array(colour, np.float32).reshape(1, 1, 3)
 
 
@@ -111,11 +111,11 @@ def step(x: Image, low: float, high: float) -> Image:
 
 
 def normal_map(height: Image, metres: float) -> Image:
-    """Normal map, n stored as 0.5 + 0.5 n, of tileable heights (size, size) in metres.
+    """Converts tileable heights (size, size) to a normal map that stores n as 0.5 + 0.5 n.
 
     Args:
-        height: Of the surface at each texel, metres.
-        metres: Edge of the image.
+        height: Height of the surface at each texel, in metres.
+        metres: Edge of the image, in metres.
     """
     per_metre = 0.5 * height.shape[0] / metres
     slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * per_metre

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PLY files, ASCII and binary."""
+"""Reader of PLY files, ASCII and binary."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wavecomb.scenes.mesh import FloatArray
 
 @dataclass(frozen=True)
 class RawMesh:
-    """What a file holds: points float64 (n, 3), triangles int64 (m, 3), uv (n, 2) or None."""
+    """Mesh of a file: points float64 (n, 3), triangles int64 (m, 3), uv (n, 2) or None."""
 
     points: FloatArray
     faces: np.ndarray
@@ -20,7 +20,7 @@ class RawMesh:
 
 
 def fans(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """Triangle fans of polygons: counts (k,), indices (sum,) -> int64 (m, 3)."""
+    """Splits polygons into triangle fans: counts (k,), indices (sum,) -> int64 (m, 3)."""
     counts = np.asarray(counts, np.int64)
     indices = np.asarray(indices, np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(indices)):
@@ -58,7 +58,10 @@ _PLY_TYPES = {
 
 @dataclass
 class _Element:
-    """A PLY element: its count and properties (name, type, type of the list's count or None)."""
+    """An element of a PLY file.
+
+    Properties are (name, type, count type of a list or None for a scalar).
+    """
 
     name: str
     count: int
@@ -66,7 +69,7 @@ class _Element:
 
 
 def _ply_header(data: bytes) -> tuple[str, list[_Element], int]:
-    """Format, elements and offset of the body."""
+    """Parses the header; returns the format, the elements and the offset of the body."""
     if not data.startswith(b"ply"):
         raise ValueError("it does not begin with 'ply'")
     end = data.find(b"end_header")
@@ -95,7 +98,7 @@ def _ply_header(data: bytes) -> tuple[str, list[_Element], int]:
 
 
 class _PlyBody:
-    """Reads elements one after the other."""
+    """Reader of a file's body, element by element."""
 
     def __init__(self, data: bytes, offset: int, style: str) -> None:
         self._data = data
@@ -105,7 +108,7 @@ class _PlyBody:
         self._word = 0
 
     def scalars(self, element: _Element) -> dict[str, np.ndarray]:
-        """Columns of an element without lists."""
+        """Reads an element without lists; returns its columns."""
         names = [name for name, _, _ in element.properties]
         if self._words is not None:
             size = element.count * len(names)
@@ -128,7 +131,7 @@ class _PlyBody:
         return rows
 
     def lists(self, element: _Element) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Counts and values of each list of an element; its scalars are skipped."""
+        """Reads the counts and values of each list of an element; skips scalars."""
         uniform = self._uniform(element)
         if uniform is not None:
             return uniform
@@ -146,7 +149,7 @@ class _PlyBody:
         return {name: (np.array(counts[name]), np.concatenate(values[name])) for name in counts}
 
     def _uniform(self, element: _Element) -> dict[str, tuple[np.ndarray, np.ndarray]] | None:
-        """The same where all lists have three entries, at once; None where they have not."""
+        """Does the same in one step if all lists have three entries, else returns None."""
         if self._words is not None:
             if len(element.properties) != 1:
                 return None
@@ -195,7 +198,7 @@ class _PlyBody:
 
 
 def read_ply(data: bytes) -> RawMesh:
-    """PLY: vertex x, y, z and s, t or u, v where present; faces of any size."""
+    """Reads a mesh from PLY: vertex x, y, z, optional s, t or u, v, and faces of any size."""
     style, elements, offset = _ply_header(data)
     body = _PlyBody(data, offset, style)
     points: FloatArray | None = None
@@ -222,7 +225,7 @@ def read_ply(data: bytes) -> RawMesh:
 
 
 def ply_vertices(data: bytes) -> dict[str, np.ndarray]:
-    """PLY: all columns of the vertices, which are no lists, by name, float64 (n,)."""
+    """Reads all scalar columns of the vertices of a PLY file, by name, float64 (n,)."""
     style, elements, offset = _ply_header(data)
     if not elements or elements[0].name != "vertex":
         raise ValueError("it does not begin with vertices")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reliefs of tubes: scales, plates, rings, folds and grain.
 
-A relief is evaluated on a tube's grid. Detail that the grid is too coarse for is left out, so that
-a coarse mesh is smooth, not noisy, and a fine one shows more.
+A relief is evaluated on a tube's grid. Detail finer than the grid is left out, so that a coarse
+mesh is smooth instead of noisy, and a fine mesh shows more.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ def ramp(x: FloatArray, low: float, high: float) -> FloatArray:
 
 
 def _visible(cells: FloatArray) -> FloatArray:
-    """Weight of a feature whose wavelength is so many grid cells: 0 below 2.5, 1 above 5."""
+    """Returns the weight of a feature by its wavelength in grid cells: 0 below 2.5, 1 above 5."""
     return ramp(cells, 2.5, 5.0)
 
 
 def _scale_height(row: FloatArray, column: FloatArray, edge: FloatArray) -> FloatArray:
-    """Height 0 to 1 of overlapping, staggered scales whose tips point to lower rows.
+    """Returns the height, 0 to 1, of overlapping, staggered scales whose tips point to lower rows.
 
     Args:
-        row: Lattice coordinate along, one row a unit.
-        column: Lattice coordinate around, one scale a unit.
-        edge: Width of the rim, lattice units.
+        row: Lattice coordinate along the tube, one row per unit.
+        column: Lattice coordinate around the tube, one scale per unit.
+        edge: Width of the rim, in lattice units.
     """
     base = np.floor(-row)
     y = -row - base
@@ -55,7 +55,7 @@ def _scale_height(row: FloatArray, column: FloatArray, edge: FloatArray) -> Floa
 
 
 def _grain(surface: Surface, around: int) -> FloatArray:
-    """Fine irregular grain, about -1 to 1, of products of sines with unrelated frequencies."""
+    """Returns fine irregular grain, about -1 to 1: products of sines of unrelated frequencies."""
     a = 2.0 * np.pi * surface.around
     b = 2.0 * np.pi * surface.turns * around
     total = np.zeros(np.broadcast(a, b).shape)
@@ -72,13 +72,14 @@ def _grain(surface: Surface, around: int) -> FloatArray:
 def scaly(
     around: int, depth: float, belly: float, fade: Callable[[FloatArray], FloatArray] | None = None
 ) -> Relief:
-    """Relief of scales above, transverse plates below, and grain.
+    """Makes a relief of scales above, transverse plates below, and grain.
 
     Args:
-        around: Scales around the tube.
+        around: Number of scales around the tube.
         depth: Height of a scale in local radii.
-        belly: Part of the turn, each side of the underside, that has plates; 0 for none.
-        fade: Factor on everything as a function of ``along``.
+        belly: Fraction of the circumference, on each side of the underside, that has plates; 0 for
+            none.
+        fade: Factor on the whole relief as a function of ``along``.
     """
 
     def relief(surface: Surface) -> FloatArray:
@@ -101,7 +102,7 @@ def scaly(
 
 
 def ringed(rings: float, depth: float) -> Relief:
-    """Relief of horns: rings across and fine grooves along."""
+    """Makes a relief for horns: rings across and fine grooves along."""
 
     def relief(surface: Surface) -> FloatArray:
         ring = np.abs(np.sin(np.pi * rings * surface.along**0.8))
@@ -112,7 +113,7 @@ def ringed(rings: float, depth: float) -> Relief:
 
 
 def fluted(folds: int, depth: float) -> Relief:
-    """Relief of fins and tufts: folds along the blade."""
+    """Makes a relief for fins and tufts: folds along the blade."""
 
     def relief(surface: Surface) -> FloatArray:
         fold = np.sin(2.0 * np.pi * folds * surface.around + 2.0 * surface.along)
@@ -122,5 +123,5 @@ def fluted(folds: int, depth: float) -> Relief:
 
 
 def skin(depth: float) -> Relief:
-    """Relief of bare skin: grain only."""
+    """Makes a relief for bare skin: grain only."""
     return lambda surface: depth * (_grain(surface, 9) + 0.6 * _grain(surface, 40))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An interior as people have them: a dining room, lit through a door that stands ajar.
+"""A dining room that is lit through a door that stands ajar.
 
-The only lamp hangs next door, so that most of what is seen was lit by bounces. Lengths are metres.
-Materials are UsdPreviewSurface without a program, as of any exporter, some 40 of them, and images
-tile in sizes of real boards, threads and grains.
+The only light is in the next room, so that most of the visible light is indirect. Lengths are
+metres. Some 40 materials are UsdPreviewSurface without a Wavecomb program, as most exporters write
+them, and images repeat at the sizes of real boards, threads and grains.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.teapot import teapot
 
 COLUMNS_A_LEVEL = 4
-"""Cells around what is turned, for each of ``SceneOptions.teapot_level``."""
+"""Cells around a body of revolution, for each unit of ``SceneOptions.teapot_level``."""
 _LAMP = (-1.6, 3.2)
-"""Middle of the lamp next door, x and z."""
+"""Centre of the light in the next room, x and z."""
 _LAMP_SIZE = (1.2, 0.6)
 _RADIANCE = (1100.0, 1000.0, 860.0)
 _RUG_TOP = 0.011
@@ -36,7 +36,7 @@ _OBJECTS = "/World/Objects"
 
 
 def build_room(writer: StageWriter, options: SceneOptions) -> None:
-    """Fills the stage; ``teapot_level`` says how finely what is turned is cut."""
+    """Builds the room. ``teapot_level`` sets the resolution of bodies of revolution."""
     rng = np.random.default_rng([options.seed, 4])
     columns = max(12, COLUMNS_A_LEVEL * options.teapot_level)
     write_looks(writer, options)
@@ -50,7 +50,7 @@ def build_room(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _lamp(writer: StageWriter) -> None:
-    """A flat panel below the ceiling of the next room."""
+    """Adds a flat light panel below the ceiling of the next room."""
     x, z = _LAMP
     half_x, half_z = 0.5 * _LAMP_SIZE[0] + 0.02, 0.5 * _LAMP_SIZE[1] + 0.02
     low, high = (x - half_x, HEIGHT - 0.02, z - half_z), (x + half_x, HEIGHT + 0.01, z + half_z)
@@ -59,7 +59,7 @@ def _lamp(writer: StageWriter) -> None:
 
 
 def _floor(writer: StageWriter, columns: int, rng: np.random.Generator) -> None:
-    """What stands on the floor."""
+    """Adds the objects on the floor."""
     x, z = _TABLE
     add_object(writer, f"{_OBJECTS}/Rug", furniture.rug(), (x, 0.0, z))
     add_object(writer, f"{_OBJECTS}/Table", furniture.table(), (x, _RUG_TOP, z))
@@ -89,7 +89,7 @@ def _floor(writer: StageWriter, columns: int, rng: np.random.Generator) -> None:
 
 
 def _table(writer: StageWriter, columns: int, options: SceneOptions) -> None:
-    """What stands on the table, by places on it."""
+    """Adds the objects on the table."""
     top = furniture.TABLE_TOP + _RUG_TOP
 
     def at(x: float, z: float, up: float = 0.0) -> tuple[float, float, float]:
@@ -128,7 +128,7 @@ def _table(writer: StageWriter, columns: int, options: SceneOptions) -> None:
 
 
 def _centred(parts: list[Part]) -> list[Part]:
-    """The parts with the middle of all of them over the origin."""
+    """Moves parts so that their common centre is over the origin."""
     low = np.min([mesh.bounds[0] for mesh, _ in parts], axis=0)
     high = np.max([mesh.bounds[1] for mesh, _ in parts], axis=0)
     middle = 0.5 * (low + high) * [1.0, 0.0, 1.0]
@@ -144,17 +144,18 @@ _ROWS = (
     (2, 0.0, 6, 9.0),
     (2, 0.40, 4, 0.0),
 )
-"""Books in a row of the case, the lowest first: row, from where, how many, how the last leans."""
+"""Rows of books in the bookcase, the lowest first: shelf, start in metres, number of books, and the
+lean of the last one in degrees."""
 
 
 def _bookcase(
     writer: StageWriter, columns: int, options: SceneOptions, rng: np.random.Generator
 ) -> None:
-    """The bookcase at the wall with the door, its books, and what stands on it."""
+    """Adds the bookcase at the wall with the door, its books, and objects on top."""
     back, middle = 0.02, 1.14
 
     def at(along: float, height: float, out: float) -> tuple[float, float, float]:
-        """Place by what the bookcase's front shows: along it, height, and out of the wall."""
+        """Converts a position along the bookcase's front, height and distance from the wall."""
         return back + out, height, middle - along
 
     add_object(writer, f"{_OBJECTS}/Bookcase", wall.bookcase(), at(0.0, 0.0, 0.0), 90.0)
@@ -194,7 +195,7 @@ def _bookcase(
 
 
 def _walls(writer: StageWriter, columns: int) -> None:
-    """What hangs on the walls."""
+    """Adds the pictures and the mirror on the walls."""
     pictures = [
         ("Hills", (0.86, 0.62), "Walnut", 0.06, (1.82, 1.56, DEPTH), 180.0),
         ("Fern", (0.42, 0.56), "Iron", 0.05, (2.62, 1.56, DEPTH), 180.0),

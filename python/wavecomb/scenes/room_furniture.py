@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands on the floor of the room: table, chairs, sofa, ottoman, lamp, side table, rug, plant.
+"""Furniture of the room: table, chairs, sofa, ottoman, lamp, side table, rug, plant.
 
-Each is a list of parts that stands on y = 0 about the origin, its front towards +z.
+Each function returns parts that stand on y = 0 about the origin, with the front towards +z.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ TABLE_TOP = 0.74
 """Height of the table."""
 SIDE_TABLE_TOP = 0.52
 SEAT = 0.45
-"""Height of a sofa's and a chair's seat."""
+"""Height of a sofa's or chair's seat."""
 _TABLE = (1.5, 0.86)
 
 
@@ -42,7 +42,7 @@ def _leg(x: float, z: float, height: float, width: float, foot: float, seed: int
 
 
 def table() -> list[Part]:
-    """A dining table of walnut."""
+    """Makes a dining table of walnut."""
     x, z = 0.5 * _TABLE[0], 0.5 * _TABLE[1]
     parts = [rounded_box((-x, TABLE_TOP - 0.032, -z), (x, TABLE_TOP, z), 0.008, 3)]
     low, high, inset = TABLE_TOP - 0.12, TABLE_TOP - 0.03, 0.07
@@ -57,7 +57,7 @@ def table() -> list[Part]:
 
 
 def chair(columns: int) -> list[Part]:
-    """A chair with a leather seat; it faces +z."""
+    """Makes a chair with a leather seat that faces +z."""
     half, deep, thick = 0.21, 0.21, 0.035
     parts: list[Part] = []
     for k, side in enumerate((-1.0, 1.0)):
@@ -86,7 +86,7 @@ def chair(columns: int) -> list[Part]:
 
 
 def sofa(columns: int) -> list[Part]:
-    """A sofa for two with a wooden foot at each corner, 1.9 m wide; it faces +z."""
+    """Makes a sofa for two, 1.9 m wide, with a wooden foot at each corner; it faces +z."""
     half, deep, arm = 0.95, 0.43, 0.15
     inner = half - arm
     body = [
@@ -116,14 +116,14 @@ def sofa(columns: int) -> list[Part]:
 
 
 def cushion(width: float, material: str) -> list[Part]:
-    """A cushion that leans back a little; it faces +z and rests on its lower edge."""
+    """Makes a cushion that leans back slightly, faces +z and rests on its lower edge."""
     lean = turn_about(0, -24.0)
     mesh = placed(pillow(width, width, 0.36 * width), turn=lean)
     return [(placed(mesh, (0.0, -float(mesh.points[:, 1].min()), 0.0)), material)]
 
 
 def ottoman(columns: int) -> list[Part]:
-    """A round leather pouf on a wooden ring."""
+    """Makes a round leather ottoman on a wooden ring."""
     radius, height = 0.29, 0.40
     body = turned(
         [(0, 0.035), (radius - 0.02, 0.035), (radius - 0.02, 0.035), (radius, 0.06),
@@ -139,14 +139,14 @@ def ottoman(columns: int) -> list[Part]:
 
 
 def _ring(radius: float, height: float, thick: float, columns: int) -> Mesh:
-    """A torus about y."""
+    """Makes a torus about y."""
     turn = np.linspace(0.0, 2.0 * np.pi, 13)
     profile = np.column_stack([radius + thick * np.cos(turn), height + thick * np.sin(turn)])
     return turned(profile, 2 * columns, 1)
 
 
 def floor_lamp(columns: int) -> list[Part]:
-    """A floor lamp, switched off: brass foot and pole, linen shade, bulb."""
+    """Makes a floor lamp, switched off: brass foot and pole, linen shade, bulb."""
     foot = turned(
         [(0, 0), (0.15, 0), (0.15, 0), (0.152, 0.012), (0.14, 0.02), (0.03, 0.03), (0.014, 0.05),
          (0.011, 0.10), (0.011, 1.42), (0.011, 1.42), (0, 1.42)],
@@ -171,7 +171,7 @@ def floor_lamp(columns: int) -> list[Part]:
 
 
 def side_table(columns: int) -> list[Part]:
-    """A round marble top on a brass column."""
+    """Makes a side table with a round marble top on a brass column."""
     top, radius = SIDE_TABLE_TOP, 0.215
     slab = turned(
         [(0, top - 0.022), (radius - 0.004, top - 0.022), (radius - 0.004, top - 0.022),
@@ -188,14 +188,14 @@ def side_table(columns: int) -> list[Part]:
 
 
 def rug() -> list[Part]:
-    """A knotted rug."""
+    """Makes a knotted rug."""
     x, z = 0.5 * RUG_METRES[0], 0.5 * RUG_METRES[1]
     mesh = rounded_box((-x, 0.0, -z), (x, 0.011, z), 0.005, 2)
     return [(mapped_flat(mesh, 0, 2), "Rug")]
 
 
 def plant(columns: int, rng: np.random.Generator) -> list[Part]:
-    """A rubber plant in a pot of terracotta."""
+    """Makes a rubber plant in a terracotta pot."""
     pot = turned(
         [(0, 0), (0.10, 0), (0.10, 0), (0.135, 0.22), (0.135, 0.22), (0.155, 0.222), (0.158, 0.27),
          (0.156, 0.276), (0.143, 0.276), (0.14, 0.27), (0.13, 0.20), (0, 0.20)],
@@ -219,7 +219,7 @@ def plant(columns: int, rng: np.random.Generator) -> list[Part]:
 def _leaf(
     start: np.ndarray, turn: float, length: float, lift: float, rng: np.random.Generator
 ) -> Mesh:
-    """A leaf on a short stalk: it rises by ``lift``, then bends down."""
+    """Makes a leaf on a short stalk that rises by ``lift`` and then bends down."""
     out = np.array([math.cos(turn), 0.0, math.sin(turn)])
     rise = np.array([0.0, 0.45 + 0.9 * (lift + rng.uniform(-0.1, 0.1)), 0.0])
     steps = ((0.0, 0.0), (0.25, 0.24), (0.5, 0.40), (0.78, 0.36), (1.0, 0.18))

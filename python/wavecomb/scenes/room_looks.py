@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of the room: UsdPreviewSurface as anybody writes it, no program named."""
+"""Materials of the room: UsdPreviewSurface without a Wavecomb program."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.textures import TextureInfo
 
 MARBLE_METRES = 0.45
-"""Edge of the surface that the image ``marble`` shows here."""
+"""Edge of the area that the image ``marble`` covers in this scene, in metres."""
 _FULL_SIZE = 2048
 _LEAST_SIZE = 16
 
@@ -30,7 +30,7 @@ ROOM_TEXTURES = {
     "fields": TextureInfo(images.fields, 1024, True),
     "fern": TextureInfo(images.fern, 1024, True),
 }
-"""Images of the room's own, beside those of ``textures.TEXTURES``."""
+"""Images that only the room uses, in addition to ``textures.TEXTURES``."""
 
 _PLASTER = 1.0 / images.PLASTER_METRES
 _WEAVE = 1.0 / images.LINEN_METRES
@@ -46,7 +46,10 @@ def coated(
     textures: dict[str, str] | None = None,
     repeat: float = 1.0,
 ) -> MaterialInfo:
-    """A coloured surface under a clear coat; ``textures`` and ``repeat`` as of ``preview``."""
+    """Makes a coloured surface under a clear coat.
+
+    ``textures`` and ``repeat`` are as in ``preview``.
+    """
     values: dict[str, float | int | Colour] = {
         "diffuseColor": colour,
         "roughness": roughness,
@@ -108,11 +111,11 @@ LOOKS: dict[str, MaterialInfo] = {
     "Fields": preview({"roughness": 0.6}, {"diffuseColor": "fields"}),
     "Fern": preview({"roughness": 0.8}, {"diffuseColor": "fern"}),
 }
-"""Every material of the room by name."""
+"""All materials of the room by name."""
 
 
 def write_textures(writer: StageWriter, options: SceneOptions) -> None:
-    """Lets materials name the room's images."""
+    """Registers the room's images, so that materials can use them."""
     for name, info in ROOM_TEXTURES.items():
         size = max(_LEAST_SIZE, info.size * options.texture_size // _FULL_SIZE)
         scaled = TextureInfo(info.make, size, info.colour, info.channels, info.normal)

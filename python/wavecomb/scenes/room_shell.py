@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walls, floor, ceiling and door of the room, and of the room next door where the lamp is.
+"""Walls, floor, ceiling and door of the room, and of the next room with the light.
 
-Walls are solids that reach into floor, ceiling and one another, so that no ray finds a gap.
+Walls are solids that overlap floor, ceiling and one another, so that no ray finds a gap.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from wavecomb.scenes.shapes import placed, rounded_box, tube, turn_about, turned
 from wavecomb.scenes.stage import StageWriter
 
 HEIGHT, WIDTH, DEPTH = 2.7, 5.0, 4.0
-"""Of the room, along y, x and z."""
+"""Size of the room along y, x and z, in metres."""
 PARTITION = 0.12
-"""Thickness of the wall with the door, which lies in x < 0."""
+"""Thickness of the wall with the door, which is at x < 0."""
 DOOR_LOW, DOOR_HIGH, DOOR_TOP = 2.4, 3.3, 2.05
-"""The doorway: its z from and to, and its height."""
+"""Doorway: start and end along z, and height."""
 NEXT_X, NEXT_LOW, NEXT_HIGH = -3.2, 0.9, 4.6
-"""The next room: its far wall, and its z from and to."""
+"""Next room: x of its far wall, and its start and end along z."""
 DOOR_DEGREES = 25.0
 _THICK = 0.15
 _INTO = 0.05
-"""How far solids reach into each other."""
+"""Overlap of adjacent solids, in metres."""
 _LINING = 0.025
 _LEAF = 0.04
 _GAP = 0.004
@@ -53,7 +53,7 @@ def _walls(writer: StageWriter) -> None:
 def _solid(
     writer: StageWriter, path: str, low: FloatArray, high: FloatArray, material: str
 ) -> None:
-    """A box of flat polygons whose texture coordinates are metres, boards along x on a floor."""
+    """Adds a box of flat polygons with texture coordinates in metres, boards along x on a floor."""
     points: list[FloatArray] = []
     uv: list[FloatArray] = []
     polygons: list[list[int]] = []
@@ -71,7 +71,10 @@ def _solid(
 
 
 def _partition(writer: StageWriter, near: float, far: float) -> None:
-    """The wall with the doorway: both faces, the reveal, and what lies in floor and ceiling."""
+    """Adds the wall with the doorway: both faces and the reveal.
+
+    The outer edges are hidden in floor and ceiling.
+    """
     low, high = -_INTO, HEIGHT + _INTO
     outline = np.array(
         [
@@ -82,7 +85,7 @@ def _partition(writer: StageWriter, near: float, far: float) -> None:
     count = len(outline)
     front = np.column_stack([np.zeros(count), outline])
     back = front - [PARTITION, 0.0, 0.0]
-    # The outline runs clockwise as seen from +x.
+    # The outline is clockwise as seen from +x.
     polygons = [list(range(count))[::-1], list(range(count, 2 * count))]
     polygons += [[k, (k + 1) % count, count + (k + 1) % count, count + k] for k in range(count)]
     points = np.concatenate([front, back])
@@ -91,7 +94,7 @@ def _partition(writer: StageWriter, near: float, far: float) -> None:
 
 
 def _skirting(writer: StageWriter) -> None:
-    """Boards along the foot of the walls, which end at the casing of the door."""
+    """Adds skirting boards along the walls, which end at the casing of the door."""
     height, deep, casing = 0.095, 0.016, 0.075
     runs = [
         ((0.0, 0.0), (WIDTH, deep)),
@@ -103,7 +106,7 @@ def _skirting(writer: StageWriter) -> None:
         ((NEXT_X, NEXT_HIGH - deep), (-PARTITION, NEXT_HIGH)),
         ((NEXT_X, NEXT_LOW), (-PARTITION, NEXT_LOW + deep)),
     ]
-    hidden = 0.004  # in wall and floor, so that no face lies in another
+    hidden = 0.004  # sunk into wall and floor, to avoid coincident faces
     boards = []
     for (x0, z0), (x1, z1) in runs:
         low, high = (x0 - hidden, -hidden, z0 - hidden), (x1 + hidden, height, z1 + hidden)
@@ -112,8 +115,8 @@ def _skirting(writer: StageWriter) -> None:
 
 
 def _door_frame(writer: StageWriter) -> None:
-    """Lining of the doorway, casings on both sides, and a stop for the leaf."""
-    deep = 0.006  # how far it stands out of the wall beyond the lining
+    """Adds the lining of the doorway, casings on both sides, and a door stop."""
+    deep = 0.006  # protrusion from the wall beyond the lining, in metres
     parts: list[Part] = []
 
     def board(low: tuple[float, ...], high: tuple[float, ...]) -> None:
@@ -139,7 +142,7 @@ def _door_frame(writer: StageWriter) -> None:
 
 
 def _door(writer: StageWriter, columns: int) -> None:
-    """A leaf of stiles, rails and two sunk panels, hinged at the far side, and its handles."""
+    """Adds the door of stiles, rails and two sunk panels, with its handles."""
     wide = DOOR_HIGH - DOOR_LOW - 2.0 * (_LINING + _GAP)
     top = DOOR_TOP - _LINING - 2.0 * _GAP
     stile, lock, sunk = 0.11, 0.95, 0.012
@@ -159,12 +162,12 @@ def _door(writer: StageWriter, columns: int) -> None:
         board(y0 + 0.05, y1 - 0.05, stile + 0.05, wide - stile - 0.05, 0.004)
     parts += _handles(wide - 0.06, lock, columns)
     hinge = (0.0, 0.0, DOOR_HIGH - _LINING - _GAP)
-    # A turn about +y takes -z towards -x: the leaf opens into the room, towards +x.
+    # A rotation about +y turns -z towards -x. The negative angle opens the door into the room (+x).
     add_object(writer, "/World/Objects/Door", parts, hinge, -DOOR_DEGREES)
 
 
 def _handles(reach: float, height: float, columns: int) -> list[Part]:
-    """A rose and a lever on each side, so far from the hinge."""
+    """Makes a rose and a lever on each side of the door, at a distance from the hinge."""
     rose = turned(
         [(0, -0.002), (0.026, -0.002), (0.026, -0.002), (0.027, 0.006), (0.024, 0.008),
          (0.024, 0.008), (0.009, 0.009), (0.009, 0.009), (0.009, 0.03), (0.0, 0.03)],
@@ -182,7 +185,7 @@ def _handles(reach: float, height: float, columns: int) -> list[Part]:
 
 
 def build_shell(writer: StageWriter, columns: int) -> None:
-    """Adds what does not move but the door; ``columns``: cells around what is turned."""
+    """Adds walls and door; ``columns`` is the number of cells around bodies of revolution."""
     _walls(writer)
     _skirting(writer)
     _door_frame(writer)

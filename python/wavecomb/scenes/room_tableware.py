@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands on the room's table: cups, saucers, spoons, a bowl with fruit, a vase, glasses.
+"""Objects on the room's table: cups, saucers, spoons, a bowl with fruit, a vase, glasses.
 
-Each is a list of parts that stands on y = 0 about the origin.
+Each function returns parts that stand on y = 0 about the origin, except where it says otherwise.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ _BOWL = np.array(
      [0.05, 0.013], [0, 0.011]]
 )  # fmt: skip
 _BOWL_INSIDE = 8
-"""Rows of ``_BOWL`` from here on are its inside."""
+"""Index of the first row of ``_BOWL`` on the inside."""
 
 
 def saucer(columns: int) -> list[Part]:
-    """A saucer with a well for the cup."""
+    """Makes a saucer with a well for the cup."""
     profile = [
         (0, 0.003), (0.022, 0.003), (0.023, 0), (0.028, 0), (0.030, 0.003), (0.055, 0.008),
         (0.074, 0.016), (0.0765, 0.0185), (0.074, 0.0195), (0.055, 0.0115), (0.031, 0.008),
@@ -42,7 +42,7 @@ def saucer(columns: int) -> list[Part]:
 
 
 def cup(columns: int, is_full: bool) -> list[Part]:
-    """A tea cup with a handle."""
+    """Makes a tea cup with a handle."""
     profile = [
         (0, 0.004), (0.017, 0.004), (0.018, 0), (0.022, 0), (0.023, 0.004), (0.034, 0.013),
         (0.0395, 0.033), (0.043, 0.057), (0.0435, 0.0605), (0.042, 0.0608), (0.0405, 0.057),
@@ -57,7 +57,7 @@ def cup(columns: int, is_full: bool) -> list[Part]:
 
 
 def spoon(columns: int) -> list[Part]:
-    """A tea spoon of steel that lies along x."""
+    """Makes a steel tea spoon that lies along x."""
     points = [(0.0, 0.0045, 0), (0.018, 0.0025, 0), (0.038, 0.004, 0), (0.055, 0.009, 0),
               (0.10, 0.0065, 0), (0.135, 0.004, 0)]  # fmt: skip
     wide = [0.004, 0.0135, 0.010, 0.0026, 0.0028, 0.005]
@@ -67,12 +67,12 @@ def spoon(columns: int) -> list[Part]:
 
 
 def bowl(columns: int) -> list[Part]:
-    """A bowl for fruit."""
+    """Makes a fruit bowl."""
     return [(grounded(turned(_BOWL, 2 * columns)), "Celadon")]
 
 
 def _rest_height(out: float, radius: float) -> float:
-    """Height of the middle of a ball that lies in the bowl, so far from its axis."""
+    """Returns the height of a ball's centre in the bowl, ``out`` metres from its axis."""
     inside = spline(_BOWL, np.linspace(0.0, 1.0, 400))
     inside = inside[int(400 * _BOWL_INSIDE / (len(_BOWL) - 1)) :]
     apart = np.abs(inside[:, 0] - out)
@@ -82,7 +82,7 @@ def _rest_height(out: float, radius: float) -> float:
 
 
 def fruit_places() -> list[FloatArray]:
-    """Middles of three balls of radius ``FRUIT`` in the bowl and one on top of them."""
+    """Returns the centres of three balls of radius ``FRUIT`` in the bowl and of one on top."""
     out = 1.02 * 2.0 * FRUIT / math.sqrt(3.0)
     low = _rest_height(out, FRUIT)
     ring = [2.0 * math.pi * k / 3.0 + 0.5 for k in range(3)]
@@ -92,7 +92,7 @@ def fruit_places() -> list[FloatArray]:
 
 
 def apple(columns: int, tilt: float) -> list[Part]:
-    """An apple about the origin, its stalk turned down from upright by ``tilt`` degrees."""
+    """Makes an apple about the origin, its stalk tilted by ``tilt`` degrees from vertical."""
     r = FRUIT
     profile = [(0, -0.72 * r), (0.12 * r, -0.80 * r), (0.35 * r, -0.95 * r), (0.75 * r, -0.80 * r),
                (1.04 * r, -0.1 * r), (0.98 * r, 0.55 * r), (0.6 * r, 0.92 * r),
@@ -106,7 +106,7 @@ def apple(columns: int, tilt: float) -> list[Part]:
 
 
 def orange(columns: int) -> list[Part]:
-    """An orange about the origin."""
+    """Makes an orange about the origin."""
     a = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 17)
     profile = np.column_stack([FRUIT * np.cos(a), 0.97 * FRUIT * np.sin(a)])
     profile[[0, -1], 0] = 0.0
@@ -114,7 +114,7 @@ def orange(columns: int) -> list[Part]:
 
 
 def pear(columns: int) -> list[Part]:
-    """A pear that stands."""
+    """Makes a standing pear."""
     profile = [(0, 0.003), (0.012, 0), (0.03, 0.006), (0.038, 0.03), (0.030, 0.058),
                (0.019, 0.078), (0.013, 0.092), (0.004, 0.097), (0, 0.094)]  # fmt: skip
     stalk = tube([(0, 0.09, 0), (0.002, 0.105, 0), (0.007, 0.116, 0)], 0.0014, 8, 8)
@@ -122,7 +122,7 @@ def pear(columns: int) -> list[Part]:
 
 
 def tumbler(columns: int) -> list[Part]:
-    """A drinking glass with a heavy foot."""
+    """Makes a drinking glass with a thick foot."""
     profile = [
         (0, 0), (0.031, 0), (0.031, 0), (0.033, 0.002), (0.0375, 0.096), (0.0375, 0.0975),
         (0.0365, 0.0975), (0.036, 0.096), (0.0315, 0.013), (0.030, 0.0105), (0.028, 0.01),
@@ -132,7 +132,7 @@ def tumbler(columns: int) -> list[Part]:
 
 
 def vase(columns: int, rng: np.random.Generator) -> list[Part]:
-    """A vase with a few dry twigs."""
+    """Makes a vase with a few dry twigs."""
     profile = [
         (0, 0.004), (0.036, 0.004), (0.038, 0), (0.042, 0.002), (0.058, 0.05), (0.072, 0.11),
         (0.062, 0.17), (0.032, 0.21), (0.025, 0.235), (0.031, 0.258), (0.032, 0.262),
@@ -160,7 +160,7 @@ def _bud(place: FloatArray, rng: np.random.Generator) -> Mesh:
 
 
 def statue(dragon: Mesh) -> list[Part]:
-    """The dragon in bronze on a plinth of marble, 0.38 m long; it faces +x."""
+    """Makes the dragon in bronze on a marble plinth, 0.38 m long, facing +x."""
     plinth = rounded_box((-0.185, 0.0, -0.075), (0.185, PLINTH, 0.075), 0.004, 3)
     low, high = dragon.bounds
     scale = 0.36 / float(high[0] - low[0])

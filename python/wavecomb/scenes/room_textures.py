@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of the room's walls, floor, fabrics and books and of the pictures that hang in it."""
+"""Images of the room's walls, floor, fabrics and books, and of the pictures on its walls."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from wavecomb.scenes.patterns import (
 
 PLASTER_METRES, PLANKS_METRES, WALNUT_METRES = 1.6, 2.4, 0.5
 LINEN_METRES, LEATHER_METRES = 0.16, 0.18
-"""Edge of the surface that an image shows."""
+"""Edge of the area that an image covers, in metres."""
 RUG_METRES = (2.7, 1.9)
-"""What the rug's image covers, which is not square."""
+"""Size of the rug's image, in metres. The area is not square."""
 _BOARDS = 16
 _THREADS = 64
 _LAYOUT_SEED = 78
@@ -41,7 +41,7 @@ def plaster(size: int, rng: np.random.Generator) -> Image:
 
 
 def plaster_normal(size: int, rng: np.random.Generator) -> Image:
-    """Normal map of plaster: strokes of a trowel and grains of sand, up to a millimetre high."""
+    """Normal map of plaster: trowel strokes and grains of sand, up to a millimetre high."""
     x, y = grid(size)
     strokes = fractal(x, y, 12, 4, rng, 0.5, rows=6)
     grains = fractal(x, y, 128, 3, rng, 0.6)
@@ -50,7 +50,7 @@ def plaster_normal(size: int, rng: np.random.Generator) -> Image:
 
 @functools.lru_cache(maxsize=1)
 def _planks(size: int) -> tuple[Image, Image, Image]:
-    """Joints, tone of each board and grain, (size, size); the images of the floor share them."""
+    """Returns joints, board tones and grain, (size, size), which the floor's images share."""
     rng = np.random.default_rng(_LAYOUT_SEED)
     x, y = grid(size)
     across = x * _BOARDS
@@ -72,7 +72,7 @@ def _planks(size: int) -> tuple[Image, Image, Image]:
 
 
 def planks(size: int, rng: np.random.Generator) -> Image:
-    """A floor of oak boards, 15 cm wide, along v."""
+    """Floor of oak boards, 15 cm wide, along v."""
     del rng
     joint, tone, grain = _planks(size)
     oak = ramp(
@@ -83,7 +83,7 @@ def planks(size: int, rng: np.random.Generator) -> Image:
 
 
 def planks_roughness(size: int, rng: np.random.Generator) -> Image:
-    """Roughness of oiled boards: grain is duller, joints are matt, steps have polished some."""
+    """Roughness of oiled boards: duller grain, matt joints, areas polished by steps."""
     joint, tone, grain = _planks(size)
     x, y = grid(size)
     worn = step(fractal(x, y, 3, 4, rng), 0.4, 0.7)
@@ -92,7 +92,7 @@ def planks_roughness(size: int, rng: np.random.Generator) -> Image:
 
 
 def walnut(size: int, rng: np.random.Generator) -> Image:
-    """Oiled walnut, quiet and nearly straight in the grain, which runs along v."""
+    """Oiled walnut with a calm, nearly straight grain along v."""
     x, y = grid(size)
     warp = fractal(x, y, 5, 4, rng, 0.45, rows=1)
     ring = ((12.0 * x + 3.0 * warp) % 1.0).astype(np.float32)
@@ -109,7 +109,7 @@ def walnut(size: int, rng: np.random.Generator) -> Image:
 
 
 def _threads(size: int, rng: np.random.Generator) -> tuple[Image, Image]:
-    """Height of plain weave, and how strong each thread is; both 0 to 1."""
+    """Returns the height of a plain weave and the strength of each thread, both 0 to 1."""
     x, y = grid(size)
     px, py = x * _THREADS, y * _THREADS
     ix, iy = np.floor(px), np.floor(py)
@@ -123,7 +123,7 @@ def _threads(size: int, rng: np.random.Generator) -> tuple[Image, Image]:
 
 
 def linen(size: int, rng: np.random.Generator) -> Image:
-    """Undyed linen, near white; materials tint it by the scale of the texture."""
+    """Undyed linen, near white. Materials tint it by the scale of the texture."""
     height, strength = _threads(size, rng)
     shade = (0.55 + 0.45 * height) * (0.93 + 0.07 * strength)
     return np.clip(flat((0.80, 0.79, 0.76)) * shade[..., None], 0, 1).astype(np.float32)
@@ -177,7 +177,7 @@ def rug(size: int, rng: np.random.Generator) -> Image:
     picture = mix(red, navy, here)
 
     def lattice(pitch: float, reach: float) -> Image:
-        """Diamonds of half width ``reach`` on a grid, both in metres."""
+        """Returns a mask of diamonds of half width ``reach`` on a grid, both in metres."""
         u, v = (across / pitch) % 1.0 - 0.5, (down / pitch) % 1.0 - 0.5
         return ((np.abs(u) + np.abs(v)) * pitch < reach).astype(np.float32)
 
@@ -204,7 +204,7 @@ def rug(size: int, rng: np.random.Generator) -> Image:
 
 
 def pages(size: int, rng: np.random.Generator) -> Image:
-    """The edges of a book's pages: fine lines across v."""
+    """Edges of a book's pages: fine lines across v."""
     x, y = grid(size)
     leaf = value_noise(0.0 * x + 0.5, y, 128, rng) + 0.0 * x
     tone = 0.84 + 0.16 * leaf + 0.04 * (fractal(x, y, 16, 3, rng) - 0.5)
@@ -212,7 +212,7 @@ def pages(size: int, rng: np.random.Generator) -> Image:
 
 
 def hills(size: int, rng: np.random.Generator) -> Image:
-    """Hills behind hills in an evening haze, and a low sun."""
+    """Rows of hills in an evening haze, and a low sun."""
     x, y = grid(size)
     sky = ramp(
         np.broadcast_to(y, (size, size)),

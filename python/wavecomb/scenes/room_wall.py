@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands or hangs at the room's walls: the bookcase and its books, pictures, the mirror."""
+"""Objects at the room's walls: the bookcase and its books, pictures, the mirror."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from wavecomb.scenes.mesh import Mesh
 from wavecomb.scenes.shapes import disc, mapped_flat, placed, rounded_box, turn_about, turned
 
 SHELF_WIDTH, SHELF_DEPTH, SHELF_TOP = 1.2, 0.29, 1.10
-"""Of the bookcase."""
+"""Width, depth and height of the bookcase."""
 BOARD = 0.022
 _BOARDS_Y = (0.07, 0.42, 0.75, SHELF_TOP - BOARD)
-"""Undersides of its boards."""
+"""Heights of the undersides of the bookcase's boards."""
 
 
 def shelf_floor(row: int) -> float:
-    """Height on which things stand in a row of the bookcase, the lowest first."""
+    """Returns the height on which objects stand in a row of the bookcase; row 0 is the lowest."""
     return _BOARDS_Y[row] + BOARD
 
 
 def bookcase() -> list[Part]:
-    """A low bookcase of walnut with three rows; its back is at z = 0, it faces +z."""
+    """Makes a low walnut bookcase with three rows, its back at z = 0, facing +z."""
     half, deep = 0.5 * SHELF_WIDTH, SHELF_DEPTH
     panel = rounded_box((-half + 0.01, 0.06, 0.0), (half - 0.01, SHELF_TOP - 0.005, 0.008), 0.001)
     parts = []
@@ -45,7 +45,7 @@ def bookcase() -> list[Part]:
 
 
 def book(width: float, height: float, thick: float, cover: str) -> list[Part]:
-    """A book that stands on y = 0, its spine at z = 0 towards +z, x from 0 to ``thick``."""
+    """Makes a book that stands on y = 0, its spine at z = 0 towards +z, x from 0 to ``thick``."""
     board, inset = 0.0025, 0.003
     parts: list[Part] = []
     for x in (0.0, thick - board):
@@ -74,18 +74,18 @@ def book(width: float, height: float, thick: float, cover: str) -> list[Part]:
 
 
 def _along_x(mesh: Mesh) -> Mesh:
-    """The mesh with lines of a texture's rows across x: its leaves lie side by side there."""
+    """Returns the mesh with texture rows across x, because the pages are stacked along x."""
     uv = np.stack([mesh.points[:, 1] + mesh.points[:, 2], mesh.points[:, 0]], axis=1)
     return Mesh(mesh.points, mesh.faces, mesh.normals, uv.astype(np.float32))
 
 
 def leaning(parts: list[Part], degrees: float) -> list[Part]:
-    """A book that leans towards -x on its lower edge at x = 0."""
+    """Turns a book so that it leans towards -x on its lower edge at x = 0."""
     return [(placed(mesh, turn=turn_about(2, degrees)), material) for mesh, material in parts]
 
 
 def lying(parts: list[Part], thick: float, turn_degrees: float) -> list[Part]:
-    """A book that lies on its side, its spine still towards +z, then turned about y."""
+    """Lays a book on its side, its spine still towards +z, and then rotates it about y."""
     turn = turn_about(1, turn_degrees) @ turn_about(2, -90.0)
     return [
         (placed(mesh, turn_about(1, turn_degrees) @ np.array([0.0, thick, 0.0]), turn), material)
@@ -94,7 +94,7 @@ def lying(parts: list[Part], thick: float, turn_degrees: float) -> list[Part]:
 
 
 def picture(width: float, height: float, image: str, frame: str, mat: float) -> list[Part]:
-    """A framed picture that hangs at z = 0 and faces +z, its middle at the origin."""
+    """Makes a framed picture that hangs at z = 0 and faces +z, centred at the origin."""
     x, y, bar, deep = 0.5 * width, 0.5 * height, 0.022, 0.026
     parts: list[Part] = []
     for side in (-1.0, 1.0):
@@ -114,12 +114,12 @@ def picture(width: float, height: float, image: str, frame: str, mat: float) -> 
 
 
 def mirror(columns: int) -> list[Part]:
-    """A round mirror in a brass rim that hangs at z = 0 and faces +z, its middle at the origin."""
+    """Makes a round mirror in a brass rim at z = 0 that faces +z, centred at the origin."""
     radius, rim = 0.27, 0.011
     turn = np.linspace(0.0, 2.0 * math.pi, 13)
     profile = np.column_stack([radius + rim * np.cos(turn), 0.013 + rim * np.sin(turn)])
     ring = turned(profile, 2 * columns, 1)
-    # What is turned about y is tipped over to face +z.
+    # Bodies of revolution are made about y, and then turned to face +z.
     tip = turn_about(0, 90.0)
     glass = disc(radius, 0.013, 2 * columns)
     return [(placed(ring, turn=tip), "Brass"), (placed(glass, turn=tip), "Mirror")]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes that furniture is made of: rounded boxes, turned profiles, tubes and pillows.
+"""Basic shapes of furniture: rounded boxes, bodies of revolution, tubes and pillows.
 
-All are closed meshes in metres whose texture coordinates are metres, too, with v along the grain.
+All are closed meshes in metres. Texture coordinates are also in metres, with v along the grain.
 """
 
 from __future__ import annotations
@@ -24,16 +24,19 @@ from wavecomb.scenes.mesh import (
 from wavecomb.scenes.sweep import Tube, spline, tube_mesh
 
 Vector = Sequence[float] | FloatArray
-"""Three numbers."""
+"""Sequence of two or three numbers."""
 
 _WELD_DIGITS = 6
-"""Points are rounded to so many digits, so that faces that meet share them."""
+"""Number of decimals that points are rounded to, so that adjacent faces share points exactly."""
 _TUBE_LENGTH = 0.5
-"""Metres that a unit of texture coordinates takes along a tube of ``sweep``."""
+"""Length of a tube of ``sweep`` per unit of texture coordinates, in metres."""
 
 
 def turn_about(axis: int, degrees: float) -> FloatArray:
-    """Matrix (3, 3) of a turn about x, y or z: counter-clockwise as seen from the axis's tip."""
+    """Returns the rotation matrix (3, 3) about axis x, y or z (0, 1 or 2).
+
+    Positive angles are counter-clockwise as seen from the tip of the axis.
+    """
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     matrix = np.eye(3)
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -42,7 +45,7 @@ def turn_about(axis: int, degrees: float) -> FloatArray:
 
 
 def placed(mesh: Mesh, offset: Vector = (0.0, 0.0, 0.0), turn: FloatArray | None = None) -> Mesh:
-    """The mesh turned by a rotation (3, 3), then shifted (3,)."""
+    """Returns the mesh rotated by a matrix (3, 3), then translated by (3,)."""
     matrix = np.eye(3) if turn is None else turn
     points = mesh.points.astype(np.float64) @ matrix.T + np.asarray(offset, float)
     normals = mesh.normals.astype(np.float64) @ matrix.T
@@ -50,12 +53,12 @@ def placed(mesh: Mesh, offset: Vector = (0.0, 0.0, 0.0), turn: FloatArray | None
 
 
 def grounded(mesh: Mesh) -> Mesh:
-    """The mesh shifted so that it stands on y = 0."""
+    """Returns the mesh translated so that it stands on y = 0."""
     return placed(mesh, (0.0, -float(mesh.points[:, 1].min()), 0.0))
 
 
 def mapped_flat(mesh: Mesh, across: int, up: int) -> Mesh:
-    """The mesh with texture coordinates 0 to 1 over its bounds along two axes."""
+    """Returns the mesh with texture coordinates from 0 to 1 over its bounds along two axes."""
     low, high = mesh.bounds
     axes = [across, up]
     uv = (mesh.points[:, axes] - low[axes]) / (high - low)[axes]
@@ -63,7 +66,7 @@ def mapped_flat(mesh: Mesh, across: int, up: int) -> Mesh:
 
 
 def tapered(mesh: Mesh, foot: float) -> Mesh:
-    """The mesh drawn in towards the y axis: by ``foot`` at its lowest point, by 1 on top."""
+    """Returns the mesh scaled towards the y axis: by ``foot`` at its lowest point, by 1 on top."""
     low, high = mesh.bounds
     height = (mesh.points[:, 1] - low[1]) / (high[1] - low[1])
     points = mesh.points.copy()
@@ -79,14 +82,14 @@ def rounded_box(
     bulge: Vector = (0.0, 0.0, 0.0),
     uv_offset: Vector = (0.0, 0.0),
 ) -> Mesh:
-    """A box with rounded edges.
+    """Makes a box with rounded edges.
 
     Args:
         low: Lower corner (3,).
         high: Upper corner (3,).
-        radius: Of the edges; at most half of the thinnest side.
+        radius: Radius of the edges; at most half of the thinnest side.
         arc: Cells on an eighth of a circle.
-        bulge: How far the middle of the faces across x, y and z stands out, as upholstery does.
+        bulge: Height of the bulge of the faces across x, y and z, for upholstery.
         uv_offset: Added to texture coordinates (2,), so that boards differ.
     """
     low, high, swell = (np.asarray(v, float) for v in (low, high, bulge))
@@ -121,19 +124,19 @@ def rounded_box(
 
 
 def _lengths(curve: FloatArray) -> FloatArray:
-    """Length of a polyline (n, k) up to each of its points, (n,)."""
+    """Returns the length of a polyline (n, k) up to each of its points, (n,)."""
     steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4) -> Mesh:
-    """A body of revolution about y.
+    """Makes a body of revolution about y.
 
     Args:
-        profile: Control points (radius, height) of a spline, upwards on the outside, from axis to
-            axis; a point given twice is nearly a corner.
+        profile: Control points (radius, height) of a spline from axis to axis, upwards on the
+            outside. A point given twice is nearly a corner.
         columns: Cells around.
-        steps: Cells from one control point to the next.
+        steps: Cells between two control points.
     """
     control = np.asarray(profile, float)
     curve = spline(control, np.linspace(0.0, 1.0, steps * (len(control) - 1) + 1))
@@ -152,7 +155,7 @@ def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4)
 
 
 def disc(radius: float, height: float, columns: int) -> Mesh:
-    """A flat disc at a height, seen from above."""
+    """Makes a flat disc at a height, facing up."""
     return turned([(radius, height), (0.5 * radius, height), (0.0, height)], columns, 2)
 
 
@@ -164,14 +167,14 @@ def tube(
     height: float | Sequence[float] | None = None,
     up: Vector = (0.0, 0.0, 1.0),
 ) -> Mesh:
-    """A closed tube with round ends along a spline.
+    """Makes a closed tube with round ends along a spline.
 
     Args:
-        points: Control points of its middle (k, 3).
-        width: Half its width: one number, or one for each point.
+        points: Control points of the centre line, (k, 3).
+        width: Half width: one number, or one for each point.
         columns: Cells around.
         rings: Cells along.
-        height: Half its height along ``up``, where it is not as wide.
+        height: Half height along ``up``; None makes it equal to the half width.
         up: Direction that is not along the tube.
     """
     control = np.asarray(points, float)
@@ -184,7 +187,7 @@ def tube(
 
 
 def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mesh:
-    """A pillow in the plane of x and y, its front towards +z, its middle at the origin."""
+    """Makes a pillow in the xy plane, its front towards +z, centred at the origin."""
     t = np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, cells + 1))
     t[[0, -1]] = -1.0, 1.0
     x, y = np.meshgrid(t, t, indexing="xy")
@@ -194,14 +197,15 @@ def pillow(width: float, depth: float, thickness: float, cells: int = 20) -> Mes
         0.5 * depth * y * (1.0 - pinch * (1.0 - x * x)),
     ]
     swell = 0.5 * thickness * np.sqrt((1.0 - x**4) * (1.0 - y**4))
-    # The cloth is as long as the pillow's middle is: it is not stretched where it bends.
+    # Texture coordinates follow the arc length along the middle, so that the cloth is not
+    # stretched.
     middle = np.stack([flat[0][cells // 2], swell[cells // 2]], axis=1)
     upright = np.stack([flat[1][:, cells // 2], swell[:, cells // 2]], axis=1)
     uv = np.stack(np.meshgrid(_lengths(middle), _lengths(upright)), axis=2)
     sides = []
     for sign in (1.0, -1.0):
         points = np.round(np.stack([*flat, sign * swell], 2), _WELD_DIGITS)
-        # Rows run up and columns right: their product points away from +z.
+        # Rows run up and columns right, so their cross product points away from +z.
         sides.append(grid_mesh(points, uv, np.zeros(points.shape), reverse=sign > 0.0))
     both = merge(sides)
     return replace(both, normals=smooth_normals(both.points, both.faces))

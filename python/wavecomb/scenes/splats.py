@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A dragon of Gaussian splats before a mirror: as a capture would be, made of our own mesh.
+"""A dragon of Gaussian splats in front of a mirror, like a capture but made from a mesh.
 
-Splats are flat and lie on the mesh; what they shine is worked out from one lamp, with a sheen that
-changes with the view.
+Splats are flat and lie on the mesh. Their colours come from one light, with a view-dependent sheen.
 """
 
 from __future__ import annotations
@@ -23,23 +22,24 @@ from wavecomb.scenes.ply import ply_vertices
 from wavecomb.scenes.stage import StageWriter
 
 _COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
-"""Degree by how many coefficients there are beside the first."""
+"""Degree of the spherical harmonics, by the number of coefficients after the first, over all
+channels."""
 _DIRECTIONS = 128
-"""In which colours are looked at."""
+"""Number of directions in which colours are evaluated."""
 _CHUNK = 1 << 15
-"""Splats whose colours are worked out at once."""
+"""Number of splats whose colours are converted at once."""
 
 
 @dataclass
 class Splats:
-    """Gaussian splats, as UsdVol has them.
+    """Gaussian splats, with the attributes of UsdVol.
 
     Attributes:
         positions: (n, 3).
         scales: (n, 3), lengths.
         orientations: (n, 4) quaternions w, x, y, z.
         opacities: (n,) from 0 to 1.
-        harmonics: (n, k, 3) of the colour less 0.5.
+        harmonics: (n, k, 3), coefficients of the colour minus 0.5.
     """
 
     positions: FloatArray
@@ -50,12 +50,13 @@ class Splats:
 
 
 def read_capture(path: Path) -> Splats:
-    """Reads what 3DGS and its kin write.
+    """Reads a PLY file of 3D Gaussian splatting.
 
-    Columns x, y, z, scale_* (logarithms), rot_*, opacity (a logit), f_dc_*, f_rest_* (by channel).
+    Columns are x, y, z, scale_* (logarithms), rot_*, opacity (a logit), f_dc_*, f_rest_* (by
+    channel).
 
     Raises:
-        SceneError: The file is something else.
+        SceneError: The file is not such a capture.
     """
     try:
         columns = ply_vertices(path.read_bytes())
@@ -90,9 +91,9 @@ def read_capture(path: Path) -> Splats:
 
 
 def basis(directions: FloatArray) -> FloatArray:
-    """Real spherical harmonics up to degree 3 of unit directions (n, 3): (n, 16).
+    """Evaluates real spherical harmonics up to degree 3 in unit directions (n, 3): (n, 16).
 
-    With the phase of Condon and Shortley, as geometry/gaussian_splat/harmonics.h has them.
+    Uses the Condon-Shortley phase, like geometry/gaussian_splat/harmonics.h.
     """
     x, y, z = directions.T
     xx, yy, zz = x * x, y * y, z * z
@@ -112,10 +113,10 @@ def basis(directions: FloatArray) -> FloatArray:
 
 
 def linear_harmonics(harmonics: FloatArray) -> FloatArray:
-    """Harmonics of linear light (n, k, 3), less 0.5, for those of colours in sRGB.
+    """Converts harmonics of sRGB colours to harmonics of linear light, (n, k, 3), both minus 0.5.
 
-    Colours are decoded in directions all over the sphere, and the harmonics are those of least
-    squares. What is below 0 there is 0.
+    Decodes the colours in directions all over the sphere, with negative values set to 0, and fits
+    harmonics by least squares.
     """
     from wavecomb.picture.image import linear_from_srgb
 
@@ -134,7 +135,7 @@ def linear_harmonics(harmonics: FloatArray) -> FloatArray:
 
 
 def add_splats(writer: StageWriter, path: str, splats: Splats) -> None:
-    """Adds a prim of splats to a stage."""
+    """Adds a prim of Gaussian splats to a stage."""
     prim = writer.stage.DefinePrim(path, "ParticleField3DGaussianSplat")
 
     def put(name: str, kind: Any, values: FloatArray) -> None:
@@ -142,7 +143,7 @@ def add_splats(writer: StageWriter, path: str, splats: Splats) -> None:
 
     put("positions", Vt.Vec3fArray, splats.positions)
     put("scales", Vt.Vec3fArray, splats.scales)
-    # In memory the real part of a quaternion comes last.
+    # USD stores the real part of a quaternion last in memory.
     put("orientations", Vt.QuatfArray, splats.orientations[:, [1, 2, 3, 0]])
     put("opacities", Vt.FloatArray, splats.opacities)
     degree = round(splats.harmonics.shape[1] ** 0.5) - 1
@@ -162,7 +163,7 @@ _LAMP = np.array([-3.2, 6.0, 4.5])
 
 
 def places(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Points (n, 3) of a mesh, by area alike, and normals there."""
+    """Samples points (n, 3) of a mesh uniformly by area, and their normals."""
     areas = np.asarray(face_areas(mesh.points, mesh.faces), np.float64)
     sums = np.cumsum(areas)
     wanted = (np.arange(count) + rng.uniform(size=count)) / count * sums[-1]
@@ -175,7 +176,10 @@ def places(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[FloatArray
 
 
 def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
-    """Quaternions w, x, y, z (n, 4) from z to unit vectors, after turns about z by ``spin``."""
+    """Returns quaternions w, x, y, z (n, 4) that rotate z to unit vectors.
+
+    A rotation about z by ``spin`` comes first.
+    """
     half = np.stack(
         [1.0 + normals[:, 2], -normals[:, 1], normals[:, 0], np.zeros(len(normals))], axis=1
     )
@@ -187,7 +191,7 @@ def turns_to(normals: FloatArray, spin: FloatArray) -> FloatArray:
 
 
 def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Coefficients (n, 4, 3) of degree 1 for what splats there shine, less 0.5."""
+    """Returns coefficients (n, 4, 3) of degree 1 of the splats' emission, minus 0.5."""
     height = np.maximum(points[:, 1] / points[:, 1].max(), 0.0)
     bands = 0.5 + 0.5 * np.sin(26.0 * height + 2.0 * np.sin(5.0 * points[:, 0]))
     low, high = np.array([0.06, 0.30, 0.26]), np.array([0.85, 0.55, 0.16])
@@ -196,7 +200,8 @@ def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -
     lit = np.maximum((normals * normalized(_LAMP - points)).sum(1), 0.0)
     sky = 0.22 + 0.16 * normals[:, 1]
     shine = paint * (0.62 * lit + 0.8 * sky)[:, None]
-    # Brighter where it is looked at from above and the lamp's side: a linear function of direction.
+    # Splats are brighter when seen from above and from the light's side, as a linear function of
+    # direction.
     half = normalized(normalized(_LAMP - points) + normals)
     sheen = -0.18 * half * lit[:, None]
     out = np.empty((len(points), 4, 3))
@@ -208,7 +213,7 @@ def colours(points: FloatArray, normals: FloatArray, rng: np.random.Generator) -
 
 
 def build_splats(writer: StageWriter, options: SceneOptions) -> None:
-    """Floor, mirror, lamp, and the dragon; or a capture alone."""
+    """Builds floor, mirror, light and dragon, or a capture alone."""
     if options.capture is not None:
         capture = read_capture(Path(options.capture))
         if not options.capture_linear:

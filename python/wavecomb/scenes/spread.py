@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A field of stones whose materials, textures, triangles and shading cost are chosen one by one.
+"""A field of stones whose materials, textures, triangles and shading cost can be set separately.
 
-For measuring how a renderer scales. Each stone is a mesh of its own, no instance, so that triangles
-are memory. Materials are dealt at random, so that neighbours differ. Each has a texture of its own,
-and the triangles of a stone lie all over it, as the charts of an atlas do: what neighbours read is
-not neighbouring memory, and the more triangles are seen, the more of the texture is read. Dear
-materials lay octaves of noise over it, in a network of MaterialX nodes.
+The stage measures how a renderer scales. Each stone is a separate mesh, not an instance, so that
+triangles need memory. Materials are assigned at random, so that neighbours differ. Each material
+has a separate texture, over which the triangles of a stone are scattered like the charts of an
+atlas. Adjacent triangles thus read distant texels, and more visible triangles read more of the
+texture. Expensive materials multiply the texture by octaves of noise, in a network of MaterialX
+nodes.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ MAX_MATERIALS = 4096
 MAX_TEXTURE_MB = 4096.0
 MAX_COST = 1000.0
 _OCTAVES_OF_NODE = 8
-"""Most octaves of one fractal; dearer materials add several."""
+"""Largest number of octaves of one fractal node. More expensive materials add several nodes."""
 _BYTES_PER_TEXEL = 4.0 * 4.0 / 3.0
-"""Memory of a texel of 8 bit colour as the core holds it, mip levels included."""
+"""Bytes of a texel of 8-bit colour in the core, including mip levels."""
 
 
 def build_spread(writer: StageWriter, options: SceneOptions) -> None:
-    """Fills the stage; ``SceneOptions`` says with how much."""
+    """Builds the field with the sizes in ``SceneOptions``."""
     check_field(
         "spread",
         options,
@@ -54,14 +55,15 @@ def build_spread(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def _edge(options: SceneOptions) -> int:
-    """Edge of each material's texture in texels; 0 without textures."""
+    """Returns the edge of each material's texture in texels, or 0 without textures."""
     return texture_edge(options, _BYTES_PER_TEXEL, TILE) if options.texture_mb > 0.0 else 0
 
 
 def octaves(options: SceneOptions, index: int) -> int:
-    """Octaves of noise on material ``index``: ``shader_cost`` on the last, geometrically between.
+    """Returns the octaves of noise on material ``index``.
 
-    The first has 1, which stands for its texture alone, without noise.
+    They grow geometrically from 1 for the first material, which means no noise, to ``shader_cost``
+    for the last.
     """
     share = index / (options.materials - 1) if options.materials > 1 else 1.0
     return round(options.shader_cost**share)
@@ -78,7 +80,8 @@ _PROGRAMS = (
     lambda colour: looks.metal(colour, 0.25),
     lambda colour: looks.dielectric(colour, 0.1),
 )
-"""Makers of a material from its colour; those of the first ``programs`` are used in turn."""
+"""Functions that make a material from its colour. The first ``programs`` of them are used in
+turn."""
 
 
 def _material(
@@ -99,7 +102,7 @@ def _material(
 
 
 def _texture(writer: StageWriter, index: int, edge: int, colour: tuple[float, ...]) -> str:
-    """The name of a pattern in a colour."""
+    """Defines a pattern in a colour and returns its texture name."""
 
     def tinted(size: int, source: np.random.Generator) -> Image:
         grey = grey_pattern(index, size, source)
@@ -111,7 +114,7 @@ def _texture(writer: StageWriter, index: int, edge: int, colour: tuple[float, ..
 
 
 def _lay_noise(writer: StageWriter, path: str, texture: str | None, count: int) -> None:
-    """Multiplies the colour of a UsdPreviewSurface by one over which noise lies."""
+    """Multiplies the colour of a UsdPreviewSurface by noise."""
     net = Network(writer.stage, path)
     surface = UsdShade.Shader.Get(writer.stage, f"{path}/Surface")
     colour = surface.GetInput("diffuseColor")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes generated stages: meshes, materials, lights, cameras, instances and texture files."""
+"""Writer of generated stages: meshes, materials, lights, cameras, instances and texture files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wavecomb.scenes.textures import TEXTURES, TextureInfo, sky, write_image
 SUFFIXES = (".usda", ".usdc", ".usd")
 BOX_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-"""Corners of a cube about the origin, (8, 3), and its faces, outwards."""
+"""Corners of a cube about the origin, (8, 3), and its faces, facing outwards."""
 _INPUT_TYPES = {
     "diffuseColor": Sdf.ValueTypeNames.Color3f,
     "specularColor": Sdf.ValueTypeNames.Color3f,
@@ -32,7 +32,7 @@ _INPUT_TYPES = {
 
 
 def _shine(light: Any, colour: Sequence[float]) -> None:
-    """Gives a light its intensity, and a colour whose largest channel is 1."""
+    """Sets the intensity of a light, and a colour whose largest channel is 1."""
     peak = max(colour)
     light.CreateIntensityAttr(peak)
     light.CreateColorAttr(_vec([v / peak for v in colour]))
@@ -43,7 +43,7 @@ def _vec(values: Sequence[float] | FloatArray) -> Gf.Vec3f:
 
 
 class StageWriter:
-    """Builds a Y-up stage in memory; ``save`` writes it, whole or not at all.
+    """Builder of a Y-up stage in memory. ``save`` writes the stage, never partially.
 
     Texture files are written as soon as a material needs them, to ``<stem>_textures/`` beside the
     stage, and are referenced by relative paths.
@@ -61,10 +61,10 @@ class StageWriter:
 
         Args:
             path: File to write: .usda, .usdc or .usd (binary).
-            metres_per_unit: Length of a scene unit.
-            texture_size: Edge of the largest textures; the others shrink in proportion.
-            seed: Of the random patterns in textures.
-            is_plain: Whether materials are written in their plain form, ``materials.plain``.
+            metres_per_unit: Length of a scene unit, in metres.
+            texture_size: Edge of the largest textures in texels; all others shrink in proportion.
+            seed: Random seed of the patterns in textures.
+            is_plain: Whether materials are written in their plain form, see ``materials.plain``.
         """
         if path.suffix.lower() not in SUFFIXES:
             raise SceneError(f"{path}: a stage's name must end in .usda, .usdc or .usd")
@@ -86,7 +86,7 @@ class StageWriter:
             UsdGeom.Scope.Define(self.stage, f"/World/{scope}")
 
     def save(self, comment: str) -> None:
-        """Writes the stage, replacing the file only when all of it is there."""
+        """Writes the stage, replacing the file only when complete."""
         self.stage.GetRootLayer().comment = comment
         suffix = ".usdc" if self._path.suffix.lower() == ".usd" else self._path.suffix.lower()
         part = self._path.with_name(f".{self._path.stem}.part{suffix}")
@@ -129,7 +129,7 @@ class StageWriter:
         material: str | None = None,
         uv: FloatArray | None = None,
     ) -> UsdGeom.Mesh:
-        """Adds flat polygons: points (n, 3), uv (n, 2)."""
+        """Adds flat polygons with points (n, 3) and uv (n, 2)."""
         prim = UsdGeom.Mesh.Define(self.stage, path)
         prim.CreatePointsAttr([_vec(p) for p in points])
         prim.CreateFaceVertexCountsAttr([len(p) for p in polygons])
@@ -158,7 +158,7 @@ class StageWriter:
     def floor(
         self, name: str, half: float, material: str, y: float = 0.0, uv: FloatArray | None = None
     ) -> None:
-        """Adds a horizontal square about the y axis, ``half`` wide to each side."""
+        """Adds a horizontal square centred on the y axis, with a half width of ``half``."""
         h = half
         corners = [[-h, y, h], [h, y, h], [h, y, -h], [-h, y, -h]]
         self.quad(f"/World/Set/{name}", corners, material, uv)
@@ -170,7 +170,7 @@ class StageWriter:
         half: Sequence[float] | FloatArray,
         material: str,
     ) -> None:
-        """Adds a box of flat polygons: its middle and half its edges, each (3,)."""
+        """Adds a box of flat polygons from its centre and half its edge lengths, each (3,)."""
         self.polygons(path, np.asarray(middle) + BOX_CORNERS * np.asarray(half), BOX, material)
 
     def prototype(self, name: str, mesh: Mesh) -> str:
@@ -189,7 +189,7 @@ class StageWriter:
         turn_degrees: float = 0.0,
         scale: float = 1.0,
     ) -> Usd.Prim:
-        """Adds a native instance of a prototype, turned about Y, with its own material."""
+        """Adds a native instance of a prototype, rotated about Y, and binds a material to it."""
         xform = UsdGeom.Xform.Define(self.stage, path)
         xform.AddTranslateOp().Set(Gf.Vec3d(*(float(v) for v in position)))
         xform.AddRotateYOp().Set(float(turn_degrees))
@@ -201,11 +201,11 @@ class StageWriter:
         return prim
 
     def bind(self, prim: Usd.Prim, material: str) -> None:
-        """Binds a material that ``material`` has made."""
+        """Binds a material that was added by ``material`` or ``own_material``."""
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(self._materials[material])
 
     def material(self, name: str, info: MaterialInfo) -> str:
-        """Adds a material, once for each name, with the textures it needs; returns the name."""
+        """Adds a material with its textures, once for each name; returns the name."""
         if name in self._materials:
             return name
         if self._is_plain:
@@ -227,12 +227,15 @@ class StageWriter:
         return name
 
     def own_material(self, name: str, material: UsdShade.Material) -> str:
-        """Lets ``bind`` know a material that was made by other means; returns the name."""
+        """Registers a material that was made by other means for ``bind``; returns the name."""
         self._materials[name] = material
         return name
 
     def define_texture(self, name: str, info: TextureInfo) -> None:
-        """Lets materials name a texture of the scene's own; ``info.size`` is its edge as it is."""
+        """Registers a texture of the scene by name.
+
+        ``info.size`` is its edge, which is not scaled.
+        """
         self._own[name] = info
 
     def _textures(self, path: str, surface: UsdShade.Shader, info: MaterialInfo) -> None:
@@ -270,7 +273,7 @@ class StageWriter:
         return self._beside("textures", file_name)
 
     def volume_file(self, file_name: str) -> tuple[Path, Sdf.AssetPath]:
-        """Where a file of grids goes, in ``<stem>_volumes/``, and the path that a stage has."""
+        """Returns the path of a file in ``<stem>_volumes/``, and its asset path in the stage."""
         return self._beside("volumes", file_name)
 
     def _beside(self, kind: str, file_name: str) -> tuple[Path, Sdf.AssetPath]:
@@ -279,7 +282,7 @@ class StageWriter:
         return folder / file_name, Sdf.AssetPath(f"./{folder.name}/{file_name}")
 
     def texture_file(self, name: str) -> Sdf.AssetPath:
-        """Writes a texture, once, and returns the path that a stage has for it."""
+        """Writes a texture, once, and returns its asset path in the stage."""
         file, asset = self._texture_path(f"{name}.png")
         if name not in self._written:
             if name in self._own:
@@ -302,7 +305,7 @@ class StageWriter:
         radiance: Sequence[float],
         tilt_degrees: float = -90.0,
     ) -> None:
-        """Adds a rectangle that emits along its -Z, turned about X; -90 shines straight down."""
+        """Adds a rectangle light that emits along -Z, rotated about X; -90 emits straight down."""
         light = UsdLux.RectLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateWidthAttr(width)
         light.CreateHeightAttr(height)
@@ -313,7 +316,7 @@ class StageWriter:
     def sphere_light(
         self, name: str, position: Sequence[float], radius: float, radiance: Sequence[float]
     ) -> None:
-        """Adds a ball that shines."""
+        """Adds a sphere light."""
         light = UsdLux.SphereLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateRadiusAttr(radius)
         _shine(light, radiance)
@@ -323,10 +326,10 @@ class StageWriter:
         """Adds a distant light.
 
         Args:
-            name: Of the prim.
-            way: Direction that its light travels, (3,).
-            angle: That it is seen under, degrees.
-            radiant: Irradiance of what faces it, rgb.
+            name: Name of the prim.
+            way: Direction in which its light travels, (3,).
+            angle: Angular diameter, in degrees.
+            radiant: Irradiance of a surface that faces the light, RGB.
         """
         light = UsdLux.DistantLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateAngleAttr(angle)
@@ -347,7 +350,7 @@ class StageWriter:
         light.AddRotateYOp().Set(turn_degrees)
 
     def even_dome(self, name: str, radiance: float) -> None:
-        """Adds an environment that is white all around."""
+        """Adds a uniform white environment."""
         light = UsdLux.DomeLight.Define(self.stage, f"/World/Lights/{name}")
         light.CreateIntensityAttr(radiance)
 
@@ -359,17 +362,17 @@ class StageWriter:
         aspect: float,
         focal_mm: float = 35.0,
     ) -> None:
-        """Adds ``/World/Camera``, a pinhole that looks at a point, +Y up.
+        """Adds ``/World/Camera``, a pinhole camera that looks at a point, with +Y up.
 
         Args:
-            position: Of the pinhole, (3,), scene units.
-            target: Point in the middle of the picture, (3,), scene units.
+            position: Position of the pinhole, (3,), in scene units.
+            target: Point in the middle of the image, (3,), in scene units.
             fov_degrees: Horizontal angle of view.
-            aspect: Width / height of the picture.
-            focal_mm: Focal length; the aperture follows from it and the angle.
+            aspect: Width / height of the image.
+            focal_mm: Focal length in mm; the aperture follows from it and the angle of view.
         """
         camera = UsdGeom.Camera.Define(self.stage, "/World/Camera")
-        # USD's camera units are tenths of a scene unit; only the ratio to the aperture counts.
+        # USD's camera units are tenths of a scene unit. Only the ratio to the aperture matters.
         aperture = 2.0 * focal_mm * math.tan(math.radians(0.5 * fov_degrees))
         camera.CreateFocalLengthAttr(focal_mm)
         camera.CreateHorizontalApertureAttr(aperture)

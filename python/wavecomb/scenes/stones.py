@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A field of stones, each a closed mesh of its own, for stages that are about their materials."""
+"""A field of stones, each a separate closed mesh, for stages that test materials."""
 
 from __future__ import annotations
 
@@ -19,24 +19,27 @@ from wavecomb.scenes.stage import StageWriter
 from wavecomb.scenes.textures import marble, weave, wood
 
 STONES = 144
-"""At least so many stones lie in a field."""
+"""Smallest number of stones in a field."""
 MIN_TRIANGLES = 32
-"""Fewest triangles of a stone: a sphere of 4 x 4 cells."""
+"""Smallest number of triangles of a stone: a sphere of 4 x 4 cells."""
 MAX_TRIANGLES = 60_000_000
 TILE = 8
-"""Edges of textures are multiples of it."""
+"""Edges of textures are multiples of this number of texels."""
 _PITCH = 2.3
 _CHART_TEXELS = 4
 _PATTERNS = (marble, wood, weave)
 
 
 def stones_for(materials: int) -> int:
-    """How many stones show so many materials."""
+    """Returns the number of stones for a number of materials."""
     return max(STONES, materials)
 
 
 def check_field(scene: str, options: SceneOptions, **ranges: tuple[float, float]) -> None:
-    """Raises SceneError for an option outside of its range; triangles have that of all fields."""
+    """Raises SceneError for an option outside of its range.
+
+    Also checks ``triangles``, whose range is the same for all fields.
+    """
     least = stones_for(options.materials) * MIN_TRIANGLES
     for name, (low, high) in {**ranges, "triangles": (least, MAX_TRIANGLES)}.items():
         value = getattr(options, name)
@@ -45,16 +48,17 @@ def check_field(scene: str, options: SceneOptions, **ranges: tuple[float, float]
 
 
 def texture_edge(options: SceneOptions, bytes_per_texel: float, least: int) -> int:
-    """Edge in texels of textures that take ``texture_mb``: each material has ``bytes_per_texel``.
+    """Returns the edge in texels of textures that take ``texture_mb`` in total.
 
-    Texels are stored in tiles of 8 x 8, so small textures take somewhat more than asked for.
+    Each material has ``bytes_per_texel``. Texels are stored in tiles of 8 x 8, so small textures
+    take somewhat more than requested.
     """
     texels = options.texture_mb * 1e6 / options.materials / bytes_per_texel
     return max(least, round(math.sqrt(texels) / TILE) * TILE)
 
 
 def grey_pattern(index: int, size: int, rng: np.random.Generator) -> Image:
-    """Pattern of material ``index``, (size, size, 1): its lightness, from about 0 to 1."""
+    """Returns the pattern of material ``index``, (size, size, 1), a lightness from about 0 to 1."""
     make = _PATTERNS[index % len(_PATTERNS)]
     return np.asarray(make(max(size, 16), rng)[:size, :size].mean(axis=2, keepdims=True))
 
@@ -67,16 +71,16 @@ def build_field(
     aspect: float,
     rng: np.random.Generator,
 ) -> None:
-    """Adds stones with the materials dealt at random among them, ground, lights and camera.
+    """Adds stones with randomly assigned materials, ground, lights and camera.
 
     Args:
-        writer: Of the stage.
-        names: Materials that it has.
-        triangles: Of all stones together.
-        edge: Of the textures, in texels: a stone's triangles lie all over them, as the charts of
-            an atlas do; 0 without texture coordinates.
-        aspect: Width / height of the picture.
-        rng: Of shapes and places.
+        writer: Writer of the stage.
+        names: Materials, which the stage already has.
+        triangles: Number of triangles of all stones together.
+        edge: Edge of the textures in texels, over which a stone's triangles are scattered like the
+            charts of an atlas; 0 means no texture coordinates.
+        aspect: Width / height of the image.
+        rng: Source of random shapes and positions.
     """
     count = stones_for(len(names))
     hands = [names[k] for _ in range(-(-count // len(names))) for k in rng.permutation(len(names))]
@@ -95,15 +99,15 @@ def build_field(
 
 
 def _cells(triangles: int) -> tuple[int, int]:
-    """Rows and columns of a sphere's grid, for about so many triangles."""
+    """Returns rows and columns of a sphere's grid with about a number of triangles."""
     rows = max(4, round(math.sqrt(triangles / 4.0)))
     return rows, max(4, round(triangles / (2.0 * (rows - 1))))
 
 
 def _stone(cells: tuple[int, int], rng: np.random.Generator) -> Mesh:
-    """A closed, bumpy ball of radius about 1 that stands on y = 0.
+    """Makes a closed, bumpy ball of radius about 1 that stands on y = 0.
 
-    The relief is a sum of waves in space, so it is closed at seam and poles.
+    The relief is a sum of waves in space, so it has no gap at seam and poles.
     """
     rows, columns = cells
     theta = np.linspace(0.0, np.pi, rows + 1)[:, None]
@@ -124,10 +128,10 @@ def _stone(cells: tuple[int, int], rng: np.random.Generator) -> Mesh:
 
 
 def _atlas(triangles: int, edge: int, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Texture coordinates of each corner, (triangles, 3, 2): every triangle in a chart of its own.
+    """Returns texture coordinates of each corner, (triangles, 3, 2), one chart per triangle.
 
-    Charts are squares of 4 x 4 texels in random order; where there are more triangles than charts,
-    they share.
+    Charts are squares of 4 x 4 texels in random order. If there are more triangles than charts,
+    they share charts.
     """
     charts = edge // _CHART_TEXELS
     order = rng.permutation(charts * charts)
@@ -149,7 +153,7 @@ def _add(
 
 
 def _set(writer: StageWriter, width: float, aspect: float) -> None:
-    """Ground, lights and camera for a field of stones so wide."""
+    """Adds ground, lights and camera for a field of a given width."""
     writer.material("Ground", looks.CHALK)
     writer.floor("Ground", 30.0 * width, "Ground")
     writer.rect_light("Lamp", (0.0, 0.8 * width, 0.2 * width), 0.5 * width, 0.3 * width, (3, 3, 3))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed tubes swept along a cubic B-spline: what the dragon is made of.
+"""Closed tubes swept along a cubic B-spline, the parts of the dragon.
 
 A tube has a centre line, an elliptic section that changes along it, an "up" direction that keeps
 the section from twisting, and an optional relief, a displacement along the section's radius.
@@ -18,19 +18,19 @@ from wavecomb.scenes.mesh import FloatArray, Mesh, normalized
 
 _DENSE_SAMPLES = 1024
 _TEXTURE_LENGTH = 0.5
-"""Scene units that one texture repeat takes along a tube."""
+"""Length along a tube, in scene units, per texture repeat."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Where a relief is evaluated.
+    """Grid positions where a relief is evaluated.
 
     Attributes:
         along: Arc length divided by the tube's length, 0 to 1, (rings, 1).
-        turns: Arc length counted in local circumferences, (rings, 1).
+        turns: Arc length in units of local circumferences, (rings, 1).
         around: Angle / 2 pi from the underside, 0 to 1; 0.5 is the ridge, (1, columns).
-        radius: Mean radius of the section, scene units, (rings, 1).
-        cell: Grid spacing as a fraction of the local circumference: finer relief would alias.
+        radius: Mean radius of the section, in scene units, (rings, 1).
+        cell: Grid spacing as a fraction of the local circumference. Finer relief would alias.
     """
 
     along: FloatArray
@@ -54,7 +54,7 @@ class Tube:
         height: Half height along "up", at each control point, (k,).
         up: Direction of the ridge, at each control point, (k, 3) or (3,).
         relief: Displacement, or None for a smooth tube.
-        belly: Factor on the height below the centre line, 1 for a full ellipse.
+        belly: Factor on the height below the centre line; 1 is a full ellipse.
         detail: Factor on the density of triangles.
     """
 
@@ -68,7 +68,7 @@ class Tube:
 
 
 def spline(control: FloatArray, t: FloatArray) -> FloatArray:
-    """Uniform cubic B-spline through its first and last control point.
+    """Evaluates a uniform cubic B-spline through its first and last control point.
 
     Args:
         control: Control values, (k,) or (k, n), k at least 2.
@@ -98,7 +98,7 @@ def spline(control: FloatArray, t: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Profile:
-    """A tube's dense samples: parameter, arc length, profile length, radii; each (n,)."""
+    """Dense samples of a tube: parameter, arc length, profile length, radii; each (n,)."""
 
     t: FloatArray
     arc: FloatArray
@@ -108,7 +108,10 @@ class _Profile:
 
 
 def _rounding(arc: FloatArray, start: float, end: float) -> FloatArray:
-    """Factor that closes both ends of a tube as ellipsoids: arc (n,), cap lengths -> (n,)."""
+    """Returns the factor that closes both ends of a tube as ellipsoids, (n,).
+
+    ``arc`` holds arc lengths (n,); ``start`` and ``end`` are the lengths of the caps.
+    """
     total = arc[-1]
     start, end = min(start, 0.5 * total), min(end, 0.5 * total)
     factor = np.ones_like(arc)
@@ -138,11 +141,11 @@ def _perimeter(profile: _Profile) -> FloatArray:
 
 @dataclass(frozen=True)
 class Extent:
-    """How large a tube is, to share out triangles.
+    """Size of a tube, for distributing triangles among tubes.
 
     Attributes:
-        length: Along its profile, scene units.
-        perimeter: Mean perimeter, scene units.
+        length: Length along its profile, in scene units.
+        perimeter: Mean perimeter, in scene units.
         detail: Factor on the density of triangles.
     """
 
@@ -152,11 +155,11 @@ class Extent:
 
     @property
     def weight(self) -> float:
-        """Surface area, without relief, times ``detail``."""
+        """Surface area without relief, times ``detail``."""
         return self.length * self.perimeter * self.detail
 
     def grid(self, density: float) -> tuple[int, int]:
-        """Rings and columns for so many triangles per unit of weight.
+        """Returns rings and columns for ``density`` triangles per unit of weight.
 
         The tube has ``2 * rings * columns`` triangles.
         """
@@ -175,7 +178,10 @@ def tube_extent(tube: Tube) -> Extent:
 
 
 def _tube_faces(rings: int, columns: int) -> np.ndarray:
-    """Faces of a grid of rings + 2 rows (the outer ones are poles) and columns + 1 columns."""
+    """Returns the faces of a grid of rings + 2 rows and columns + 1 columns.
+
+    The first and last row are poles.
+    """
     stride = columns + 1
     faces = np.empty((2 * rings * columns, 3), np.int32)
     j = np.arange(columns, dtype=np.int32)
@@ -194,18 +200,18 @@ def _tube_faces(rings: int, columns: int) -> np.ndarray:
 
 
 def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
-    """Evaluates a tube on a grid: a closed mesh of ``2 * rings * columns`` triangles.
+    """Evaluates a tube on a grid, as a closed mesh of ``2 * rings * columns`` triangles.
 
-    The first and last column lie on each other (texture seam on the underside); the first and
-    last row are poles.
+    The first and last column coincide (texture seam on the underside); the first and last row are
+    poles.
     """
     profile = _profile(tube)
     radius_dense = 0.5 * (profile.width + profile.height)
-    # Rings lie closer where the tube is thin, but not as close as its radius would ask for.
+    # Rings are closer where the tube is thin, but not in proportion to its radius.
     thin = np.maximum(radius_dense, 0.15 * radius_dense.max()) ** -0.4
     measure = np.concatenate([[0.0], np.cumsum(np.diff(profile.length) * thin[1:])])
     targets = np.linspace(0.0, measure[-1], rings + 2)
-    # The outermost rings stay off the poles by half a step.
+    # The outermost rings keep a distance of half a step from the poles.
     targets[1:-1] = (np.arange(rings) + 0.75) / (rings + 0.5) * measure[-1]
     t = np.interp(targets, measure, profile.t)
     t[0], t[-1] = 0.0, 1.0
@@ -224,7 +230,7 @@ def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
     around = np.linspace(0.0, 1.0, columns + 1)
     angle = 2.0 * np.pi * around - 0.5 * np.pi
     cosine, sine = np.cos(angle), np.sin(angle)
-    # The two seam columns agree to the last bit.
+    # The two seam columns must be bitwise equal.
     cosine[-1], sine[-1] = cosine[0], sine[0]
     lower = np.where(sine < 0.0, tube.belly, 1.0)
     across = width[:, None] * cosine
@@ -265,14 +271,17 @@ def tube_mesh(tube: Tube, rings: int, columns: int) -> Mesh:
 
 
 def _tangents(control: FloatArray, t: FloatArray) -> FloatArray:
-    """Unit tangents of the spline, (m, 3), by a central difference."""
+    """Returns unit tangents of the spline, (m, 3), by central differences."""
     step = 1e-4
     ahead = spline(control, np.minimum(t + step, 1.0))
     return normalized(ahead - spline(control, np.maximum(t - step, 0.0)))
 
 
 def _grid_normals(points: FloatArray, tangent: FloatArray) -> np.ndarray:
-    """Unit normals of a grid, float32 (rows, columns, 3); points alike, tangent (rows, 3)."""
+    """Returns unit normals of a grid, float32 (rows, columns, 3).
+
+    ``points`` have the same shape, ``tangent`` is (rows, 3).
+    """
     normals = np.empty(points.shape, np.float32)
     normals[0] = -tangent[0]
     normals[-1] = tangent[-1]

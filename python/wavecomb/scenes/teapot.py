@@ -6,8 +6,8 @@ University of Utah, 1975; numbers as published by F. Crow, "The Origins of the T
 7(1), 1987, with the bottom that was added later.
 
 The published list has 306 points, but most follow from symmetry: rim, body, lid and bottom are
-turned from a profile, four patches a turn; handle and spout are half sections mirrored in y = 0.
-Only the generating numbers stand here.
+profiles turned in four patches; handle and spout are half sections mirrored in y = 0. This file
+holds only the generating numbers.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from wavecomb.scenes.errors import SceneError
 from wavecomb.scenes.mesh import FloatArray, Mesh, grid_mesh, merge, normalized, without_flat_faces
 
 _CIRCLE = 0.56
-"""Newell's rounded Bezier constant of a quarter circle (exact would be 0.5523)."""
+"""Newell's rounded Bezier constant of a quarter circle (the exact value would be 0.5523)."""
 
-# Turned parts: rows of (radius, height, circle constant), four rows a patch, neighbours share one.
+# Bodies of revolution: rows of (radius, height). A patch has four rows and shares one with the
+# next.
 _RIM = np.array(
     [[1.4, 2.4], [1.3375, 2.53125], [1.4375, 2.53125], [1.5, 2.4]],
 )
@@ -33,7 +34,7 @@ _LID = np.array(
 _BOTTOM = np.array([[1.5, 0.15], [1.5, 0.075], [1.425, 0], [0, 0]])
 _KNOB_ROW = 1
 _KNOB_CIRCLE = 0.5625
-"""The widest row of the lid's knob was published as 0.45 / 0.8, not 0.56."""
+"""Circle constant of the widest row of the lid's knob, published as 0.45 / 0.8 instead of 0.56."""
 
 # Swept parts: rows of (x and z of one side, x and z of the other side, half width in y).
 _HANDLE = np.array(
@@ -60,11 +61,15 @@ _SPOUT = np.array(
 )
 
 _TEXTURE_LENGTH = 2.0 * np.pi
-"""Length in teapot units of one texture repeat: the belly's circumference takes two."""
+"""Length of one texture repeat in teapot units. The circumference of the belly takes two
+repeats."""
 
 
 def _turned(profile: FloatArray) -> FloatArray:
-    """Patches (k, 4, 4, 3) of a profile of rows (radius, height), one axis along it, one around."""
+    """Returns the patches (k, 4, 4, 3) of a profile of rows (radius, height).
+
+    One index runs along the profile, the other around the axis.
+    """
     constants = np.full(len(profile), _CIRCLE)
     if profile is _LID:
         constants[_KNOB_ROW] = _KNOB_CIRCLE
@@ -84,7 +89,10 @@ def _turned(profile: FloatArray) -> FloatArray:
 
 
 def _swept(rows: FloatArray) -> FloatArray:
-    """Patches (k, 4, 4, 3) of a mirrored tube: rows along it, columns around one half."""
+    """Returns the patches (k, 4, 4, 3) of a mirrored tube.
+
+    The first index runs along the tube, the second around one half.
+    """
     patches = []
     for first in range(0, len(rows) - 1, 3):
         near_x, near_z, far_x, far_z, half = rows[first : first + 4].T
@@ -94,13 +102,13 @@ def _swept(rows: FloatArray) -> FloatArray:
         for sign in (1.0, -1.0):
             y = np.stack([zero, sign * half, sign * half, zero], axis=1)
             patch = np.stack([x, y, z], axis=2)
-            # One half runs back, so that both have the same orientation and make one turn.
+            # One half is reversed, so that both have the same orientation and form a full turn.
             patches.append(patch[:, ::-1] if sign < 0.0 else patch)
     return np.array(patches) + 0.0
 
 
 def teapot_patches() -> FloatArray:
-    """The 32 patches, Newell's coordinates (Z up, spout along +x): float64 (32, 4, 4, 3).
+    """Returns the 32 patches in Newell's coordinates (Z up, spout along +x), float64 (32, 4, 4, 3).
 
     The first index of a patch runs along the profile or tube, the second around it.
     """
@@ -109,7 +117,7 @@ def teapot_patches() -> FloatArray:
 
 
 def _bernstein(t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Cubic Bernstein polynomials and derivatives at t (n,): two arrays (n, 4)."""
+    """Evaluates cubic Bernstein polynomials and derivatives at t (n,): two arrays (n, 4)."""
     s = 1.0 - t
     value = np.stack([s**3, 3 * s * s * t, 3 * s * t * t, t**3], axis=1)
     slope = np.stack([-3 * s * s, 3 * s * s - 6 * s * t, 6 * s * t - 3 * t * t, 3 * t * t], axis=1)
@@ -119,7 +127,7 @@ def _bernstein(t: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _evaluate(
     patch: FloatArray, along: FloatArray, around: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Points and unnormalised normals, each (rows, columns, 3), of a patch on a grid."""
+    """Evaluates points and unnormalised normals, each (rows, columns, 3), of a patch on a grid."""
     value_i, slope_i = _bernstein(along)
     value_j, slope_j = _bernstein(around)
     points = np.einsum("ri,ijk,cj->rck", value_i, patch, value_j)
@@ -129,7 +137,10 @@ def _evaluate(
 
 
 def _arc_lengths(rows: FloatArray) -> FloatArray:
-    """Lengths along a control polygon column (k, 3), at its patch ends: ((k - 1) // 3 + 1,)."""
+    """Returns arc lengths at patch ends, ((k - 1) // 3 + 1,).
+
+    ``rows`` is a column of the control points, (k, 3).
+    """
     t = np.linspace(0.0, 1.0, 65)
     value, _ = _bernstein(t)
     pieces = [
@@ -140,11 +151,11 @@ def _arc_lengths(rows: FloatArray) -> FloatArray:
 
 
 def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> Mesh:
-    """Mesh of a part in Newell's coordinates.
+    """Tessellates a part in Newell's coordinates.
 
     Args:
         patches: (k, 4, 4, 3), ``turns`` patches around for each step along.
-        turns: Patches around.
+        turns: Number of patches around.
         level: Cells along each patch edge.
         repeats: Texture repeats around the part.
     """
@@ -157,7 +168,7 @@ def _tessellate(patches: FloatArray, turns: int, level: int, repeats: float) -> 
     for index, patch in enumerate(patches):
         row, turn = divmod(index, turns)
         points, normals = _evaluate(patch, t, t)
-        # At a pole a derivative vanishes: the normal is the limit from inside the patch.
+        # At a pole one derivative vanishes, so the normal is the limit from inside the patch.
         _, near = _evaluate(patch, inner, inner)
         size = np.linalg.norm(normals, axis=2, keepdims=True)
         normals = np.where(size > 1e-9 * size.max(), normals, near)
@@ -172,7 +183,7 @@ def teapot(level: int = 16) -> Mesh:
     """Tessellates the teapot, Y up, standing on y = 0, spout along +x, 6.43 units wide.
 
     Args:
-        level: Cells along each patch edge, at least 1; about ``64 * level**2`` triangles.
+        level: Cells along each patch edge, at least 1; yields about ``64 * level**2`` triangles.
 
     Returns:
         The mesh with analytic normals, and uv whose unit is a sixth of the height around.

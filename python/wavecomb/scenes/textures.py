@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Procedural images of our own, tileable, and a sky; written through OpenImageIO.
+"""Procedural, tileable images and a sky, written through OpenImageIO.
 
 Images are float32 arrays (height, width, channels) with row 0 on top. Colours are display-referred
 sRGB values from 0 to 1; data images (roughness, normals) are linear; the sky is linear radiance.
@@ -33,10 +33,10 @@ from wavecomb.scenes.patterns import (
 
 @dataclass(frozen=True)
 class TextureInfo:
-    """How to make one texture.
+    """Description of a procedural texture.
 
     Attributes:
-        make: Size in texels and random generator -> image.
+        make: Function of the size in texels and a random generator that returns the image.
         size: Edge in texels at full resolution.
         colour: True for sRGB colour, False for raw data.
         channels: Output of UsdUVTexture to use, "rgb" or "r".
@@ -51,7 +51,7 @@ class TextureInfo:
 
 
 def checker(size: int, rng: np.random.Generator) -> Image:
-    """Ivory and deep blue checks, 8 x 8, a little worn."""
+    """Ivory and deep blue checks, 8 x 8, slightly abraded."""
     x, y = grid(size)
     odd = ((np.floor(x * 8) + np.floor(y * 8)) % 2).astype(np.float32)
     wear = 0.90 + 0.14 * fractal(x, y, 8, 5, rng)
@@ -61,7 +61,7 @@ def checker(size: int, rng: np.random.Generator) -> Image:
 
 
 def wood(size: int, rng: np.random.Generator) -> Image:
-    """Walnut: growth rings drawn out along v, pores and fibres."""
+    """Walnut: growth rings stretched along v, pores and fibres."""
     x, y = grid(size)
     warp = fractal(x, y, 3, 4, rng)
     ring = (x * 5.0 + 1.6 * warp + 0.25 * np.sin(2 * np.pi * y)) % 1.0
@@ -108,9 +108,9 @@ _TILE_SEED = 77
 
 @functools.lru_cache(maxsize=1)
 def _tile_layout(size: int) -> tuple[Image, Image, Image, Image]:
-    """Joint mask, tone of each tile, fine grain, broad stains; each (size, size).
+    """Returns joint mask, tone of each tile, fine grain and broad stains, each (size, size).
 
-    The two tile images share it, so it has its own seed.
+    The two tile images share this layout, so it uses a fixed seed.
     """
     rng = np.random.default_rng(_TILE_SEED)
     x, y = grid(size)
@@ -136,7 +136,7 @@ def tiles(size: int, rng: np.random.Generator) -> Image:
 
 
 def tiles_roughness(size: int, rng: np.random.Generator) -> Image:
-    """Roughness of the floor tiles: honed stone, worn smooth in places, matt joints."""
+    """Roughness of the floor tiles: honed stone, smooth where people walk, matt joints."""
     del rng
     joint, tone, grain, stain = _tile_layout(size)
     rough = 0.22 + 0.12 * tone + 0.20 * grain + 0.28 * step(stain, 0.35, 0.7)
@@ -209,14 +209,15 @@ TEXTURES: dict[str, TextureInfo] = {
     "brushed": TextureInfo(brushed, 1024, False, "r"),
     "hammered": TextureInfo(hammered, 1024, False, "rgb", True),
 }
-"""The images that materials may ask for, by name; the file is ``<name>.png``."""
+"""Images that materials may use, by name. The file is ``<name>.png``."""
 
 
 def sky(width: int, height: int, seed: int) -> Image:
-    """A late afternoon sky as a latitude-longitude map of linear radiance, (height, width, 3).
+    """Makes a late afternoon sky as a latitude-longitude map, (height, width, 3).
 
-    Row 0 is the zenith (+Y); the sun is a soft disc of about 8 degrees, 24 degrees over the
-    horizon, so that few texels carry the light and sampling by brightness has something to do.
+    Values are linear radiance. Row 0 is the zenith (+Y). The sun is a soft disc of about 8 degrees,
+    24 degrees above the horizon, so that few texels hold most of the light and importance sampling
+    matters.
     """
     rng = np.random.default_rng([seed, 5])
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
@@ -243,7 +244,7 @@ def sky(width: int, height: int, seed: int) -> Image:
     image *= 0.55 + 0.75 * facing**2
     glow = np.maximum(to_sun, 0.0)[..., None]
     image += np.array([1.0, 0.62, 0.30]) * (0.9 * glow**14 + 2.5 * glow**110)
-    # Clouds: noise on a plane over the viewer, so that they crowd towards the horizon.
+    # Clouds are noise on a plane above the viewer, so that they are denser towards the horizon.
     reach = 1.0 / np.maximum(up, 0.03)
     px = (0.11 * reach * np.sin(theta) * np.cos(phi) + 0.5) % 1.0
     py = (0.11 * reach * np.sin(theta) * np.sin(phi) + 0.5) % 1.0
@@ -261,7 +262,7 @@ def sky(width: int, height: int, seed: int) -> Image:
 
 
 def write_image(path: Path, image: Image, data_format: str) -> None:
-    """Writes an image whole or not at all.
+    """Writes an image, never partially.
 
     Args:
         path: PNG or EXR file.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages of volumes: smoke over an ember, clouds over the sea, and a lamp in fog.
+"""Stages with volumes: smoke over an ember, clouds over the sea, and a street lamp in fog.
 
 Grids are made procedurally and written as .vdb files in ``<stem>_volumes/`` beside the stage.
 Materials are MaterialX's ``volume``, whose coefficients are per metre.
@@ -27,19 +27,19 @@ from wavecomb.scenes.stage import StageWriter
 Points = NDArray[np.float32]
 
 _EDGE = 64
-"""Of the table: the noise repeats after so many units."""
+"""Edge of the noise table: the noise repeats after this number of units."""
 
 
 class Noise:
-    """Value noise: numbers at the corners of a lattice, smooth between them."""
+    """Value noise: random values at the points of a lattice, with smooth interpolation."""
 
     def __init__(self, seed: int, number: int = 0) -> None:
-        """``number``: tells the noises of one seed apart."""
+        """Creates a noise. ``number`` distinguishes noises of the same seed."""
         rng = np.random.default_rng([seed, 977, number])
         self._table = rng.random((_EDGE, _EDGE, _EDGE), np.float32).ravel()
 
     def at(self, points: Points) -> NDArray[np.float32]:
-        """Values in [0, 1] at points (n, 3)."""
+        """Returns values in [0, 1] at points (n, 3)."""
         cell = np.floor(points)
         part = points - cell
         fade = part * part * part * (part * (part * 6.0 - 15.0) + 10.0)
@@ -57,7 +57,7 @@ class Noise:
         return found
 
     def fractal(self, points: Points, octaves: int, gain: float = 0.5) -> NDArray[np.float32]:
-        """Sum of octaves, each of twice the frequency and ``gain`` times the weight, in [0, 1]."""
+        """Sums octaves of twice the frequency and ``gain`` times the weight, in [0, 1]."""
         found = np.zeros(len(points), np.float32)
         weight, weights = 1.0, 0.0
         for octave in range(octaves):
@@ -73,14 +73,14 @@ Density = Callable[[Points], NDArray[np.float32]]
 def sampled(
     density: Density, low: Sequence[float], high: Sequence[float], voxels: int, half: bool = True
 ) -> dict[str, Any]:
-    """A function of space as bricks, for ``vdb.write``; without bricks of zeros.
+    """Samples a function of space to bricks for ``vdb.write``, leaving out bricks of zeros.
 
     Args:
-        density: Gives values at points (n, 3), 0 where nothing is.
-        low: Corner of the box that it is looked at in.
-        high: The other one.
-        voxels: Along the longest edge.
-        half: Keep values in 16 bits.
+        density: Returns values at points (n, 3), 0 in empty space.
+        low: Lower corner of the sampled box.
+        high: Upper corner of the sampled box.
+        voxels: Number of voxels along the longest edge.
+        half: Whether to store values with 16 bits.
     """
     start, end = np.array(low), np.array(high)
     step = float((end - start).max()) / voxels
@@ -107,7 +107,7 @@ def sampled(
 
 
 def _where(mask: NDArray[np.bool_], points: Points, of: Density) -> NDArray[np.float32]:
-    """Values of a function where it is looked at, 0 elsewhere."""
+    """Evaluates a function at the points of a mask; all other values are 0."""
     found = np.zeros(len(points), np.float32)
     if mask.any():
         found[mask] = of(points[mask])
@@ -115,7 +115,7 @@ def _where(mask: NDArray[np.bool_], points: Points, of: Density) -> NDArray[np.f
 
 
 class _Volumes:
-    """Writes the volumes of a stage."""
+    """Writer of a stage's volumes and their materials."""
 
     def __init__(self, writer: StageWriter) -> None:
         self._writer = writer
@@ -131,7 +131,7 @@ class _Volumes:
         emission: Colour | None = None,
         glow: str = "",
     ) -> str:
-        """A MaterialX volume: coefficients per metre, times fields where these are named."""
+        """Adds a MaterialX volume, with coefficients per metre, scaled by named fields."""
         net = Network(self._stage, f"/World/Looks/{name}")
 
         def coefficient(kind: str, value: Colour, field: str) -> Any:
@@ -164,7 +164,10 @@ class _Volumes:
         extent: tuple[Sequence[float], Sequence[float]],
         grids: dict[str, dict[str, Any]] | None = None,
     ) -> None:
-        """A volume of some grids by field, or a homogeneous one that fills its extent."""
+        """Adds a volume of grids by field name.
+
+        Without grids, the volume is homogeneous and fills its extent.
+        """
         path = f"/World/Objects/{name}"
         prim = UsdVol.Volume.Define(self._stage, path)
         prim.CreateExtentAttr([Gf.Vec3f(*map(float, end)) for end in extent])
@@ -193,7 +196,7 @@ def _ground(writer: StageWriter, half: float, colour: Colour) -> None:
 
 
 def smoke_density(seed: int) -> Density:
-    """A plume of 4 m that rises from the origin, swirls and widens; at most 1."""
+    """Returns the density of a plume, 4 m high, that swirls and widens; at most 1."""
     swirl = [Noise(seed, number) for number in range(3)]
     detail = Noise(seed, 3)
 
@@ -222,13 +225,13 @@ def smoke_density(seed: int) -> Density:
 
 
 def _fire(points: Points, smoke: Density) -> NDArray[np.float32]:
-    """Temperatures, of 1 at most, low in the plume."""
+    """Returns temperatures, at most 1, in the lower part of the plume."""
     low = np.clip(1.0 - points[:, 1] / 0.9, 0.0, 1.0)
     return _where(low > 0, points, lambda some: smoke(some) ** np.float32(0.3)) * low
 
 
 def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
-    """Smoke that rises over an ember, before a wall."""
+    """Builds smoke that rises over an ember, in front of a wall."""
     volumes = _Volumes(writer)
     _ground(writer, 8.0, (0.3, 0.3, 0.3))
     writer.material("Brick", looks.diffuse((0.32, 0.16, 0.12)))
@@ -250,7 +253,7 @@ def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def cloud_density(seed: int) -> Density:
-    """Heaps of cloud with flat bottoms over a layer, in units of 100 m; at most 1."""
+    """Returns the density of cumulus clouds with flat bottoms, in units of 100 m; at most 1."""
     rng = np.random.default_rng([seed, 41])
     place, size = [], []
     for _ in range(9):
@@ -280,7 +283,7 @@ def cloud_density(seed: int) -> Density:
 
 
 def build_clouds(writer: StageWriter, options: SceneOptions) -> None:
-    """Clouds over the sea in the evening; a unit is 100 m."""
+    """Builds clouds over the sea in the evening; a unit is 100 m."""
     volumes = _Volumes(writer)
     _ground(writer, 400.0, (0.015, 0.03, 0.045))
     low, high = (-11.0, 0.0, -11.0), (11.0, 5.0, 11.0)
@@ -295,13 +298,13 @@ def build_clouds(writer: StageWriter, options: SceneOptions) -> None:
     sun.CreateColorAttr(Gf.Vec3f(1.0, 0.78, 0.52))
     sun.AddRotateXYZOp().Set(Gf.Vec3f(-14.0, 62.0, 0.0))
     writer.dome_light("Sky", 30.0, 0.6)
-    # A window of the observer's, which sees to it that shadows are not black.
+    # A fill light, so that the shadows are not black.
     writer.rect_light("Glow", (0.0, 40.0, 0.0), 30.0, 30.0, (0.25, 0.3, 0.4))
     writer.camera((0.0, 5.5, 26.0), (0.0, 7.5, 0.0), 50.0, options.aspect or 16.0 / 9.0)
 
 
 def build_fog(writer: StageWriter, options: SceneOptions) -> None:
-    """A street lamp and a window in fog that is everywhere alike, posts before them."""
+    """Builds a street lamp and a window in homogeneous fog, with posts in front of them."""
     volumes = _Volumes(writer)
     _ground(writer, 14.0, (0.2, 0.2, 0.21))
     writer.material("Post", looks.diffuse((0.12, 0.1, 0.09)))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads USD stages into scenes: ``load_stage("shot.usd").scene``.
 
-One module for each concept: ``stage`` is the way in; ``traverse`` finds prims and ``groups`` places
-them; ``mesh``, ``shapes``, ``light``, ``camera`` and ``instancing`` read one kind of prim each;
-``material``, ``preview`` and ``materialx`` turn networks into programs with parameters.
+``stage`` opens and traverses stages and builds groups; ``geometry``, ``lights``, ``cameras`` and
+``volumes`` read one kind of prim each; ``looks``, ``graphs`` and ``materialx`` convert shader
+networks to programs with parameters.
 
-Names are imported when they are first used: OpenUSD comes with those that need it.
+Names are imported on first use, since most of them load OpenUSD.
 """
 
 from __future__ import annotations

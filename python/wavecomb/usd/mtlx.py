@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door to MaterialX: the one module that imports ``wavecomb.usd.materialx``.
+"""Interface to MaterialX: the only module that imports ``wavecomb.usd.materialx``.
 
-Without that package, or without the ``materialx`` wheel, stages load as they are: what asks for
-MaterialX is drawn in its displayColor or left out, and said once.
+Without that package or the ``materialx`` wheel, stages still load: MaterialX materials are replaced
+by displayColor or left out, which is reported once.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.report import LoadReport
 
 ABSENT = "MaterialX without the Python package materialx (pip install materialx)"
-"""What is said where a stage asks for MaterialX and it is not there."""
+"""Message if a stage uses MaterialX but it is not installed."""
 
 MODELS = ("standard_surface", "open_pbr_surface", "gltf_pbr")
-"""Shading models that are read."""
+"""Supported MaterialX shading models."""
 
 HAIR = "chiang_hair"
-"""The model of a ``surface`` whose BSDF is a ``chiang_hair_bsdf``."""
+"""Name of the model of a ``surface`` node whose BSDF is a ``chiang_hair_bsdf``."""
 
 
 def is_there() -> bool:
-    """Whether MaterialX can be read; imports nothing."""
+    """Returns whether MaterialX is available, without importing it."""
     return all(_is_there(name) for name in ("MaterialX", "wavecomb.usd.materialx"))
 
 
@@ -46,20 +46,20 @@ def _is_there(name: str) -> bool:
 
 @functools.cache
 def _can_be_found(name: str) -> bool:
-    """Looked for once: there may be thousands of materials."""
+    """Returns whether a module can be found; cached, since there may be thousands of materials."""
     return importlib.util.find_spec(name) is not None
 
 
 def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
-    """Makes a stage see the MaterialX files that its layers name.
+    """Makes a stage use the MaterialX files that its layers name.
 
-    Those layers are changed in memory, and cannot be saved from then on. What cannot be read stays
-    missing; ``tell`` says so. Costs next to nothing where no such file is missing.
+    Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
+    ``tell`` reports them. The call is fast if no such file is missing.
 
     Args:
         stage: The stage.
-        everywhere: Also where variants are not selected, so that selecting them later, on whatever
-            thread, changes no layer. Looks through all layers.
+        everywhere: Whether to include unselected variants, which takes a pass over all layers.
+            Selecting them later, on any thread, then changes no layer.
     """
     if (everywhere or any(True for _ in unread_mtlx(stage))) and is_there():
         from wavecomb.usd.materialx import references
@@ -68,7 +68,7 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
 
 
 def reload(stage: Usd.Stage) -> None:
-    """Reads the files of a stage again that changed, MaterialX files among them."""
+    """Reloads changed files of a stage, including MaterialX files."""
     if not is_there():
         stage.Reload()
         return
@@ -78,7 +78,7 @@ def reload(stage: Usd.Stage) -> None:
 
 
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
-    """Says which MaterialX files are missing from a stage, and what of others was left out."""
+    """Reports MaterialX files that are missing, and problems of translated ones."""
     read_none = "wavecomb.usd.materialx.references" not in sys.modules
     if read_none and not any(True for _ in unread_mtlx(stage)):
         return
@@ -92,7 +92,7 @@ def tell(stage: Usd.Stage, report: LoadReport) -> None:
 
 
 def translated_files(stage: Usd.Stage) -> list[str]:
-    """MaterialX files that a stage brought in."""
+    """Returns the MaterialX files that a stage uses."""
     if "wavecomb.usd.materialx.references" not in sys.modules:
         return []
     from wavecomb.usd.materialx import references
@@ -101,7 +101,7 @@ def translated_files(stage: Usd.Stage) -> list[str]:
 
 
 def model_of(identifier: str) -> str:
-    """The shading model of a shader id such as ``ND_standard_surface_surfaceshader``, or ''.
+    """Returns the shading model of an id such as ``ND_standard_surface_surfaceshader``, or "".
 
     MaterialX has its standard_surface from Arnold, whose shader has the same inputs.
     """
@@ -111,7 +111,7 @@ def model_of(identifier: str) -> str:
 
 
 def hair_bsdf(shader: UsdShade.Shader) -> UsdShade.Shader | None:
-    """The ``chiang_hair_bsdf`` of a ``surface`` node, or of itself; None of other shaders."""
+    """Returns a shader that is a ``chiang_hair_bsdf``, or that of a ``surface`` node; else None."""
     identifier = shader_id(shader)
     if identifier == "ND_surface":
         source = source_of(shader, "bsdf", Usd.TimeCode.Default())
@@ -129,16 +129,16 @@ def surface(
     model: str,
     values: Mapping[str, Any] | None = None,
 ) -> Surface | None:
-    """The surface of a shader; None, and said, without MaterialX.
+    """Returns the surface of a shader; reports and returns None if MaterialX is not installed.
 
     Args:
-        material: That the shader is in.
-        time: Of evaluation.
-        textures: Of the scene.
-        report: Is told what is not supported.
+        material: Material that contains the shader.
+        time: Time code at which attributes are evaluated.
+        textures: Textures of the scene.
+        report: Collects unsupported features.
         shader: The surface shader.
         model: One of ``MODELS``, or ``HAIR``.
-        values: Constants of the shader in place of what the stage says.
+        values: Constants of the shader that replace the authored ones.
     """
     if not is_there():
         report.missing(f"{ABSENT}: displayColor in its place", material.GetPath())
@@ -153,11 +153,13 @@ def surface(
 
 
 def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
-    """Inputs of a shading model that are read, by name, in MaterialX's order; none without it.
+    """Returns the supported inputs of a shading model by name, in MaterialX's order.
+
+    Returns nothing if MaterialX is not installed.
 
     Args:
-        model: One of ``MODELS``; of ``HAIR`` none are known.
-        identifier: The shader's, which may name an older version.
+        model: One of ``MODELS``; ``HAIR`` has no known inputs.
+        identifier: Id of the shader, which may refer to an older version.
     """
     if model == HAIR or not is_there():
         return {}
@@ -169,7 +171,7 @@ def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
 def networks(
     material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
 ) -> Networks:
-    """What compiles the networks of a material's nodes."""
+    """Returns the networks of a material, which compile its nodes."""
     if not is_there():
         return _NoNodes(material, textures, report)
     from wavecomb.usd.materialx.nodes import network
@@ -178,7 +180,7 @@ def networks(
 
 
 class _NoNodes:
-    """Networks of a material where no node can be read, as ``graph_surface.Networks``."""
+    """Implementation of ``Networks`` for use without MaterialX; it reports every node."""
 
     def __init__(self, material: Usd.Prim, textures: TextureTable, report: LoadReport) -> None:
         self.make = Expressions()
@@ -189,14 +191,14 @@ class _NoNodes:
         self.uv_names: list[str] = []
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
-        """Nothing, and said."""
+        """Reports the node and returns None."""
         return self.node(shader, name, kind)
 
     def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
-        """Nothing, and said."""
+        """Reports the node and returns None."""
         self.report.missing(f"{ABSENT}: nodes left out", shader.GetPath())
         return None
 
     def in_working_space(self) -> Networks:
-        """The same."""
+        """Returns itself."""
         return self

@@ -72,7 +72,7 @@ std::vector<uint8_t> fibre_meshes(const Scene& scene) {
   if (std::none_of(materials.begin(), materials.end(),
                    [](const Material& m) { return has_trait(m.program, program_trait::kFibre); }))
     return fibres;
-  const auto is_other = [&](uint32_t m) { 
+  const auto is_other = [&](uint32_t m) {
     return !has_trait(materials[m].program, program_trait::kFibre);
   };
   // Materials that meshes without one inherit from their instances; the world is instance 0.

@@ -117,8 +117,8 @@ struct AovRow {
 };
 inline constexpr AovRow kAovs[] = {
 #define WAVECOMB_AOV(id, name, channels, letters, content, kind, source, title) \
-  {Aov::k##id,      name,          channels,          letters, AovContent::content, \
-   AovKind::kind, AovSource::source, title},
+  {Aov::k##id,          name,          channels,          letters,              \
+   AovContent::content, AovKind::kind, AovSource::source, title},
     WAVECOMB_AOVS(WAVECOMB_AOV)
 #undef WAVECOMB_AOV
 };

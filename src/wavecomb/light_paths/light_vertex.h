@@ -266,7 +266,8 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const Place& place,
   const F nearness = 1.f / select(looker.sees, looker.distance2, F(1.f));
   const F turn = place.turn(looker.w) * nearness;
   const F before = min(F(target.ratio * F(back * nearness)), F(kMostRatio));
-  const F others = min(F(place.others(v.path.mis_sum, e.pdf) * F(turn * target.pdf)), F(kMostRatio));
+  const F others =
+      min(F(place.others(v.path.mis_sum, e.pdf) * F(turn * target.pdf)), F(kMostRatio));
   const F brightness = turn / F(F(1.f + before) + others);
   ask_whether_seen<F>(place, looker, target.from,
                       Color<F>(place.flux * e.f_cos * target.light * brightness), out);

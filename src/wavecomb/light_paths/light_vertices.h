@@ -14,7 +14,8 @@
 
 namespace wavecomb {
 
-/// Stored vertex of a light path, in addition to the LightPathRow that led there and its ShadingRecord.
+/// Stored vertex of a light path, in addition to the LightPathRow that led there and its
+/// ShadingRecord.
 template <typename F>
 struct LightVertexRow {
   Vec3<F> p;
@@ -74,9 +75,10 @@ class LightVertices {
 /// so far, the last one replaces the stored one with probability 1 / n. Returns the lanes whose
 /// vertex was stored.
 template <typename F>
-inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth, const LightPathRow<F>& path,
-                                 const ShadingRecord<F>& record, const UInt<F>& material,
-                                 const Vec3<F>& p, const Mask<F>& offered) {
+inline Mask<F> keep_light_vertex(const LightVertices& to, uint32_t depth,
+                                 const LightPathRow<F>& path, const ShadingRecord<F>& record,
+                                 const UInt<F>& material, const Vec3<F>& p,
+                                 const Mask<F>& offered) {
   using U = UInt<F>;
   if (none(offered)) return Mask<F>(false);
   LightVertexRow<F> row = load_row<LightVertexRow, F>(to.chosen, record.slot, offered);

@@ -67,13 +67,12 @@ class PathHistory {
     if (depth >= most_) return;
     const Color<F> brought = load_row<RadianceRow, F>(radiance, slot, active).sum;
     const Vec3<F> none(F(0.f));
-    store_row<HistoryRow, F>(
-        rows_.floats(0), slot * most_ + depth,
-        {fma(path.dir, t, path.o), select<F>(v.alive, v.next.dir, none),
-         select<F>(v.alive, v.next.throughput, none),
-         select(v.alive & not_(v.next.enters_body), v.next.pdf, F(0.f)), brought,
-         material, v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
-        active);
+    store_row<HistoryRow, F>(rows_.floats(0), slot * most_ + depth,
+                             {fma(path.dir, t, path.o), select<F>(v.alive, v.next.dir, none),
+                              select<F>(v.alive, v.next.throughput, none),
+                              select(v.alive & not_(v.next.enters_body), v.next.pdf, F(0.f)),
+                              brought, material, v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
+                             active);
     scatter<UInt<F>>(counts_.uints(0), UInt<F>(depth + 1), slot, Mask<UInt<F>>(active));
   }
 

@@ -73,10 +73,10 @@ struct PathState {
   F pdf{0.f};  ///< density of the previous bounce; 0 for a delta bounce or camera ray
   F eta_scale{1.f};
   F cone_width{0.f}, cone_spread{0.f};
-  Vec3<F> o;              ///< origin of the ray that arrived
-  UInt<F> receiver{0u};   ///< LightReceiver::normal of the previous vertex
-  UInt<F> link{0u};   ///< link class of the surface that the ray left, if lights are linked
-  F importance{0.f};  ///< one over the brightness of the image at the pixel; 0 if unknown
+  Vec3<F> o;             ///< origin of the ray that arrived
+  UInt<F> receiver{0u};  ///< LightReceiver::normal of the previous vertex
+  UInt<F> link{0u};      ///< link class of the surface that the ray left, if lights are linked
+  F importance{0.f};     ///< one over the brightness of the image at the pixel; 0 if unknown
   /// The ratio R of light_paths/join.h, the density of light paths relative to this path; 0 if no
   /// light path can produce it.
   F ratio{0.f};
@@ -116,8 +116,8 @@ WAVECOMB_INLINE PathState<F> path_state(const PathRow<F>& row, const F& t) {
           .o = row.o,
           .receiver = row.receiver};
 }
-/// Returns the row of a camera path whose next ray is that of `next`. `kMayEnter` is false if no ray
-/// can enter a subsurface body.
+/// Returns the row of a camera path whose next ray is that of `next`. `kMayEnter` is false if no
+/// ray can enter a subsurface body.
 template <bool kMayEnter, typename F>
 WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>& key) {
   PathRow<F> row{.o = next.o,

@@ -207,8 +207,9 @@ class PathTracer {
     }
   }
 
-  /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no surface of that body continues unchanged. Sets `came_out` if the walk has
-  /// left the body. Returns false if the path is terminated.
+  /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no
+  /// surface of that body continues unchanged. Sets `came_out` if the walk has left the body.
+  /// Returns false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& came_out) {
     path.enters_body = false;

@@ -161,7 +161,7 @@ def test_errors_of_a_run_are_messages(qtbot, panel, tmp_path):
     panel.choice.stages.item(0).setCheckState(Qt.CheckState.Unchecked)
     with qtbot.waitSignal(panel.failed) as failed:
         QTest.mouseClick(button(panel, "benchStart"), LEFT)
-    assert "tick one" in failed.args[0] and not panel.busy
+    assert "check at least one" in failed.args[0] and not panel.busy
 
 
 def test_suites_and_the_command(tmp_path):

@@ -34,12 +34,12 @@ class SuiteInfo:
 
     Attributes:
         name: A name of `wavecomb bench list`, or the path of a TOML file.
-        title: One line.
+        title: Title in one line.
         stages: Names of its stages.
         repetitions: Default number of repetitions.
         configurations: Number of configurations on this machine.
         seconds: Rough time of one repetition of all configurations, at 0.4 million samples per
-            second and thread; without making stages and golden pictures.
+            second and thread, without the time for preparing stages and golden images.
         experiments: Name and number of configurations of each experiment.
     """
 
@@ -69,7 +69,7 @@ def suite_info(name: str, stages: tuple[str, ...] = ()) -> SuiteInfo:
     """Reads a suite by name or TOML file, restricted to some stages.
 
     Raises:
-        WavecombError: The suite is invalid; one line.
+        WavecombError: The suite is invalid. The message is one line.
     """
     from wavecomb.bench.machine import limits
     from wavecomb.bench.plan import Estimator, configurations
@@ -125,7 +125,7 @@ class Choice:
 
 
 class SuiteChoice(QWidget):
-    """The form.
+    """Form for the arguments of a benchmark.
 
     Signals:
         changed(): The choice changed.
@@ -168,7 +168,7 @@ class SuiteChoice(QWidget):
         self.folder.textChanged.connect(lambda text: self.changed.emit())
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
-        tip = "Choose a suite of your own, a TOML file"
+        tip = "Choose a TOML file with a custom suite"
         form.addRow("Suite", self._with_button(self.suite, "suiteFile", tip, self._ask_suite))
         form.addRow("", self.about)
         form.addRow("Stages", self.stages)
@@ -191,27 +191,30 @@ class SuiteChoice(QWidget):
     # ---- the choice ----------------------------------------------------------------------------
 
     def info(self) -> SuiteInfo | None:
-        """The chosen suite."""
+        """Returns the chosen suite, or None."""
         return self._infos.get(str(self.suite.currentData()))
 
     def chosen_stages(self) -> list[str]:
-        """Names of the stages with a tick."""
+        """Returns the names of the checked stages."""
         items = [self.stages.item(k) for k in range(self.stages.count())]
         return [i.text() for i in items if i.checkState() == Qt.CheckState.Checked]
 
     def results_folder(self) -> Path:
-        """The results folder."""
+        """Returns the results folder."""
         return Path(self.folder.text().strip()).expanduser()
 
     def choice(self, *, quiet: bool = False) -> Choice | None:
-        """The choice; None, after ``failed`` unless ``quiet``, if it is incomplete."""
+        """Returns the choice.
+
+        Returns None if the choice is incomplete, and emits ``failed`` unless ``quiet``.
+        """
         info = self.info()
         stages = self.chosen_stages()
         problem = ""
         if info is None:
             problem = "no suite is chosen"
         elif not stages:
-            problem = "no stage is chosen: tick one at least"
+            problem = "no stage is chosen: check at least one"
         elif not self.folder.text().strip():
             problem = "choose a folder for the results"
         if problem or info is None:
@@ -232,7 +235,7 @@ class SuiteChoice(QWidget):
         self._choose_suite(suite)
 
     def shutdown(self) -> None:
-        """Stops reading."""
+        """Stops the thread that reads suites."""
         self._reader.close()
 
     # ---- inside --------------------------------------------------------------------------------
@@ -275,7 +278,7 @@ class SuiteChoice(QWidget):
             self.about.setText(
                 f"{info.configurations} configurations ({parts}); with {self.repetitions.value()} "
                 f"repetitions {runs} runs on all stages. Roughly {time_text(seconds)} for the "
-                "chosen stages, and the time to make stages and converged pictures."
+                "chosen stages, plus the time to make stages and golden images."
             )
         self.changed.emit()
 

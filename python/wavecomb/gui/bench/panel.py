@@ -31,15 +31,15 @@ if TYPE_CHECKING:
     from wavecomb.gui.viewport.session import Session
 
 _PREPARES = {
-    "stage": "Making the stage",
-    "golden": "Rendering the converged picture",
+    "stage": "Generating the stage",
+    "golden": "Rendering the golden image",
     "trace": "Recording the oracle's trace",
     "warm-up": "Warming up",
 }
 
 
 class BenchPanel(TakesFiles, QWidget):
-    """Choice of suite, buttons, progress and log.
+    """Panel with the form, buttons, progress and log of a benchmark.
 
     The viewport pauses while a suite runs, since its renders would disturb the measurement.
 
@@ -66,7 +66,7 @@ class BenchPanel(TakesFiles, QWidget):
         self.suite.event.connect(self._take)
         self.suite.said.connect(self._log_line)
         self.suite.finished.connect(self._end_suite)
-        self.helper = Command(self)  # the estimate and the report
+        self.helper = Command(self)  # makes the estimate and the report
         self.helper.finished.connect(self._end_helper)
         self.choice = SuiteChoice(self)
         self.choice.failed.connect(self._fail)
@@ -114,7 +114,7 @@ class BenchPanel(TakesFiles, QWidget):
         column.addWidget(self.log, 1)
 
     def sizeHint(self) -> QSize:
-        """Room for the form and some lines of the log."""
+        """Returns a size for the form and some lines of the log."""
         return QSize(theme.em(64), theme.em(36))
 
     # ---- actions -------------------------------------------------------------------------------
@@ -177,7 +177,7 @@ class BenchPanel(TakesFiles, QWidget):
             self.helper.start(["bench", "report", str(self._folder)])
 
     def shutdown(self) -> None:
-        """Stops everything; a suite can be resumed."""
+        """Stops all processes. A stopped suite can be resumed."""
         self._measuring = False
         self.choice.shutdown()
         self.suite.shutdown()
@@ -211,7 +211,7 @@ class BenchPanel(TakesFiles, QWidget):
 
     def _end_suite(self, code: int, text: str, error: str) -> None:
         self._measuring = False
-        if self._session.state != "stopped":  # the user stopped it
+        if self._session.state != "stopped":  # in this state the user stopped the viewport
             self._session.resume()
         self._enable(True)
         self.bar.setRange(0, max(self._runs, 1))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two pictures beside each other."""
+"""The window that compares two images."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What there is to say of two pictures, in numbers and in a map. No Qt.
+"""Differences of two images, as numbers and as maps. Independent of Qt.
 
-The figures are those of `wavecomb compare`.
+The numbers equal those of `wavecomb compare`.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ MAPS = {
     "flip-hdr": "FLIP, high range",
     "z": "z-test",
 }
-"""Kinds of maps and their names."""
+"""Names of the kinds of maps."""
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """How A differs from B, the reference, in one layer.
+    """Differences of A from B, the reference, in one layer.
 
     Attributes:
-        layer: Its name.
+        layer: Name of the layer.
         comparison: Differences of linear values.
-        psnr: As shown, dB.
-        flip: Mean FLIP as shown; None: not known (yet).
-        flip_note: Why there is none.
-        test: None where no variance is known.
-        test_note: Why there is none.
-        others_differ: Layers that both have, with other bits; None where only one was looked at.
+        psnr: PSNR of the displayed values, in dB.
+        flip: Mean FLIP of the displayed values; None if not known (yet).
+        flip_note: Reason for a missing FLIP value.
+        test: Result of the z-test; None if no variance is known.
+        test_note: Reason for a missing z-test.
+        others_differ: Layers of both images whose bits differ; None if only one layer was compared.
     """
 
     layer: str
@@ -53,15 +53,15 @@ class Numbers:
     others_differ: tuple[str, ...] | None = None
 
     def with_flip(self, mean: float | None, note: str = "") -> Numbers:
-        """The same with what FLIP found."""
+        """Returns a copy with the result of FLIP."""
         return replace(self, flip=mean, flip_note=note)
 
 
 def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
-    """All but FLIP, which takes longer.
+    """Computes all numbers but FLIP, which takes longer.
 
     Raises:
-        ValueError: The sizes or channels differ (``sides.problem`` says it better).
+        ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer message).
     """
     one, two = pair(a, b, layer)
     others: tuple[str, ...] | None = None
@@ -76,7 +76,7 @@ def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
 
 
 def same(a: NDArray[Any], b: NDArray[Any]) -> bool:
-    """Bit for bit."""
+    """Returns whether two arrays are equal bit for bit."""
     if a.shape != b.shape or a.dtype != b.dtype:
         return False
     bits = f"u{a.dtype.itemsize}"
@@ -89,7 +89,7 @@ def _test(
     a: Side, b: Side, layer: str, one: NDArray[Any], two: NDArray[Any]
 ) -> tuple[ZTest | None, str]:
     if layer != "beauty":
-        return None, "of the beauty only"
+        return None, "available only for the beauty"
     variances = [side.variance for side in (a, b)]
     if all(variance is None for variance in variances):
         return None, "needs a variance: a layer of an adaptive render, or NAME_var.exr"
@@ -101,16 +101,16 @@ def _test(
 
 
 def rows(found: Numbers) -> list[tuple[str, str, str]]:
-    """Name, value and meaning of each figure, for a table."""
+    """Returns name, value and explanation of each number, for a table."""
     c = found.comparison
     pixels = c.width * c.height
     at = c.luminance_max_at
     out = [
-        ("Verdict", verdict(found), "Equal means every bit of this layer: -0 is not 0"),
+        ("Verdict", verdict(found), "Equal means bit-identical in this layer; -0 differs from 0"),
         (
             "Pixels that differ",
             f"{c.pixels_different} of {pixels} ({100 * c.pixels_different / pixels:.3g} %)",
-            "Pixels with other bits",
+            "Pixels whose bits differ",
         ),
         ("relMSE", f"{c.rel_mse:.4g}", "Mean of (A - B)² / (B² + 0.01)"),
         (
@@ -119,16 +119,16 @@ def rows(found: Numbers) -> list[tuple[str, str, str]]:
             "relMSE without the 0.1 % of pixels with the largest terms",
         ),
         ("RMSE", f"{c.rmse:.4g}", "Square root of the mean of (A - B)², linear"),
-        ("PSNR", decibels(found.psnr), "-10 log10 of the mean of (A - B)² of the values as shown"),
+        ("PSNR", decibels(found.psnr), "-10 log10 of the mean of (A - B)² as displayed"),
         (
             "FLIP, mean",
             f"{found.flip:.4g}" if found.flip is not None else found.flip_note,
-            "How different the two look as shown: 0 equal, 1 the most",
+            "Perceptual difference of the displayed images, from 0 (equal) to 1",
         ),
         (
             "Largest difference",
             f"{c.max_abs:.4g}" + (f" near {at[0]}, {at[1]}" if at else ""),
-            "Of any channel; the pixel is that with the largest difference of luminance",
+            "Of any channel; the pixel has the largest difference of luminance",
         ),
         ("Mean difference", _row(c.mean_signed), "Mean of A - B of each channel"),
     ]
@@ -148,7 +148,7 @@ def rows(found: Numbers) -> list[tuple[str, str, str]]:
 
 
 def verdict(found: Numbers) -> str:
-    """One line."""
+    """Returns a summary in one line."""
     c = found.comparison
     if c.pixels_different == 0:
         return "bit for bit the same"
@@ -168,12 +168,12 @@ def _test_rows(found: Numbers) -> list[tuple[str, str, str]]:
     accepted = f"{100 * test.pixels_accepted:.4g} % of pixel channels"
     return [
         ("z-test", f"{said}, p = {test.p_value:.3g}{where}", why),
-        ("z-test, pixels", accepted, "Share of pixel channels that pass on their own"),
+        ("z-test, pixels", accepted, "Fraction of pixel channels that pass the test individually"),
     ]
 
 
 def decibels(value: float) -> str:
-    """For people."""
+    """Formats a value in dB."""
     return f"{value:.2f} dB" if math.isfinite(value) else "infinite: looks equal"
 
 
@@ -182,7 +182,7 @@ def _row(values: tuple[float, ...]) -> str:
 
 
 def pixel_rows(a: Side | None, b: Side | None, layer: str, x: int, y: int) -> dict[str, str]:
-    """What A, B and A - B hold at a pixel, as text; empty where there is nothing."""
+    """Returns the values of A, B and A - B at a pixel as text; empty without an image."""
     found: dict[str, NDArray[Any]] = {}
     for name, side in (("A", a), ("B", b)):
         values = side.layer(layer) if side is not None else None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""FLIP in a process of its own: the library holds Python's lock for seconds, a window would stall.
+"""Computes FLIP in a separate process, because the library holds Python's lock for seconds.
 
-Run as a module, this file reads a job as one .npz from stdin and answers with one.
+Run as a module, this file reads a job in .npz format from stdin and writes the result to stdout.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from wavecomb.errors import WavecombError
 
 
 class FlipProcess:
-    """Computes FLIP; ``stop`` ends what runs, from any thread."""
+    """Runner of FLIP processes. ``stop`` ends the current one, from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -30,10 +30,10 @@ class FlipProcess:
     def flip(
         self, a: NDArray[Any], b: NDArray[Any], high_range: bool, exposure: float
     ) -> NDArray[np.float32]:
-        """``perceptual.flip`` of two pictures (height, width, channels).
+        """Computes ``perceptual.flip`` of two images (height, width, channels).
 
         Raises:
-            WavecombError: The library is missing, or it failed; one line.
+            WavecombError: The library is missing, or the process failed. The message is one line.
         """
         job = io.BytesIO()
         np.savez(job, a=a, b=b, high_range=high_range, exposure=exposure)
@@ -55,7 +55,7 @@ class FlipProcess:
         return values
 
     def stop(self) -> None:
-        """Ends what runs; nothing is computed any more."""
+        """Ends the current process and rejects further jobs."""
         with self._lock:
             self._closed = True
             if self._process is not None and self._process.poll() is None:
@@ -63,7 +63,7 @@ class FlipProcess:
 
 
 def main() -> int:
-    """The process."""
+    """Runs the job in the separate process."""
     from wavecomb.picture.perceptual import flip
 
     job = np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Computes what a comparison shows, off the UI thread: images, numbers, FLIP, the map."""
+"""Background computation of a comparison: displayed images, numbers, FLIP and difference map."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from wavecomb.picture.layer_view import Legend, Shown
 
 @dataclass(frozen=True)
 class Ask:
-    """What is to be shown.
+    """Request to show a comparison.
 
     Attributes:
-        a: Or None.
-        b: The reference, or None.
-        look: Layer, exposure and view, of both.
-        kind: Of the map: a key of ``differences.MAPS``.
+        a: Image A, or None.
+        b: Image B, the reference, or None.
+        look: Layer, exposure and tone mapping of both images.
+        kind: Kind of the map, a key of ``differences.MAPS``.
     """
 
     a: Side | None
@@ -40,15 +40,15 @@ class Ask:
 
     @property
     def problem(self) -> str:
-        """Why there is no difference; "" where there is one."""
+        """Reason why there is no difference, or ""."""
         return problem(self.a, self.b, self.look.layer)
 
     def pictures(self) -> tuple[Any, ...]:
-        """Equal where A and B look the same."""
+        """Returns a key that is equal for requests with equal displayed images."""
         return (*self._sides(), self.look)
 
     def figures(self) -> tuple[Any, ...]:
-        """Equal where the numbers are the same."""
+        """Returns a key that is equal for requests with equal numbers."""
         return (*self._sides(), self.look.layer, self.look.exposure)
 
     def _sides(self) -> tuple[int, int]:
@@ -56,13 +56,13 @@ class Ask:
 
 
 class Jobs(QObject):
-    """Four workers: pictures, figures, FLIP, the map. Of each, only the newest counts.
+    """Four workers for images, numbers, FLIP and the map. Each computes only the newest request.
 
     Signals:
-        images(A, B): QImage or None.
-        numbers(Numbers): First without FLIP, then with it; None: there is nothing to compare.
-        map(QImage, Scale): The difference; None, None where there is none.
-        failed(str): One line.
+        images(A, B): Displayed images, QImage or None.
+        numbers(Numbers): Numbers, first without and then with FLIP; None if there is no comparison.
+        map(QImage, Scale): Difference map; None, None if there is no map.
+        failed(str): Error in one line.
     """
 
     images = Signal(object, object)
@@ -94,7 +94,7 @@ class Jobs(QObject):
         return any(w.busy for w in (self._pictures, self._figures, self._looks, self._map))
 
     def want(self, ask: Ask) -> None:
-        """Computes what of this is not shown already."""
+        """Computes the parts of a request that are not shown already."""
         self._ask = ask
         if self._shown.get("pictures") != ask.pictures():
             self._shown["pictures"] = ask.pictures()
@@ -114,7 +114,7 @@ class Jobs(QObject):
         self._want_map()
 
     def close(self) -> None:
-        """Ends what runs."""
+        """Stops all workers."""
         self._process.stop()
         for worker in (self._pictures, self._figures, self._looks, self._map):
             worker.close()
@@ -129,7 +129,8 @@ class Jobs(QObject):
         if ask.figures() in self._flip:
             found = self._with_flip(ask, found)
         elif before is not None and before.flip is not None and (ask.a.live or ask.b.live):  # type: ignore[union-attr]
-            found = found.with_flip(before.flip)  # of a moment ago, until there is a newer one
+            # FLIP of the previous frame, until the new value is known
+            found = found.with_flip(before.flip)
         self._numbers = found
         self.numbers.emit(found)
         self._want_flip(ask, high_range=False)
@@ -151,7 +152,7 @@ class Jobs(QObject):
             self.numbers.emit(self._numbers)
         self._want_map()
         if self._ask is not None and self._ask.figures() not in self._flip:
-            self._want_flip(self._ask, high_range=False)  # the pictures are others by now
+            self._want_flip(self._ask, high_range=False)  # the images have changed in the meantime
 
     def _with_flip(self, ask: Ask, found: Numbers) -> Numbers:
         values = self._flip[ask.figures()]
@@ -229,7 +230,7 @@ def _map(
 
 
 def _images(ask: Ask) -> tuple[Shown | None, Shown | None]:
-    """Both as they are shown; false colours have one scale for both."""
+    """Returns both displayed images; false colours use a common scale."""
     layers = [
         _drawable(side.layer(ask.look.layer)) if side is not None else None
         for side in (ask.a, ask.b)
@@ -249,7 +250,7 @@ def _images(ask: Ask) -> tuple[Shown | None, Shown | None]:
 
 
 def _drawable(layer: NDArray[Any] | None) -> NDArray[Any] | None:
-    """With as many channels as ``show`` takes: an alpha is left out, a grey picture is thrice."""
+    """Adapts the number of channels for ``show``: drops an alpha channel, repeats a grey one."""
     if layer is None:
         return None
     channels = layer.shape[2]

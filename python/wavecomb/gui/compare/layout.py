@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the pictures of a comparison lie: panes, zoom and pan, which all panes share."""
+"""Layout of a comparison: panes, and the zoom and pan that all panes share."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ MOST_ZOOM = 64.0
 
 
 class Layout:
-    """Geometry in device-independent points of the widget.
+    """Geometry of the panes, in device-independent points of the widget.
 
     Attributes:
         mode: One of ``MODES``.
-        shown: A or B: which a flip shows.
-        area: Of the widget.
-        size: Of a picture in pixels; of two sizes that of A; None: there is none.
-        gap: Between panes.
-        bar: Height kept free below the difference.
-        zoom: Points per pixel; None: the whole picture.
-        centre: What is in the middle of a pane, as a share of the picture.
+        shown: The image that the flip view shows, A or B.
+        area: Area of the widget.
+        size: Size of an image in pixels, that of A if they differ; None without images.
+        gap: Gap between panes.
+        bar: Height of the free area below the difference.
+        zoom: Points per pixel; None fits the whole image.
+        centre: Point of the image in the middle of a pane, as a fraction of the image size.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Layout:
         self.centre = QPointF(0.5, 0.5)
 
     def panes(self) -> list[tuple[str, QRectF]]:
-        """What is drawn where."""
+        """Returns the content (A, B or D) and the rectangle of each pane."""
         which = {SIDE: (A, B), WIPE: (A,), FLIP: (self.shown,), DIFFERENCE: (D,), THREE: (A, B, D)}
         kinds = which[self.mode]
         gap = self.gap if len(kinds) > 1 else 0.0
@@ -51,19 +51,19 @@ class Layout:
         return [(k, QRectF(i * (width + gap), 0, width, height)) for i, k in enumerate(kinds)]
 
     def pane_at(self, at: QPointF) -> QRectF:
-        """The pane under a point; the first where there is none."""
+        """Returns the pane under a point, or the first one."""
         panes = [rect for _, rect in self.panes()]
         return next((rect for rect in panes if rect.contains(at)), panes[0])
 
     def points_per_pixel(self) -> float:
-        """The zoom as it is."""
+        """Returns the current zoom in points per pixel."""
         if self.zoom is not None or self.size is None:
             return self.zoom or 1.0
         pane = self.panes()[0][1]
         return min(pane.width() / self.size.width(), pane.height() / self.size.height())
 
     def target(self, pane: QRectF, size: QSizeF | None = None) -> QRectF:
-        """Where a whole picture lies; one of another size has its corner where A has it."""
+        """Returns the rectangle of a whole image. Images of other sizes share the corner of A."""
         reference = self.size or size or QSizeF(1, 1)
         scale = self.points_per_pixel()
         width, height = reference.width() * scale, reference.height() * scale
@@ -72,13 +72,13 @@ class Layout:
         return QRectF(corner, QSizeF(own.width() * scale, own.height() * scale))
 
     def share(self, at: QPointF, pane: QRectF) -> QPointF:
-        """A point as a share of the picture in its pane."""
+        """Returns a point as a fraction of the image in its pane."""
         target = self.target(pane)
         offset = at - target.topLeft()
         return QPointF(offset.x() / target.width(), offset.y() / target.height())
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Column and row under a point."""
+        """Returns the column and row under a point, or None."""
         if self.size is None:
             return None
         share = self.share(at, self.pane_at(at))
@@ -87,11 +87,11 @@ class Layout:
         return int(share.x() * self.size.width()), int(share.y() * self.size.height())
 
     def fit(self) -> None:
-        """The whole picture."""
+        """Fits the whole image into the pane."""
         self.zoom, self.centre = None, QPointF(0.5, 0.5)
 
     def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
-        """So many points per pixel; what is at a point stays there."""
+        """Sets the zoom in points per pixel, keeping the image point under ``at`` fixed."""
         pane = self.pane_at(at) if at is not None else None
         before = self.share(at, pane) if at is not None and pane is not None else None
         self.zoom = min(max(zoom, 1.0 / MOST_ZOOM), MOST_ZOOM)
@@ -99,7 +99,7 @@ class Layout:
             self._centre(self.centre + before - self.share(at, pane))
 
     def pan(self, dx: float, dy: float) -> None:
-        """By points of the screen."""
+        """Moves the image by points of the screen."""
         if self.size is not None:
             scale = self.zoom = self.points_per_pixel()
             step = QPointF(dx / (self.size.width() * scale), dy / (self.size.height() * scale))

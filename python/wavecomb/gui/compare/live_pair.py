@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a live render that is compared with another."""
+"""Settings of a live render in a comparison."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from wavecomb.gui.compare.source import SideSource
 
 NOTE = (
-    "Both renders go on at once and share all threads evenly, so each is slower than alone. "
-    "Compare pictures here; compare times by the benchmark."
+    "Both renders run at once and share all threads evenly, so each is slower than alone. "
+    "Compare images here, and times with the benchmark."
 )
 
 
@@ -40,18 +40,18 @@ _SHOWN: dict[str, dict[str, Any]] = {
     "adaptive": {"least": 0.0, "most": 1.0},
     "clamp_indirect": {"most": 1000.0, "step": 1.0, "decimals": 2},
 }
-SAME = "Changes no bit of the picture."
+SAME = "Does not change the image."
 
 
 def _row(name: str) -> Choice | Number:
-    """What it is, and whether the picture depends on it."""
+    """Returns a setting as a form row; its tip says whether the setting affects the image."""
     setting = settings()[name]
     row = choice(name) if name in _CHOSEN else replace(number(name), **_SHOWN.get(name, {}))
     return row if setting.changes_picture else replace(row, tip=f"{row.tip} {SAME}")
 
 
 class LiveSettings(QWidget):
-    """A grid of settings; each change restarts that side alone."""
+    """Grid of settings. Each change restarts only the render of that side."""
 
     def __init__(self, source: SideSource, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -76,7 +76,7 @@ class LiveSettings(QWidget):
         control.setObjectName(f"{row.field}{self._source.name}")
         control.setAccessibleName(f"{row.label} of {self._source.name}")
         if isinstance(control, ChoiceBox):
-            control.setMinimumContentsLength(7)  # three of them are side by side
+            control.setMinimumContentsLength(7)  # three columns must fit side by side
         else:
             control.setGroupSeparatorShown(False)
         self._widgets[row.field] = control
@@ -87,7 +87,7 @@ class LiveSettings(QWidget):
         self.show_setup()
 
     def show_setup(self) -> None:
-        """What the render uses."""
+        """Shows the settings that the render uses."""
         live = self._source.live
         if live is None:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a comparison, and what A, B and their difference hold at a pixel."""
+"""Tables with the numbers of a comparison, and the values at a pixel."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wavecomb.gui.compare.picture_sides import Side
 
 
 class _Table(QTableWidget):
-    """Two columns; Ctrl+C copies all."""
+    """Table of two columns. Ctrl+C copies its whole text."""
 
     def __init__(self, name: str, accessible: str, parent: QWidget) -> None:
         super().__init__(0, 2, parent)
@@ -40,7 +40,7 @@ class _Table(QTableWidget):
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
 
     def set_rows(self, found: list[tuple[str, str, str]]) -> None:
-        """Name, value, tooltip."""
+        """Fills the table with (name, value, tooltip)."""
         self.setRowCount(len(found))
         for row, (name, value, tip) in enumerate(found):
             for column, text in enumerate((name, value)):
@@ -52,7 +52,7 @@ class _Table(QTableWidget):
                 item.setToolTip(tip)
 
     def text(self) -> str:
-        """All of it, for the clipboard."""
+        """Returns the whole table as text for the clipboard."""
         lines = []
         for row in range(self.rowCount()):
             cells = [self.item(row, column) for column in range(2)]
@@ -60,7 +60,7 @@ class _Table(QTableWidget):
         return "\n".join(lines)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Copies."""
+        """Copies the table on Ctrl+C."""
         if event.matches(QKeySequence.StandardKey.Copy):
             QGuiApplication.clipboard().setText(self.text())
         else:
@@ -68,7 +68,7 @@ class _Table(QTableWidget):
 
 
 class NumbersPanel(QWidget):
-    """Two tables, one above the other."""
+    """Panel with two tables, one above the other."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -90,7 +90,7 @@ class NumbersPanel(QWidget):
         self.set_pixel(None, None, "beauty", -1, -1)
 
     def set_numbers(self, found: Numbers | None, message: str) -> None:
-        """Figures, or why there are none."""
+        """Shows the numbers, or ``message`` as the reason for missing ones."""
         listed = rows(found) if found is not None else []
         self._verdict.setText(f"{found.layer}: {listed[0][1]}" if found is not None else message)
         font = self._verdict.font()
@@ -100,7 +100,7 @@ class NumbersPanel(QWidget):
         self._table.set_rows(listed[1:])
 
     def set_pixel(self, a: Side | None, b: Side | None, layer: str, x: int, y: int) -> None:
-        """Values at a pixel; x < 0: none."""
+        """Shows the values at a pixel; x < 0 means no pixel."""
         if x < 0:
             self._pixel.set_rows([("Pixel", "move the mouse over a picture", "")])
             return

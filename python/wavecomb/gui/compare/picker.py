@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bar of one side of a comparison: what it shows, and where else it may come from."""
+"""Bar of one side of a comparison, which shows and chooses the source of its image."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 
 class SidePicker(TakesFiles, QWidget):
-    """Name and source of A or B.
+    """Bar with the name of side A or B and a menu of sources.
 
     Signals:
-        dropped(list): Paths of files that were dropped here.
+        dropped(list): Files with these paths were dropped on the bar.
     """
 
     dropped = Signal(list)
@@ -45,7 +45,7 @@ class SidePicker(TakesFiles, QWidget):
         self.setObjectName(f"side{name}")
         self.setAcceptDrops(True)
         self._button = tool(
-            f"choose{name}", f"{name}  ", f"Choose where picture {name} is from", self
+            f"choose{name}", f"{name}  ", f"Choose the source of picture {name}", self
         )
         self._button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self._button.setMenu(self._menu())
@@ -84,12 +84,12 @@ class SidePicker(TakesFiles, QWidget):
                 "EXR with any layers, PNG, .npy of a results folder",
                 self.ask,
             ),
-            ("keep", "&Keep the viewport's picture", "As it is now", self.source.keep),
-            ("follow", "Follow the &viewport", "The picture as it goes on", self.source.follow),
+            ("keep", "&Keep the viewport's picture", "Without later changes", self.source.keep),
+            ("follow", "Follow the &viewport", "With all later changes", self.source.follow),
             (
                 "render",
                 "&Render with other settings",
-                "A second live render of the same stage, beside the viewport's",
+                "Start a second live render of the same stage",
                 self.render_other,
             ),
         ):
@@ -101,7 +101,7 @@ class SidePicker(TakesFiles, QWidget):
         return menu
 
     def ask(self) -> None:
-        """A dialog for a file; it blocks nothing else."""
+        """Opens a file dialog that does not block the window."""
         patterns = " ".join(f"*{suffix}" for suffix in SUFFIXES)
         ask_file(
             self, f"Picture {self.source.name}", f"Pictures ({patterns})",
@@ -109,7 +109,7 @@ class SidePicker(TakesFiles, QWidget):
         )  # fmt: skip
 
     def render_other(self) -> None:
-        """A render of its own, at first with the viewport's settings."""
+        """Starts a separate render, initially with the viewport's settings."""
         self.source.render(self._session.setup)
 
     def _show(self) -> None:
@@ -126,5 +126,5 @@ class SidePicker(TakesFiles, QWidget):
         self._live.show_setup()
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Files were dropped on the bar."""
+        """Emits ``dropped`` for files that were dropped on the bar."""
         self.dropped.emit(paths)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two pictures of a comparison: from files, from frames. No Qt."""
+"""The two images of a comparison, from files or frames. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 SUFFIXES = (".exr", ".png", ".npy", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".pfm")
-"""Files that are taken for pictures where they are dropped."""
+"""File endings that are accepted as images when dropped."""
 
 _numbers = itertools.count(1)
 
 
 @dataclass(frozen=True)
 class Side:
-    """A picture to compare.
+    """An image to compare.
 
     Attributes:
-        name: For people: a file's name, "viewport".
-        layers: By name, float32 (height, width, channels), linear; at least one.
-        note: Where it is from, or how far it is.
-        path: Of its file, or None.
-        variance: Of each pixel's mean, like the beauty; None where it is not known.
-        live: More may come: it is a frame of a render that goes on.
-        number: Another for each picture.
+        name: Name for people, such as a file name or "viewport".
+        layers: Layers by name, float32 (height, width, channels), linear; at least one.
+        note: Description of the origin or progress.
+        path: Path of the file, or None.
+        variance: Variance of each pixel's mean, with the shape of the beauty; None if unknown.
+        live: Whether it is a frame of a render that continues.
+        number: Unique number of this image.
     """
 
     name: str
@@ -55,19 +55,22 @@ class Side:
         return int(first.shape[1]), int(first.shape[0])
 
     def layer(self, name: str) -> Array | None:
-        """A layer; of a picture with only one, such as a PNG, that one is the beauty."""
+        """Returns a layer by name.
+
+        The only layer of an image, as in a PNG, counts as the beauty.
+        """
         if name == "beauty" and name not in self.layers and len(self.layers) == 1:
             return next(iter(self.layers.values()))
         return self.layers.get(name)
 
 
 def read_side(path: Path) -> Side:
-    """Reads a picture file: EXR with all layers, PNG and others, .npy of a results folder.
+    """Reads an image file: EXR with all layers, PNG and others, .npy of a results folder.
 
-    A file NAME_var.exr beside NAME.exr, as golden pictures have it, is its variance.
+    A file NAME_var.exr beside NAME.exr, as golden images have it, is read as its variance.
 
     Raises:
-        WavecombError: It cannot be read; one line that names the file.
+        WavecombError: The file cannot be read. The message is one line that names the file.
     """
     try:
         layers = _read_npy(path) if path.suffix.lower() == ".npy" else layers_of(path)
@@ -93,7 +96,7 @@ def _read_npy(path: Path) -> dict[str, Array]:
 
 
 def side_of_frame(frame: Frame, name: str, *, live: bool) -> Side:
-    """A frame of a live render. Its arrays are shared, not copied: frames do not change."""
+    """Makes a side from a frame of a live render, sharing its arrays, which never change."""
     layers = {layer: _three(frame.layer(layer)) for layer in frame.names()}
     done = frame.status.get("samples_done")
     note = f"{frame.width} x {frame.height}"
@@ -101,7 +104,7 @@ def side_of_frame(frame: Frame, name: str, *, live: bool) -> Side:
         note += f", {done / (frame.width * frame.height):.3g} samples a pixel"
     if frame.scale > 1:
         note += f", 1/{frame.scale} of the size"
-    note += ", done" if frame.final else ", going on" if live else ""
+    note += ", done" if frame.final else ", rendering" if live else ""
     return Side(name, layers, note, None, layers.get("variance"), live and not frame.final)
 
 
@@ -112,7 +115,7 @@ def _three(layer: Array | None) -> Array:
 
 
 def common_layers(a: Side | None, b: Side | None) -> list[str]:
-    """Layers that can be shown of both, or of the one there is; the beauty first."""
+    """Returns the layers that all existing sides have, the beauty first."""
     sides = [side for side in (a, b) if side is not None]
     names: list[str] = []
     for name in ("beauty", *(name for side in sides for name in side.layers)):
@@ -122,14 +125,14 @@ def common_layers(a: Side | None, b: Side | None) -> list[str]:
 
 
 def problem(a: Side | None, b: Side | None, layer: str) -> str:
-    """Why the two cannot be compared, and what to do; "" where they can."""
+    """Returns why the two cannot be compared and what to do, or "" if they can."""
     if a is None or b is None:
         missing = "A and B" if a is None and b is None else "A" if a is None else "B"
         return f"Choose {missing}: open or drop a picture, or take the viewport's."
     if a.size != b.size:
         return (
             f"A is {a.size[0]} x {a.size[1]}, B is {b.size[0]} x {b.size[1]}: only pictures of one "
-            "size have differences. Render or choose one at the size of the other."
+            "size can be subtracted. Render or choose one at the size of the other."
         )
     one, two = a.layer(layer), b.layer(layer)
     if one is None or two is None:
@@ -143,7 +146,7 @@ def problem(a: Side | None, b: Side | None, layer: str) -> str:
 
 
 def pair(a: Side, b: Side, layer: str) -> tuple[Array, Array]:
-    """The layer of both with as many channels: an alpha that only one has is left out."""
+    """Returns the layer of both with the same number of channels, dropping an alpha of only one."""
     one, two = a.layer(layer), b.layer(layer)
     assert one is not None and two is not None
     channels = min(one.shape[2], two.shape[2])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a picture has the bits of the one before, though its scheduling is another; no Qt."""
+"""Verification that scheduling settings do not change the bits of an image. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from wavecomb.gui.viewport.session import Session
 from wavecomb.options import settings
 
 BITS = (*(name for name, row in settings().items() if row.changes_bits), "region")
-"""Settings that decide over the bits, beside the samples of each pixel."""
+"""Settings that determine the bits of an image, in addition to the sample counts."""
 
 MAX_PICTURES = 32
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the light shows.
+    """Verdict of the bit comparison.
 
-    ``kind``: "same", "different", "first" (nothing to compare with yet), "none" (cannot be told).
+    ``kind`` is "same", "different", "first" (nothing to compare with yet) or "none" (no comparison
+    is possible).
     """
 
     kind: str
@@ -35,12 +36,12 @@ class Verdict:
 
 
 def fingerprint(beauty: NDArray[np.float32]) -> str:
-    """A hash of the bits of a picture."""
+    """Returns a hash of the bits of an image."""
     return hashlib.blake2b(np.ascontiguousarray(beauty).data, digest_size=8).hexdigest()
 
 
 def even_samples(samples: NDArray[Any] | None) -> int:
-    """The samples that each pixel has; 0 where not all have the same number, or it is not known."""
+    """Returns the sample count that all pixels share, or 0 if they differ or are unknown."""
     if samples is None or samples.size == 0:
         return 0
     first = int(samples.flat[0])
@@ -48,43 +49,43 @@ def even_samples(samples: NDArray[Any] | None) -> int:
 
 
 def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable, ...] | None:
-    """What decides over the bits at equal samples; None where the clock has a say.
+    """Returns a key of everything that determines the bits at equal sample counts.
 
-    ``revision``: of scene and camera. With a limit of time, and with roulette by measured costs,
-    a picture depends on how fast the machine was.
+    ``revision`` identifies scene and camera. Returns None if the image depends on the speed of the
+    machine, as with a time limit or with roulette by measured costs.
     """
     if setup.get("time_limit"):
         return None
     if setup.get("roulette") == "cost-aware":
         if setup.get("costs") == "measured":
             return None
-        # Costs decide over the survival of paths.
+        # Costs decide which paths are terminated.
         costs = (setup.get("costs"), repr(setup.get("profile")))
         return (revision, costs, *(_plain(setup.get(name)) for name in BITS))
     return (revision, *(_plain(setup.get(name)) for name in BITS))
 
 
 class PictureBook:
-    """Fingerprints of even pictures, and what they were rendered with."""
+    """Fingerprints of images with equal sample counts in all pixels, and their settings."""
 
     def __init__(self) -> None:
         self._pictures: dict[Hashable, tuple[str, dict[str, Any]]] = {}
         self.checked = 0
-        """Pictures compared with one of other settings since the last different one."""
+        """Number of comparisons with images of other settings since the last different image."""
 
     def add(
         self, key: Hashable | None, samples: Hashable, mark: str, settings: Mapping[str, Any]
     ) -> Verdict:
-        """Compares a picture with the first of its key.
+        """Compares an image with the first one of the same key.
 
         Args:
-            key: Of ``picture_key``.
-            samples: Samples of each pixel, or what tells their map.
-            mark: Of ``fingerprint``.
-            settings: Of its scheduling, to say what is different.
+            key: Key from ``picture_key``.
+            samples: Samples of each pixel, or an identifier of their map.
+            mark: Hash from ``fingerprint``.
+            settings: Scheduling settings, to report the differences.
         """
         if key is None:
-            return Verdict("none", "Time decides over this picture: no two are alike")
+            return Verdict("none", "This picture depends on time, so no two are equal")
         place = (key, samples)
         if place not in self._pictures:
             self._pictures[place] = (mark, dict(settings))
@@ -101,7 +102,7 @@ class PictureBook:
         return Verdict("different", f"DIFFERENT picture with {changes}: please report this")
 
     def clear(self) -> None:
-        """Forgets all."""
+        """Forgets all images."""
         self._pictures.clear()
         self.checked = 0
 
@@ -110,11 +111,12 @@ def _plain(value: Any) -> Hashable:
     return tuple(value) if isinstance(value, list) else value
 
 
-# ---- Tells whether what is looked at has changed: stage, camera, materials, lights ---------------
+# ---- Detection of changes in stage, camera, materials and lights
+# -----------------------------------
 
 
 class PictureRevision(QObject):
-    """A name for scene and camera: the same again when an edit is taken back."""
+    """Identifier of scene and camera, which returns to its old value when an edit is undone."""
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -123,7 +125,7 @@ class PictureRevision(QObject):
         session.opened.connect(self._count)
 
     def value(self) -> str:
-        """The name of what is looked at now."""
+        """Returns the identifier of the current scene and camera."""
         session = self._session
         camera = session.pose.options() if session.pose is not None else None
         edits = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a side of a comparison gets its picture from: a file, the viewport, a render of its own."""
+"""Source of one side of a comparison: a file, the viewport, or a separate render."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ SHORT = {
     **{"lanes": "lanes", "wave_size": "waves", "ray_order": "rays", "shadow_order": "shadow rays"},
     **{"adaptive": "adaptive", "denoise": "denoise", "clamp_indirect": "clamp"},
 }
-"""Settings by which live renders are told apart, and their short names."""
+"""Short names of the settings by which live renders are distinguished."""
 
 
 class SideSource(QObject):
-    """One side. All methods are for the UI thread; none waits.
+    """One side of a comparison. All methods are for the UI thread; none blocks.
 
     Signals:
-        changed(): ``side`` or ``kind`` is another.
+        changed(): ``side`` or ``kind`` changed.
         failed(str): One line that says what to do.
     """
 
@@ -57,17 +57,17 @@ class SideSource(QObject):
         return self._reader.busy
 
     def open(self, path: Path) -> None:
-        """Reads a picture file; what is there stays until then."""
+        """Reads an image file. The current image stays until the new one is read."""
         self._reader.submit(partial(read_side, path), path)
 
     def set_side(self, side: Side, kind: str = FILE) -> None:
-        """Takes a picture that is there."""
+        """Shows a given image."""
         self._release()
         self.kind, self.side = kind, side
         self.changed.emit()
 
     def keep(self) -> None:
-        """The viewport's picture as it is now."""
+        """Shows the viewport's current image, without following later changes."""
         frame = self._session.last_frame
         if frame is None:
             self.failed.emit(f"{self.name}: there is no picture to keep yet: open a stage first")
@@ -76,7 +76,7 @@ class SideSource(QObject):
         self.set_side(side, KEPT)
 
     def follow(self) -> None:
-        """The viewport, as it goes on."""
+        """Shows the viewport and follows its changes."""
         self._release()
         self.kind, self.side = VIEWPORT, None
         frame = self._session.last_frame
@@ -85,7 +85,7 @@ class SideSource(QObject):
         self.changed.emit()
 
     def render(self, setup: Setup) -> None:
-        """A render of its own of the stage that is open, with these settings."""
+        """Starts a separate render of the open stage with these settings."""
         if self._session.stage is None:
             self.failed.emit(f"{self.name}: there is no stage to render: open one first")
             return
@@ -99,12 +99,12 @@ class SideSource(QObject):
         self.changed.emit()
 
     def change(self, **values: Any) -> None:
-        """Changes settings of the render of its own."""
+        """Changes settings of the separate render."""
         if self.live is not None and self.live.change(**values):
             self.changed.emit()
 
     def exchange(self, other: SideSource) -> None:
-        """Gives each the other's picture."""
+        """Exchanges the images of two sides."""
         for mine, theirs in ((self, other), (other, self)):
             if mine.live is not None:
                 mine.live.frame.disconnect(mine._on_live)
@@ -118,7 +118,7 @@ class SideSource(QObject):
         other.changed.emit()
 
     def close(self) -> None:
-        """Ends what runs."""
+        """Stops reading and rendering."""
         self._reader.close()
         self._release()
         self.side = None
@@ -144,7 +144,10 @@ class SideSource(QObject):
 
 
 def setup_text(setup: Setup, beside: Setup | None = None) -> str:
-    """What tells a setup from another, in short; policy and samples where nothing does."""
+    """Describes a setup in short by its differences from another.
+
+    If nothing differs, it names policy and samples.
+    """
     names = list(SHORT)
     if beside is not None:
         names = [name for name in names if getattr(setup, name) != getattr(beside, name)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two pictures and their difference: side by side, wiped, flipped; zoom and pan are linked."""
+"""View of two images and their difference: side by side, wipe or flip, with common zoom and pan."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from wavecomb.picture.heatmap import Scale
 def paint_label(
     painter: QPainter, pane: QRectF, text: str, *, middle: bool = False, right: bool = False
 ) -> None:
-    """Text on a dark ground in a corner of a pane, or in its middle, wrapped."""
+    """Paints wrapped text on a dark background in a corner or the middle of a pane."""
     if not text or pane.width() < theme.em(2):
         return
     pad = theme.em(0.35)
@@ -53,7 +53,7 @@ def paint_label(
 
 
 def paint_bar(painter: QPainter, area: QRectF, scale: Scale) -> None:
-    """Title, ramp and numbers; numbers that would overlap are left out."""
+    """Paints the title, the colour ramp and its numbers, leaving out those that would overlap."""
     metrics = painter.fontMetrics()
     pad = theme.em(0.4)
     left, width = area.left() + pad, max(area.width() - 2 * pad, 1.0)
@@ -79,16 +79,16 @@ def paint_bar(painter: QPainter, area: QRectF, scale: Scale) -> None:
 
 ZOOM_STEP = 1.25
 _PAN_STEP = 0.1
-"""Share of what is seen that an arrow key moves it by."""
+"""Distance that an arrow key pans, as a fraction of the visible area."""
 
 
 class CompareView(TakesFiles, QWidget):
-    """Draws; knows nothing of where pictures are from.
+    """Widget that draws the images, independent of their sources.
 
     Signals:
         hovered(x, y): The pixel under the mouse, or -1, -1.
-        flipped(which): "A" or "B" is shown now.
-        wiped(fraction): Where the line is, 0 at the left.
+        flipped(which): The flip view now shows "A" or "B".
+        wiped(fraction): The wipe line moved to this fraction of the width, 0 at the left.
         dropped(which, paths): Files were dropped on the half of A or of B.
     """
 
@@ -123,81 +123,81 @@ class CompareView(TakesFiles, QWidget):
     # ---- what is shown -------------------------------------------------------------------------
 
     def set_image(self, which: str, image: QImage | None) -> None:
-        """A, B or D (the difference)."""
+        """Sets the image of A, B or D (the difference)."""
         self._images[which] = image
         self.update()
 
     def image(self, which: str) -> QImage | None:
-        """What ``set_image`` got."""
+        """Returns the image set by ``set_image``."""
         return self._images[which]
 
     def set_scale(self, scale: Scale | None) -> None:
-        """What the colours of the difference mean."""
+        """Sets the colour scale of the difference."""
         self._scale = scale
         self.update()
 
     def set_mode(self, mode: str) -> None:
-        """One of ``compare_layout.MODES``."""
+        """Sets the view, one of ``layout.MODES``."""
         self._layout.mode = mode
         self.update()
 
     def set_message(self, message: str) -> None:
-        """In place of the difference; "": none."""
+        """Shows a message in place of the difference; "" removes it."""
         self.message = message
         self.update()
 
     def flip(self) -> None:
-        """The other of A and B."""
+        """Switches between A and B in the flip view."""
         self._layout.shown = B if self.shown == A else A
         self.flipped.emit(self.shown)
         self.update()
 
     def set_wipe(self, fraction: float) -> None:
-        """Moves the line."""
+        """Moves the wipe line."""
         self.wipe = min(max(fraction, 0.0), 1.0)
         self.wiped.emit(self.wipe)
         self.update()
 
     def fit(self) -> None:
-        """The whole picture."""
+        """Fits the whole image."""
         self._arranged().fit()
         self.update()
 
     def set_zoom(self, zoom: float, at: QPointF | None = None) -> None:
-        """So many points per pixel; what is at a point of the widget stays there."""
+        """Sets the zoom in points per pixel, keeping the image point under ``at`` fixed."""
         self._arranged().set_zoom(zoom, at)
         self.update()
 
     @property
     def mode(self) -> str:
-        """What ``set_mode`` got."""
+        """The current view, one of ``layout.MODES``."""
         return self._layout.mode
 
     @property
     def shown(self) -> str:
-        """A or B, of a flip."""
+        """The image that the flip view shows, A or B."""
         return self._layout.shown
 
     @property
     def zoom(self) -> float | None:
-        """Points per pixel that were asked for; None: the whole picture."""
+        """The chosen zoom in points per pixel; None fits the whole image."""
         return self._layout.zoom
 
     def points_per_pixel(self) -> float:
-        """The zoom as it is."""
+        """Returns the current zoom in points per pixel."""
         return self._arranged().points_per_pixel()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Column and row under a point of the widget."""
+        """Returns the column and row under a point of the widget."""
         return self._arranged().pixel_at(at)
 
     def target(self, number: int) -> QRectF:
-        """Where the picture of a pane lies."""
+        """Returns the rectangle of the image in a pane."""
         layout = self._arranged()
         return layout.target(layout.panes()[number][1])
 
     def _arranged(self) -> Layout:
-        """For the widget and the pictures as they are."""
+        """Returns the layout for the current sizes of widget and images."""
         layout = self._layout
         layout.area = QRectF(self.rect())
         there = [image for image in (self._images[A], self._images[B]) if image is not None]
@@ -215,7 +215,7 @@ class CompareView(TakesFiles, QWidget):
     # ---- painting ------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Panes, then the line of the wipe, labels and the bar of the difference."""
+        """Paints panes, the wipe line, labels and the colour bar."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), theme.surround())
         for which, pane in self._panes():
@@ -286,7 +286,7 @@ class CompareView(TakesFiles, QWidget):
         self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Takes the line of a wipe, or the picture."""
+        """Starts dragging the wipe line or the image."""
         at = event.position()
         left = event.button() == Qt.MouseButton.LeftButton
         near = abs(at.x() - self._line_x()) <= max(theme.em(0.5), 6)
@@ -294,7 +294,7 @@ class CompareView(TakesFiles, QWidget):
         self._drag = at
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Drags, or tells the pixel."""
+        """Drags, or reports the pixel under the mouse."""
         at = event.position()
         if self._wiping:
             self.set_wipe(at.x() / max(self._panes()[0][1].width(), 1.0))
@@ -310,11 +310,11 @@ class CompareView(TakesFiles, QWidget):
         self._hover(self.pixel_at(at))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Lets go."""
+        """Ends dragging."""
         self._drag, self._wiping = None, False
 
     def leaveEvent(self, event: object) -> None:
-        """No pixel."""
+        """Reports that the mouse is over no pixel."""
         self._hover(None)
 
     def _hover(self, pixel: tuple[int, int] | None) -> None:
@@ -324,13 +324,13 @@ class CompareView(TakesFiles, QWidget):
             self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Zooms to the pixel under the mouse."""
+        """Zooms about the pixel under the mouse."""
         steps = event.angleDelta().y() / 120.0
         if steps:
             self.set_zoom(self.points_per_pixel() * ZOOM_STEP**steps, event.position())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Zoom, pan, line, flip."""
+        """Handles keys for zoom, pan, wipe line and flip."""
         key, keys = Qt.Key(event.key()), Qt.Key
         steps = {
             keys.Key_Left: (-1, 0),
@@ -362,11 +362,11 @@ class CompareView(TakesFiles, QWidget):
             self._pan(-dx * _PAN_STEP * pane.width(), -dy * _PAN_STEP * pane.height())
 
     def focusInEvent(self, event: object) -> None:
-        """Draws the frame."""
+        """Repaints to show the focus frame."""
         self.update()
 
     focusOutEvent = focusInEvent
 
     def take_files(self, paths: list[str], at: QPointF) -> None:
-        """Files that are dropped on the left half become A, others B."""
+        """Emits ``dropped``: files dropped on the left half become A, on the right half B."""
         self.dropped.emit(A if at.x() < self.width() / 2 else B, paths)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare: two pictures or two live settings, seen and in numbers."""
+"""Compare window: two images or two live settings, displayed and in numbers."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ _KEYS = {"side": "1", "wipe": "2", "flip": "3", "difference": "4", "three": "5"}
 
 
 class CompareWindow(QWidget):
-    """A and B, in one view, with numbers.
+    """Window that compares A and B, in one view and with numbers.
 
     Signals:
-        failed(str): One line that says what to do; also shown here.
+        failed(str): One line that says what to do; also shown in the window.
     """
 
     failed = Signal(str)
@@ -119,7 +119,7 @@ class CompareWindow(QWidget):
         bar.addStretch(1)
         for name, text, tip, call in (
             ("fit", "Fit", "The whole picture (0)", self.view.fit),
-            ("one", "1:1", "Pixel by pixel (1)", self._one_to_one),
+            ("one", "1:1", "One image pixel per screen pixel (1)", self._one_to_one),
         ):
             button = tool(name, text, tip, self)
             button.clicked.connect(lambda checked=False, call=call: call())
@@ -127,7 +127,7 @@ class CompareWindow(QWidget):
         return bar
 
     def _mark_mode(self) -> None:
-        """The chosen view's button in the colours of a selection."""
+        """Gives the button of the chosen view the colours of a selection."""
         colours = QApplication.palette()
         for button in self._modes.values():
             own = QPalette()
@@ -138,10 +138,10 @@ class CompareWindow(QWidget):
 
     def _look_bar(self) -> QHBoxLayout:
         bar = QHBoxLayout()
-        self._map = self._combo("map", "Difference", "What the difference shows")
+        self._map = self._combo("map", "Difference", "Kind of difference to show")
         for kind, title in MAPS.items():
             self._map.addItem(title, kind)
-        self._layer = self._combo("layer", "Layer", "Layer that both have")
+        self._layer = self._combo("layer", "Layer", "Layer to compare")
         self._layer.addItem("beauty")
         self._exposure = real(
             "compareExposure", "Exposure of both",
@@ -165,17 +165,18 @@ class CompareWindow(QWidget):
         return combo
 
     def sizeHint(self) -> QSize:
-        """Room for two pictures and the numbers."""
+        """Returns a size for two images and the numbers."""
         return QSize(theme.em(70), theme.em(42))
 
-    # ---- what others call ----------------------------------------------------------------------
+    # ---- public methods
+    # ----------------------------------------------------------------------------
 
     def keep(self, which: str) -> None:
-        """Keeps the viewport's picture as "A" or "B"."""
+        """Keeps the viewport's current image as "A" or "B"."""
         self.sources[which].keep()
 
     def open(self, which: str, paths: list[str | Path]) -> None:
-        """Opens a file as "A" or "B"; two files at once are A and B."""
+        """Opens a file as "A" or "B"; two files at once become A and B."""
         if len(paths) > 2:
             self._fail(f"{len(paths)} files were dropped: drop one, or two for A and B")
         elif len(paths) == 2:
@@ -185,7 +186,7 @@ class CompareWindow(QWidget):
             self.sources[which].open(Path(paths[0]))
 
     def compare(self, a: Side | Path | None, b: Side | Path | None) -> None:
-        """Shows two pictures, in front of other panels; None: what is there stays."""
+        """Shows two images, and raises the window. None keeps the current image."""
         for source, side in ((self.a, a), (self.b, b)):
             if isinstance(side, Side):
                 source.set_side(side)
@@ -199,18 +200,18 @@ class CompareWindow(QWidget):
             dock.raise_()
 
     def set_mode(self, mode: str) -> None:
-        """One of ``compare_layout.MODES``."""
+        """Sets the view, one of ``layout.MODES``."""
         self._modes[mode].setChecked(True)
         self.view.set_mode(mode)
         self.view.setFocus()
 
     @property
     def busy(self) -> bool:
-        """Whether something is read or computed."""
+        """Whether something is being read or computed."""
         return self._jobs.busy or self.a.loading or self.b.loading
 
     def shutdown(self) -> None:
-        """Ends live renders and what is computed."""
+        """Stops live renders and computations."""
         self._jobs.close()
         self.a.close()
         self.b.close()
@@ -221,12 +222,12 @@ class CompareWindow(QWidget):
         self.view.set_zoom(1.0 / self.view.devicePixelRatioF())
 
     def look(self) -> Look:
-        """How both are shown."""
+        """Returns the layer, exposure and tone mapping of both images."""
         layer = self._layer.currentText() or "beauty"
         return Look(layer, self._exposure.value(), self._tone.currentText())
 
     def refresh(self) -> None:
-        """Computes what is to be shown."""
+        """Computes everything that the window shows."""
         self._show_layers()
         for name, source in self.sources.items():
             title = source.side.name if source.side is not None else ""
@@ -259,7 +260,7 @@ class CompareWindow(QWidget):
         self.numbers.set_numbers(found, self.view.message)
 
     def _take_map(self, image: QImage | None, scale: Scale | str | None) -> None:
-        """A string in place of the scale says why there is no map."""
+        """Shows the map, or a text that says why there is none."""
         self.view.set_image("D", image)
         self.view.set_scale(scale if isinstance(scale, Scale) else None)
         if isinstance(scale, str):
@@ -280,13 +281,13 @@ class CompareWindow(QWidget):
             self.session.failed.emit(message)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Nothing is computed for nobody: renders of its own stand still."""
+        """Pauses the separate renders while the window is hidden."""
         for source in self.sources.values():
             if source.live is not None:
                 source.live.pause()
 
     def showEvent(self, event: object) -> None:
-        """Goes on."""
+        """Resumes the separate renders."""
         for source in self.sources.values():
             if source.live is not None and self.session.state != "paused":
                 source.live.resume()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stage: its tree, materials, lights, and edits of them."""
+"""Panels for the stage: its tree, materials and lights, and their edits."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps a copy of unsaved edits, so that a crash of the window loses none."""
+"""Saves a copy of unsaved edits, so that a crash of the window loses none."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from wavecomb.gui.scene.scene_edits import SceneEdits
 
 DELAY_MS = 2000
-"""Time from an edit to its copy on the disk."""
+"""Delay between an edit and saving its copy, in milliseconds."""
 
 
 class Autosave(QObject):
-    """Writes the edits of the open stage to a file until they are saved or undone.
+    """Automatic writer of the edits of the open stage to a file, until they are saved or undone.
 
-    Each stage has one file. The window that has the stage open holds a lock on a file beside it; a
-    second window of the same stage writes none.
+    Each stage has one file. The window with the stage holds a lock beside the file. A second window
+    with the same stage writes no copy.
 
     Signals:
-        found(): Edits of an earlier window, which ended without saving them, can be restored.
+        found(): There are edits of an earlier window that ended without saving them.
     """
 
     found = Signal()
@@ -41,8 +41,8 @@ class Autosave(QObject):
 
         Args:
             edits: The edits.
-            folder: Where the files go; made when it is needed.
-            parent: Lives as long.
+            folder: Folder of the files, created when needed.
+            parent: Qt parent.
         """
         super().__init__(parent)
         self._edits, self._folder = edits, folder
@@ -59,11 +59,11 @@ class Autosave(QObject):
 
     @property
     def file(self) -> Path | None:
-        """File of the stage that is open; None if there is none or another window has it."""
+        """File of the open stage, or None if there is no stage or another window has the lock."""
         return self._file
 
     def close(self) -> None:
-        """Writes what is due and lets other windows have the file. Unsaved edits stay in it."""
+        """Writes pending edits and releases the lock. Unsaved edits stay in the file."""
         if self._timer.isActive():
             self.write()
         self._release()
@@ -75,19 +75,19 @@ class Autosave(QObject):
         self._file = self._lock = None
 
     def write(self) -> None:
-        """Writes the edits now, or removes the file where there are none."""
+        """Writes the edits now, or removes the file if there are none."""
         if self._file is None or self._edits.edits is None:
             return
         if self._edits.history.stack.isClean():
             if not self._waits:
                 self.discard()
             return
-        self._waits = False  # new edits replace those that nobody restored
+        self._waits = False  # new edits replace those that were not restored
         with contextlib.suppress(WavecombError, OSError):
             save_edits(self._edits.edits.stage, self._file)
 
     def restore(self) -> None:
-        """Brings the edits of the file into the stage."""
+        """Loads the edits of the file into the stage."""
         self._waits = False
         usd, layer = self._edits.usd, None
         if self._file is not None and usd is not None:
@@ -140,11 +140,12 @@ class Autosave(QObject):
 
     def _on_clean(self, clean: bool) -> None:
         if clean and not self._waits:
-            self._timer.start(0)  # a stage that is being closed stops the timer: its edits stay
+            # a stage that is being closed stops the timer, so its edits stay in the file
+            self._timer.start(0)
 
 
 def make_question(autosave: Autosave, parent: QWidget) -> QMessageBox:
-    """A dialog, not shown yet, that asks what to do with edits which were found."""
+    """Creates the dialog that asks whether to restore edits."""
     box = QMessageBox(parent)
     box.setObjectName("autosave")
     box.setIcon(QMessageBox.Icon.Question)

@@ -14,15 +14,15 @@ from wavecomb.picture.files import replacing
 _NOT_REPEATED = frozenset(
     {"subLayers", "subLayerOffsets", "comment", "documentation", "customLayerData", "owner"}
 )
-"""Metadata of the root layer that a layer over it does not repeat."""
+"""Metadata of the root layer that is not copied to a layer over it."""
 
 
 def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
-    """A layer with the content of the session layer that has the stage beneath it.
+    """Returns a layer with the content of the session layer, and the stage as its sublayer.
 
     Args:
-        stage: With edits in its session layer.
-        folder: Where the layer will be: the stage is named from there.
+        stage: Stage with edits in its session layer.
+        folder: Folder of the layer, from which the path of the stage is relative.
     """
     root = stage.GetRootLayer()
     layer = Sdf.Layer.CreateAnonymous("edits.usda")
@@ -30,11 +30,11 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
     base = Path(root.realPath)
     try:
         name = os.path.relpath(base, folder)
-    except ValueError:  # another drive
+    except ValueError:  # on Windows, the stage may be on another drive
         name = str(base)
     name = Path(name).as_posix()
     layer.subLayerPaths = [name if name.startswith(("../", "/")) else f"./{name}"]
-    # Up axis, units, default prim, times: USD takes them from the strongest layer only.
+    # USD reads up axis, units, default prim and times only from the strongest layer, so copy them.
     for key in root.pseudoRoot.ListInfoKeys():
         if key not in _NOT_REPEATED and not layer.pseudoRoot.HasInfo(key):
             layer.pseudoRoot.SetInfo(key, root.pseudoRoot.GetInfo(key))
@@ -42,10 +42,10 @@ def edit_layer(stage: Usd.Stage, folder: Path) -> Sdf.Layer:
 
 
 def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
-    """Writes the edits as a .usda file, whole or not at all; gives its path.
+    """Writes the edits as a .usda file, never partially, and returns its path.
 
     Raises:
-        WavecombError: It cannot be written, or would replace a file of the stage.
+        WavecombError: The file cannot be written, or would replace a file of the stage.
     """
     target = Path(path)
     if target.suffix.lower() not in (".usda", ".usd"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A form as data: rows of fields with values that are edited. No widgets."""
+"""Form as data: rows of fields with editable values. Independent of widgets."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Range:
-    """What a parameter can be.
+    """Range of a parameter.
 
     Attributes:
-        low: Least value.
-        high: Greatest value.
+        low: Smallest value.
+        high: Largest value.
         soft_low: Left end of the slider.
         soft_high: Right end of the slider.
-        decimals: Of the number.
-        logarithmic: The slider's steps are ratios; its left end is 0 then where low is.
+        decimals: Number of decimals.
+        logarithmic: Whether the slider is logarithmic. If ``low`` is 0, its left end means 0.
     """
 
     low: float
@@ -34,7 +34,7 @@ class Range:
     logarithmic: bool = False
 
     def share(self, value: float) -> float:
-        """Where a value stands on the slider, from 0 to 1.
+        """Returns the position of a value on the slider, from 0 to 1.
 
         >>> Range(0.0, 10.0, 0.0, 2.0).share(0.5), Range(0.0, 10.0, 0.0, 2.0).share(3.0)
         (0.25, 1.0)
@@ -47,7 +47,7 @@ class Range:
         return min(max(share, 0.0), 1.0)
 
     def value_at(self, share: float) -> float:
-        """The value at a place of the slider."""
+        """Returns the value at a position of the slider."""
         low, high = self.soft_low, self.soft_high
         if not self.logarithmic:
             return low + share * (high - low)
@@ -58,7 +58,10 @@ UNIT = Range(0.0, 1.0, 0.0, 1.0)
 
 
 def differs(shown: Any, value: Any) -> bool:
-    """Whether a field must be set anew: not for rounding, which would take the cursor away."""
+    """Returns whether a field must be updated.
+
+    Ignores rounding differences, because an update would move the text cursor.
+    """
     if isinstance(shown, tuple) != isinstance(value, tuple):
         return True
     if isinstance(value, tuple):
@@ -71,19 +74,20 @@ NUMBER, COLOUR, SWITCH, DRIVEN = "number", "colour", "switch", "driven"
 
 @dataclass(frozen=True)
 class FieldRow:
-    """One field.
+    """A field of a form.
 
     Attributes:
-        name: By which it is set.
-        label: Before it.
-        kind: "number", "colour", "switch", or "driven": something else gives the value.
-        value: When the form was made: a number, three of them, a bool; None where it is driven.
-        title: For people, with what tells it from others: "coat weight".
-        bounds: Of a number, and of each part of a colour.
-        default: Value where nobody says any; None: not known.
-        driver: What gives the value of a driven one: "texture wood.png".
-        group: Heading that it stands under; "": none.
-        tip: What it does and where the edit goes.
+        name: Name of the parameter.
+        label: Label before the field.
+        kind: "number", "colour", "switch", or "driven" for a value from a texture or primvar.
+        value: Value when the form was made: a number, a colour of three numbers, or a bool; None
+            for a driven field.
+        title: Full name for people, such as "coat weight".
+        bounds: Range of a number, or of each component of a colour.
+        default: Value if nothing is authored; None if unknown.
+        driver: Source of the value of a driven field, such as "texture wood.png".
+        group: Heading above the field, or "".
+        tip: Tooltip with the effect and the edited attribute.
     """
 
     name: str
@@ -99,17 +103,17 @@ class FieldRow:
 
 
 class FormModel(QObject):
-    """Fields of one thing at a time. Subclasses say what the values are and where edits go.
+    """Form of one object at a time. Subclasses provide the values and receive the edits.
 
     Signals:
-        remade(): Other rows: another thing is shown, or none.
-        changed(): The same rows, other values.
+        remade(): The rows changed, because another object or none is shown.
+        changed(): The values of the same rows changed.
 
     Attributes:
         rows: Fields, in order.
-        title: What it is of, "" for nothing.
-        note: Said in place of fields, or below them.
-        set_typing: Starts or ends a value that is being typed, which is one step of undo.
+        title: Name of the object, or "".
+        note: Text in place of fields or below them.
+        set_typing: Called at the start and end of typing a value, which becomes one undo step.
     """
 
     remade = Signal()
@@ -123,23 +127,26 @@ class FormModel(QObject):
         self._folds: dict[str, bool] = {}
 
     def value(self, name: str) -> Any:
-        """What a field is to show now; None: what it shows."""
+        """Returns the value that a field shows; None leaves the field as it is."""
         raise NotImplementedError
 
     def is_edited(self, name: str) -> bool:
-        """Whether there is something to take back."""
+        """Returns whether a field has an edit that can be reset."""
         raise NotImplementedError
 
     def set_value(self, name: str, value: Any) -> None:
-        """Edits a field; None: back to what the stage has."""
+        """Edits a field; None resets it to the value of the stage."""
         raise NotImplementedError
 
     def groups(self) -> list[str]:
-        """Headings, in order; "" first where fields have none."""
+        """Returns the headings in order. "" comes first if some fields have none."""
         return list(dict.fromkeys(row.group for row in self.rows))
 
     def is_open(self, group: str) -> bool:
-        """Whether a heading is open: as somebody left it, or where something is not by default."""
+        """Returns whether a heading is open.
+
+        This is the user's choice, or else whether a field below it differs from its default.
+        """
         used = any(
             row.kind == DRIVEN or row.value != row.default
             for row in self.rows
@@ -148,5 +155,5 @@ class FormModel(QObject):
         return self._folds.get(group, used)
 
     def fold(self, group: str, opened: bool) -> None:
-        """Keeps how somebody left a heading."""
+        """Stores whether the user opened or closed a heading."""
         self._folds[group] = opened

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows a form model: a field for each row, under headings that fold."""
+"""View of a form model: a field for each row, under collapsible headings."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from wavecomb.gui.scene.value_fields import (
 from wavecomb.gui.widgets import named
 
 LABEL_EM = 6.2
-"""Width of the names, the same in all groups."""
+"""Width of the labels, equal in all groups."""
 
 
 def field_of(row: FieldRow) -> Field | DrivenField:
-    """The field of a row; one that only says what drives it where it has no value."""
+    """Creates the field of a row; a driven row gets a field that only shows its source."""
     if row.kind == DRIVEN:
         return DrivenField(row.title, row.driver)
     if row.kind == SWITCH:
@@ -48,11 +48,11 @@ def field_of(row: FieldRow) -> Field | DrivenField:
 
 
 class FormView(QScrollArea):
-    """The fields of a model, made again where its rows are others.
+    """View of the fields of a model, rebuilt when its rows change.
 
     Attributes:
-        fields: That can be edited, by name.
-        groups: By title.
+        fields: Editable fields by name.
+        groups: Groups by title.
     """
 
     def __init__(self, model: FormModel, name: str, title: str) -> None:
@@ -107,7 +107,7 @@ class FormView(QScrollArea):
         return field
 
     def _show(self) -> None:
-        """Brings fields up to what the model says now."""
+        """Updates the fields with the values of the model."""
         for name, field in self.fields.items():
             value = self._model.value(name)
             if value is None:
@@ -118,7 +118,7 @@ class FormView(QScrollArea):
 
 
 class Rows(QWidget):
-    """Names and fields below each other."""
+    """Labels and fields, one below the other."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -130,7 +130,7 @@ class Rows(QWidget):
         self._form.setVerticalSpacing(theme.em(0.25))
 
     def add(self, row: FieldRow, field: QWidget) -> None:
-        """A row more."""
+        """Adds a row."""
         label = QLabel(row.label)
         label.setWordWrap(True)
         label.setFixedWidth(theme.em(LABEL_EM))
@@ -142,10 +142,10 @@ class Rows(QWidget):
 
 
 class Group(QWidget):
-    """Rows under a heading that folds them away.
+    """Rows under a heading that collapses them.
 
     Signals:
-        toggled(str, bool): Somebody folded this group, or opened it.
+        toggled(str, bool): The user opened (True) or closed the group.
     """
 
     toggled = Signal(str, bool)
@@ -157,7 +157,7 @@ class Group(QWidget):
             QToolButton(),
             f"group-{title.lower().replace(' ', '-')}",
             f"{title}, inputs",
-            "Fold, or open",
+            "Collapse or expand",
         )
         self.head.setText(title)
         self.head.setAutoRaise(True)

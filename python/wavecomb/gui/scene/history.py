@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of undo: Qt's stack, and commands that join where they are one drag or one value typed."""
+"""Undo steps: Qt's undo stack, with commands that merge within one drag or one typed value."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from wavecomb.gui.scene.stage_edits import Step
 
 MERGE_S = 0.7
-"""Changes of one thing that follow each other faster are one step of undo."""
+"""Changes of one value at shorter intervals, in seconds, merge into one undo step."""
 _EDIT = 1
-"""Commands of other kinds do not join."""
+"""Id of commands that may merge."""
 
 
 class EditCommand(QUndoCommand):
-    """A step that can be taken back.
+    """An undo command.
 
     Args:
-        step: What.
-        history: Whose.
-        stretch: Steps of another one never join.
-        typing: Whether the stretch is a value that is being typed.
-        moment: Seconds.
+        step: The step.
+        history: The history it belongs to.
+        stretch: Number that is equal for steps that may merge.
+        typing: Whether the step is part of typing a value.
+        moment: Time of the step in seconds.
     """
 
     def __init__(
@@ -34,25 +34,26 @@ class EditCommand(QUndoCommand):
     ) -> None:
         super().__init__(step.label)
         self.step, self.stretch, self.typing, self.moment = step, stretch, typing, moment
-        # Qt keeps commands, and these must not keep what keeps the stack.
+        # Qt owns the commands. A strong reference would keep the history, and thus its stack,
+        # alive.
         self._history = weakref.ref(history)
 
     def redo(self) -> None:
-        """Makes it, the first time too."""
+        """Applies the step. Qt also calls this when the command is pushed."""
         if (history := self._history()) is not None:
             history.step.emit(self.step)
 
     def undo(self) -> None:
-        """Takes it back."""
+        """Reverts the step."""
         if (history := self._history()) is not None:
             history.step.emit(self.step.inverse())
 
     def id(self) -> int:
-        """Qt asks those with the same to join."""
+        """Returns the id by which Qt finds commands that may merge."""
         return _EDIT if self.step.drags else -1
 
     def mergeWith(self, other: QUndoCommand) -> bool:
-        """Takes in a later one, if both are parts of one drag or of one value typed."""
+        """Merges a later command if both are part of one drag or one typed value."""
         if not isinstance(other, EditCommand) or other.stretch != self.stretch:
             return False
         quick = other.typing or other.moment - self.moment < MERGE_S
@@ -63,14 +64,14 @@ class EditCommand(QUndoCommand):
 
 
 class History(QObject):
-    """The steps of one stage.
+    """Undo history of one stage.
 
     Signals:
-        step(Step): Is to be made now: a new one, one that is done again, or the inverse of one.
+        step(Step): Apply this step: a new one, a redone one, or the inverse of one.
 
     Attributes:
-        stack: Qt's; it is clean where the edits are as they were saved.
-        now: The clock, for telling drags from single changes.
+        stack: Qt's undo stack; clean while the edits equal the saved ones.
+        now: Clock in seconds, which distinguishes drags from single changes.
     """
 
     step = Signal(object)
@@ -85,26 +86,29 @@ class History(QObject):
         self._typing = False
 
     def push(self, step: Step) -> None:
-        """Makes a step; it is part of the one before where both are one drag."""
+        """Applies a step and adds it to the history.
+
+        Merges it with the previous one of the same drag.
+        """
         command = EditCommand(step, self, self._stretch, self._typing, self.now())
         self.stack.push(command)
 
     def set_typing(self, typing: bool) -> None:
-        """Between True and False all changes of one thing are one step, however slow they are."""
+        """Marks the start (True) and end of typing a value, which becomes one step at any speed."""
         self._typing = typing
         self._stretch += 1
 
     def undo(self) -> None:
-        """Takes the last step back, if there is one."""
+        """Undoes the last step, if there is one."""
         self._stretch += 1
         self.stack.undo()
 
     def redo(self) -> None:
-        """Makes the step again that was taken back last, if there is one."""
+        """Redoes the last undone step, if there is one."""
         self._stretch += 1
         self.stack.redo()
 
     def clear(self) -> None:
-        """Forgets all steps."""
+        """Removes all steps."""
         self._stretch += 1
         self.stack.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of lights that the window edits: what the core's table of lights has, and brightness."""
+"""Editable inputs of lights: those of the core's table of lights, and brightness."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class LightInput:
     """An input of a light.
 
     Attributes:
-        name: By which it is set.
-        input: UsdLux's, without "inputs:".
-        label: In the form.
-        kind: Of a field: ``form_model``.
-        default: Where nothing is authored.
-        bounds: Of a number, and of each part of a colour.
-        tip: What it does.
-        group: Heading that it stands under; "": none.
+        name: Name of the input in the window.
+        input: UsdLux name of the input, without "inputs:".
+        label: Label in the form.
+        kind: Kind of field, see ``form_model``.
+        default: Value if nothing is authored.
+        bounds: Range of a number, or of each component of a colour.
+        tip: Tooltip with the effect.
+        group: Heading above the field, or "".
     """
 
     name: str
@@ -48,16 +48,16 @@ class LightInput:
 
     @property
     def attribute(self) -> str:
-        """The name of the attribute of the prim."""
+        """Name of the attribute of the prim."""
         return f"inputs:{self.input}"
 
     @property
     def type_name(self) -> Sdf.ValueTypeName:
-        """The type of the attribute."""
+        """Type of the attribute."""
         return _TYPES[self.kind]
 
     def read(self, prim: Usd.Prim, time: Usd.TimeCode) -> Any:
-        """What a prim has: a number, three of them or a bool."""
+        """Returns the value on a prim: a number, a colour of three numbers, or a bool."""
         attribute = prim.GetAttribute(self.attribute)
         value = attribute.Get(time) if attribute else None
         if value is None:
@@ -67,28 +67,31 @@ class LightInput:
         return bool(value) if self.kind == SWITCH else float(value)
 
     def stored(self, value: Any) -> Any:
-        """As the attribute holds it."""
+        """Converts a value to the type of the attribute."""
         return Gf.Vec3f(*value) if self.kind == COLOUR else as_stored(value)
 
 
 BRIGHTNESS = (
     LightInput("intensity", "intensity", "intensity", NUMBER, 1.0,
-               Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True), "What the colour is multiplied by"),
+               Range(0.0, 1e9, 1e-3, 1e5, 4, logarithmic=True), "Factor on the colour"),
     LightInput("exposure", "exposure", "exposure", NUMBER, 0.0,
-               Range(-30.0, 30.0, -10.0, 10.0, 2), "Stops: one more is twice as bright"),
+               Range(-30.0, 30.0, -10.0, 10.0, 2), "Stops; each doubles the brightness"),
     LightInput("color", "color", "colour", COLOUR, (1.0, 1.0, 1.0), Range(0.0, 1e4, 0.0, 1.0),
-               "Linear Rec.709; the colour temperature of the stage comes on top"),
+               "Linear Rec.709, multiplied by the colour temperature of the stage"),
 )  # fmt: skip
-"""What the core has as one colour."""
+"""Inputs that the core combines into one colour."""
 
 
 def light_inputs() -> dict[str, LightInput]:
-    """All inputs by name."""
+    """Returns all inputs by name."""
     return {one.name: one for one in (*map(_of, _edited(light_parameters().values())), *BRIGHTNESS)}
 
 
 def inputs_of(prim: Usd.Prim) -> list[LightInput]:
-    """Those that a prim has, in the order of a form: brightness, its own, then under headings."""
+    """Returns the inputs of a prim in the order of a form.
+
+    Brightness comes first, then inputs of the light type, then those under headings.
+    """
     kind = KINDS.get(str(prim.GetTypeName()), "")
     brightness = {one.name for one in BRIGHTNESS}
     own = [_of(row) for row in _edited(of_kind(kind)) if row.name not in brightness]
@@ -101,7 +104,7 @@ def _edited(rows: Iterable[LightParameter]) -> list[LightParameter]:
 
 
 def _of(row: LightParameter) -> LightInput:
-    """A parameter of the core's as a field."""
+    """Converts a light parameter of the core to an input."""
     low = -1e9 if row.least is None else row.least
     high = 1e9 if row.most is None else row.most
     usual = row.usual if row.most is None else row.most

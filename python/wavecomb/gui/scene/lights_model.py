@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights of the stage as data: the list with its switches, and the fields of one. No widgets."""
+"""Lights of the stage as data: the list with switches, and the form of one light. No widgets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SOFT_DOME = "soft dome"
 
 
 class LightsModel(HeadedModel):
-    """The list of lights by their paths, with those that are switched off."""
+    """List of lights by path, including those that are off."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)
@@ -31,7 +31,7 @@ class LightsModel(HeadedModel):
         self.read()
 
     def read(self) -> None:
-        """Reads which lights there are."""
+        """Reads the lights of the stage."""
         stage = self._edits.stage
         paths: dict[str, None] = {}
         if stage is not None and self._edits.edits is not None:
@@ -39,11 +39,11 @@ class LightsModel(HeadedModel):
         self.fill(list(paths))
 
     def refresh(self) -> None:
-        """What rows say may have changed."""
+        """Updates the cells of all rows."""
         self.tell(0, len(HEADERS) - 1)
 
     def flags(self, index: Any) -> Qt.ItemFlag:
-        """As Qt has it: what can be switched has a box."""
+        """Returns the item flags; switchable cells have a check box."""
         flags = super().flags(index)
         if index.column() in (ON, SOLO) and self._switch(self.rows[index.row()]):
             flags |= Qt.ItemFlag.ItemIsUserCheckable
@@ -53,7 +53,7 @@ class LightsModel(HeadedModel):
         return bool(path) and not uneditable(self._edits.prim(path))
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it, and ``ColourRole`` and ``ToneRole``."""
+        """Returns a cell's data, also for ``ColourRole`` and ``ToneRole``."""
         path, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             if column == NAME:
@@ -76,13 +76,13 @@ class LightsModel(HeadedModel):
 
     def _tip(self, path: str, column: int) -> str:
         if not path:
-            return "Added because the stage has no light; it is not on the stage"
+            return "Added because the stage has no light; not part of the stage"
         if column == ON:
-            return "Switches the light: its visibility on the stage"
-        return "Shows this light alone, or all again" if column == SOLO else path
+            return "Switches the light on or off, by its visibility on the stage"
+        return "Shows only this light, or all lights again" if column == SOLO else path
 
     def setData(self, index: Any, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
-        """As Qt has it: boxes switch lights."""
+        """Switches a light by its check box."""
         if role != Qt.ItemDataRole.CheckStateRole:
             return False
         path = self.rows[index.row()]
@@ -95,10 +95,10 @@ class LightsModel(HeadedModel):
 
 
 class LightForm(FormModel):
-    """The fields of one light.
+    """Form of one light.
 
     Attributes:
-        path: Its prim, "" of the soft dome; None: no light is shown.
+        path: Path of its prim, "" for the soft dome, None if no light is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
@@ -109,7 +109,7 @@ class LightForm(FormModel):
         self.show_light(None)
 
     def show_light(self, path: str | None) -> None:
-        """Another light."""
+        """Shows another light; None shows no light."""
         self._edits.set_typing(False)
         self.path = path
         self.note = "No light" if path is None else ""
@@ -120,7 +120,7 @@ class LightForm(FormModel):
 
     def _row(self, path: str, one: LightInput) -> FieldRow:
         reason = self._edits.light_reason(path)
-        where = f"in the picture only, it cannot be saved: {reason}" if reason else "on the stage"
+        where = f"only in the picture, cannot be saved: {reason}" if reason else "on the stage"
         return FieldRow(
             one.name,
             one.label,
@@ -134,16 +134,16 @@ class LightForm(FormModel):
         )
 
     def value(self, name: str) -> Any:
-        """What a field is to show now; None while there is no stage to edit."""
+        """Returns the value that a field shows, or None while there is no stage."""
         if self.path is None or self._edits.edits is None:
             return None
         return self._edits.light_value(self.path, name)
 
     def is_edited(self, name: str) -> bool:
-        """Whether there is something to take back."""
+        """Returns whether a field has an edit that can be reset."""
         return self.path is not None and self._edits.light_is_edited(self.path, name)
 
     def set_value(self, name: str, value: Any) -> None:
-        """Edits a field; None: back to what the stage has."""
+        """Edits a field; None resets it to the value of the stage."""
         if self.path is not None:
             self._edits.set_light(self.path, name, value)

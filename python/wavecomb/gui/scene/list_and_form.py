@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panels of lights and of materials: a list, and below it the values of the chosen row."""
+"""Panels of lights and materials: a list, and below it the form of the selected row."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 
 class ListAndForm(QWidget):
-    """A list and the fields of its chosen row, which stays chosen when the list is read again.
+    """A list, and the form of its selected row. The selection survives rereading the list.
 
     Args:
         model: Rows of the list.
         form: Fields of one row.
-        show: Shows the fields of a row; None means of no row.
-        name: Object name in the singular: "light".
-        title: Accessible name in the singular: "Light".
+        show: Shows the fields of a row, or no fields for None.
+        name: Object name in the singular, such as "light".
+        title: Accessible name in the singular, such as "Light".
         tip: Tooltip of the list.
         widths: Widths of columns after the first, in font heights.
     """
@@ -76,11 +76,11 @@ class ListAndForm(QWidget):
 
     @property
     def fields(self) -> dict[str, Field]:
-        """Fields that can be edited, by name."""
+        """Editable fields by name."""
         return self.form.fields
 
     def choose_first(self, is_wanted: Callable[[Any], bool]) -> bool:
-        """Chooses the first row of a kind; returns whether there is one."""
+        """Selects the first row that satisfies a predicate; returns whether there is one."""
         for number, row in enumerate(self.model.rows):
             if is_wanted(row):
                 self.view.selectRow(number)
@@ -104,29 +104,29 @@ class ListAndForm(QWidget):
 
 
 class LightsPanel(ListAndForm):
-    """Lights of the stage by their paths, "" for the soft dome."""
+    """Panel of the lights of the stage by path; "" stands for the soft dome."""
 
     def __init__(self, edits: SceneEdits) -> None:
         form = LightForm(edits)
-        tip = "Lights of the stage, with those that are off"
+        tip = "Lights of the stage, including those that are off"
         widths = {KIND: 5, ON: 3, SOLO: 3.4}
         super().__init__(LightsModel(edits), form, form.show_light, "light", "Light", tip, widths)
 
     def choose(self, path: str) -> bool:
-        """Chooses a light by its prim; returns whether there is one."""
+        """Selects a light by its prim; returns whether there is one."""
         return self.choose_first(lambda light: light == path)
 
 
 class MaterialsPanel(ListAndForm):
-    """Materials in use."""
+    """Panel of the materials in use."""
 
     chosen: Row | None
 
     def __init__(self, edits: SceneEdits) -> None:
         model, form = MaterialsModel(edits), MaterialForm(edits)
-        tip, widths = "Materials that are in use", {PROGRAM: 5.5, RECORDS: 6, COST: 3}
+        tip, widths = "Materials in use", {PROGRAM: 5.5, RECORDS: 6, COST: 3}
         super().__init__(model, form, form.show_material, "material", "Material", tip, widths)
 
     def choose(self, path: str) -> bool:
-        """Chooses the material of a prim; returns whether it is in use."""
+        """Selects the material of a prim; returns whether it is in use."""
         return self.choose_first(lambda row: row.path == path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of a run: what a record costs, predicted and measured, how many, and a table of all."""
+"""Plots and a table of the materials in a run: cost per record and number of records."""
 
 from __future__ import annotations
 
@@ -32,38 +32,38 @@ from wavecomb.run.progress import count_text
 
 ORDERS = {
     "time": "By shading time: records x nanoseconds.",
-    "ns per record": "By what a record costs.",
+    "ns per record": "By cost per record.",
     "records": "By number of records.",
 }
 
 
 @dataclass(frozen=True)
 class MaterialCost:
-    """One material of a run."""
+    """Costs of one material in a run."""
 
     name: str
     short: str
     program: str
     records: int
     measured_ns: float
-    """A record, over timed batches; 0 where none was timed."""
+    """Measured ns per record over timed batches; 0 if none was timed."""
     predicted_ns: float
-    """A record, as the next pass is scheduled by."""
+    """Predicted ns per record, used to schedule the next pass."""
     calibrated_ns: float
-    """A record, before the first pass."""
+    """Calibrated ns per record, before the first pass."""
     share: float
-    """Its share of the shading time of all materials, 0 to 1."""
+    """Fraction of the shading time of all materials, 0 to 1."""
 
     @property
     def ns(self) -> float:
-        """Measured, else predicted."""
+        """Measured ns per record, or the predicted value if nothing was measured."""
         return self.measured_ns or self.predicted_ns
 
 
 def material_costs(stats: Mapping[str, Any], order: str = "time") -> list[MaterialCost]:
-    """Materials that were shaded, the greatest first.
+    """Returns the materials that were shaded, the largest first.
 
-    ``order``: one of ``ORDERS``.
+    ``order`` is one of ``ORDERS``.
     """
     used = [one for one in stats.get("materials", ()) if one.get("records")]
     times = [one["records"] * (one["ns_per_record"] or one["predicted_ns"]) for one in used]
@@ -92,7 +92,7 @@ def material_costs(stats: Mapping[str, Any], order: str = "time") -> list[Materi
 
 
 def short_names(paths: Sequence[str]) -> list[str]:
-    """The last part of each path; more parts where that is not enough to tell them apart.
+    """Returns the last part of each path, with as many parts as needed to be unique.
 
     >>> short_names(["/A/Looks/Gold", "/A/Looks/Wood", "/B/Looks/Gold", ""])
     ['A/Looks/Gold', 'Wood', 'B/Looks/Gold', '(no name)']
@@ -113,27 +113,27 @@ def short_names(paths: Sequence[str]) -> list[str]:
 
 _HEADER = {
     "material": "",
-    "program": "The code that lanes run together.",
-    "records": "Hits shaded.",
+    "program": "The shading program of the material.",
+    "records": "Number of shaded hits.",
     "time": "Share of the shading time of all materials.",
-    "measured": "Nanoseconds a record, over timed batches; empty where none was timed.",
-    "predicted": "Nanoseconds a record, as the next pass is scheduled by.",
-    "calibrated": "Nanoseconds a record, measured on synthetic hits before the first pass.",
+    "measured": "Nanoseconds per record over timed batches; empty if none was timed.",
+    "predicted": "Nanoseconds per record, used to schedule the next pass.",
+    "calibrated": "Nanoseconds per record, measured on synthetic hits before the first pass.",
 }
 
 
 def measured_colour() -> QColor:
-    """The colour of what was measured."""
+    """Returns the colour of measured values."""
     return theme.series(1)
 
 
 def predicted_colour() -> QColor:
-    """The colour of what was predicted."""
+    """Returns the colour of predicted values."""
     return theme.series(0)
 
 
 class MaterialsTab(QWidget):
-    """Bars of the first few materials, and a table of all that can be searched and sorted."""
+    """Tab with bars of the first few materials, and a sortable table of all."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -141,7 +141,7 @@ class MaterialsTab(QWidget):
             QComboBox(),
             "materials_of",
             "Series whose materials are shown",
-            "Of which series; of its longest run.",
+            "Series of which the longest run is shown.",
         )
         self.of.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -154,8 +154,8 @@ class MaterialsTab(QWidget):
         self.top = named(
             QSpinBox(),
             "materials_top",
-            "How many materials have bars",
-            "How many materials have bars; the table has all.",
+            "Number of materials with bars",
+            "Number of materials with bars; the table has all.",
         )
         self.top.setRange(1, 40)
         self.top.setValue(10)
@@ -231,7 +231,7 @@ class MaterialsTab(QWidget):
     def show_series(
         self, series: Sequence[Series], labels: Sequence[str], current: Series | None
     ) -> None:
-        """Draws the chosen series; the current one until another is chosen."""
+        """Draws the chosen series, or the current one if none was chosen."""
         chosen = self.of.currentData()
         follow = self.of.currentIndex() <= 0 or chosen not in series
         blocked = self.of.blockSignals(True)
@@ -250,7 +250,7 @@ class MaterialsTab(QWidget):
         text = f"{len(self._rows)} materials were shaded."
         if prediction.get("materials"):
             r2 = prediction["r2"]
-            worth = f"{r2:.2f}" if r2 >= 0.0 else "below 0, worse than one mean for all"
+            worth = f"{r2:.2f}" if r2 >= 0.0 else "below 0, worse than a common mean"
             text += (
                 f" Prediction of the last pass: r² {worth}, mean error "
                 f"{100 * prediction['mean_error']:.0f} %, over {prediction['materials']} materials."

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of the scene as data: the list with costs, and the fields of one. No widgets."""
+"""Materials of the scene as data: the list with costs, and the form of one material. No widgets."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ NAME, PROGRAM, RECORDS, COST = range(4)
 HEADERS = ("Material", "Program", "Records", "ns")
 TIPS = (
     "Prim of the material",
-    "Shading code that it runs",
-    "Hits that were shaded with it (statistics: records)",
-    "Nanoseconds for each of them, measured (statistics: ns_per_record)",
+    "Shading program of the material",
+    "Number of shaded hits (statistics: records)",
+    "Measured nanoseconds per hit (statistics: ns_per_record)",
 )
 
 
@@ -43,20 +43,20 @@ RANGES = {
     "conductor_eta": Range(0.0, 100.0, 0.0, 5.0),
     "conductor_k": Range(0.0, 100.0, 0.0, 10.0),
 }
-"""Ranges of parameters of UsdPreviewSurface that are not within 0 and 1."""
+"""Ranges of UsdPreviewSurface parameters that are not limited to 0 to 1."""
 
 LABELS = {"conductor_eta": "eta", "conductor_k": "k"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the list: a prim, or a material that the loader made.
+    """A row of the list: a material prim, or a material that the loader made.
 
     Attributes:
-        path: The prim, "" where there is none.
-        name: For people.
-        program: Its shading code.
-        ids: Materials of the scene.
+        path: Path of the prim, or "" if there is none.
+        name: Name for people.
+        program: Shading program.
+        ids: Indices of its materials in the scene.
     """
 
     path: str
@@ -66,7 +66,7 @@ class Row:
 
 
 def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
-    """One row for each prim, and for each material without one."""
+    """Returns one row for each prim, and for each material without a prim."""
     by_path: dict[str, list[int]] = {}
     for number, path in enumerate(paths):
         by_path.setdefault(path or f"#{number}", []).append(number)
@@ -79,7 +79,7 @@ def rows_of(scene: Scene, paths: tuple[str, ...]) -> list[Row]:
 
 
 class MaterialsModel(HeadedModel):
-    """The list."""
+    """List of materials."""
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent, TIPS)
@@ -92,7 +92,7 @@ class MaterialsModel(HeadedModel):
         self.read()
 
     def read(self) -> None:
-        """Reads which materials there are."""
+        """Reads the materials of the scene."""
         stage = self._edits.stage
         rows: list[Row] = []
         if stage is not None and self._edits.edits is not None:
@@ -101,14 +101,14 @@ class MaterialsModel(HeadedModel):
         self.fill(rows)
 
     def recolour(self) -> None:
-        """Swatches after an edit."""
+        """Updates the colour swatches after an edit."""
         colours = self._read_colours(self.rows)
         if colours != self.colours:
             self.colours = colours
             self.tell(NAME, NAME)
 
     def count(self, statistics: dict[str, Any]) -> None:
-        """Records and costs: ``materials`` of the statistics."""
+        """Updates records and costs from the ``materials`` of the statistics."""
         self._figures = statistics["materials"]
         self.tell(RECORDS, COST)
 
@@ -124,7 +124,7 @@ class MaterialsModel(HeadedModel):
         return out
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it, and ``ColourRole``."""
+        """Returns a cell's data, also for ``ColourRole``."""
         row, column = self.rows[index.row()], index.column()
         if role == Qt.ItemDataRole.DisplayRole:
             if column == NAME:
@@ -133,8 +133,8 @@ class MaterialsModel(HeadedModel):
         if role == ColourRole and column == NAME:
             return self.colours[index.row()]
         if role == Qt.ItemDataRole.ToolTipRole:
-            more = f"\n{len(row.ids)} of them: meshes bring values" if len(row.ids) > 1 else ""
-            return (row.path or "made by the loader: of a display colour") + more
+            more = f"\n{len(row.ids)} versions: meshes override values" if len(row.ids) > 1 else ""
+            return (row.path or "made by the loader from a display colour") + more
         if role == Qt.ItemDataRole.TextAlignmentRole and column in (RECORDS, COST):
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None
@@ -150,10 +150,10 @@ class MaterialsModel(HeadedModel):
 
 
 class MaterialForm(FormModel):
-    """The parameters of one material, under the headings that MaterialX gives them.
+    """Form of one material, with the headings of its MaterialX definition.
 
     Attributes:
-        row: The material; None: none is shown.
+        row: The material; None if none is shown.
     """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
@@ -165,7 +165,7 @@ class MaterialForm(FormModel):
         self.show_material(None)
 
     def show_material(self, row: Row | None) -> None:
-        """Another material."""
+        """Shows another material; None shows no material."""
         self._edits.set_typing(False)
         self.row = row
         self._read()
@@ -188,31 +188,31 @@ class MaterialForm(FormModel):
         self.changed.emit()
 
     def value(self, name: str) -> Any:
-        """What a field is to show now; None: what it shows."""
+        """Returns the value that a field shows; None leaves the field as it is."""
         parameter = self._now.get(name)
         if parameter is None or parameter.driven_by or self.row is None:
             return None
         return self._edits.parameter_value(self.row.path, parameter)
 
     def is_edited(self, name: str) -> bool:
-        """Whether there is something to take back."""
+        """Returns whether a field has an edit that can be reset."""
         parameter = self._now.get(name)
         if parameter is None or self.row is None:
             return False
         return self._edits.is_edited(self.row.path, parameter)
 
     def set_value(self, name: str, value: Any) -> None:
-        """Edits a field; None: back to what the stage has."""
+        """Edits a field; None resets it to the value of the stage."""
         if self.row is not None:
             self._edits.set_parameter(self.row.path, name, value)
 
     def is_open(self, group: str) -> bool:
-        """The base is always open at first."""
+        """Returns whether a heading is open. The base is open initially."""
         return self._folds.get(group, group == "Base" or super().is_open(group))
 
 
 def range_of(parameter: Parameter) -> Range:
-    """What a parameter can be."""
+    """Returns the range of a parameter."""
     one = parameter.definition
     if one is None:
         row = known_parameters().get(parameter.name)
@@ -224,7 +224,7 @@ def range_of(parameter: Parameter) -> Range:
 
 
 def row_of(parameter: Parameter) -> FieldRow:
-    """The field of a parameter; one that only says what drives it where there is no value."""
+    """Returns the field of a parameter; a driven parameter gets a field that names its source."""
     name, one = parameter.name, parameter.definition
     title = name.replace("_", " ")
     driver, kind = "", NUMBER
@@ -238,7 +238,7 @@ def row_of(parameter: Parameter) -> FieldRow:
         tip = f"{name}: edits {parameter.attribute}"
     else:
         why = parameter.reason
-        tip = f"{name}: in the picture only, edits of it cannot be saved: {why}"
+        tip = f"{name}: only in the picture, edits cannot be saved: {why}"
     return FieldRow(
         name,
         one.label if one is not None else LABELS.get(name, title),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What loading found, as rows that can be filtered. No widgets."""
+"""Findings of the loader as rows that can be filtered. No widgets."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ KINDS = (UNSUPPORTED, WARNING, NOTE)
 
 @dataclass(frozen=True)
 class Row:
-    """One finding at one place; place: a prim path, a file, or "" for the whole stage."""
+    """One finding at one place, which is a prim path, a file, or "" for the whole stage."""
 
     kind: str
     what: str
     place: str
 
     def line(self) -> str:
-        """As text."""
+        """Returns the row as text."""
         return f"{self.kind}: {self.what}" + (f": {self.place}" if self.place else "")
 
 
 def rows_of(stage: LoadedStage) -> list[Row]:
-    """A row for each place that the report names, and one for those that it only counts."""
+    """Returns a row for each reported place, and one row for the places that were only counted."""
     out: list[Row] = []
     report = stage.report
 
@@ -54,13 +54,13 @@ def rows_of(stage: LoadedStage) -> list[Row]:
 
 
 class NotesModel(HeadedModel):
-    """The rows."""
+    """Table model of the findings."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(HEADERS, parent)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it, and ``ToneRole``."""
+        """Returns a cell's data, also for ``ToneRole``."""
         row = self.rows[index.row()]
         if role == Qt.ItemDataRole.DisplayRole:
             return (row.kind, row.what, row.place)[index.column()]
@@ -72,7 +72,7 @@ class NotesModel(HeadedModel):
 
 
 class NotesFilter(QSortFilterProxyModel):
-    """Rows of one kind that hold a text in any column."""
+    """Filter for rows of one kind that contain a text in any column."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -80,12 +80,12 @@ class NotesFilter(QSortFilterProxyModel):
         self.text = ""
 
     def set(self, kind: str, text: str) -> None:
-        """What to show; kind "": all."""
+        """Sets the filter; an empty kind means all kinds."""
         self.kind, self.text = kind, text.casefold()
         self.invalidate()
 
     def filterAcceptsRow(self, number: int, parent: Any) -> bool:
-        """As Qt has it."""
+        """Returns whether a row passes the filter."""
         model = self.sourceModel()
         assert isinstance(model, NotesModel)
         row = model.rows[number]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What loading found: not supported, wrong in the stage, chosen by the loader."""
+"""Panel of the loader's findings: unsupported features, errors in the stage, choices it made."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class NotesPanel(QWidget):
-    """The list with a filter; double click chooses the prim, Ctrl+C copies lines."""
+    """List with a filter. Double click selects the prim, Ctrl+C copies lines."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -68,8 +68,8 @@ class NotesPanel(QWidget):
         view = self.view
         view.setModel(self._filter)
         view.setItemDelegate(RowDelegate(view))
-        tip = "Double click chooses the prim; Ctrl+C copies"
-        show_rows(view, "notes", "What loading found", tip)
+        tip = "Double click selects the prim; Ctrl+C copies"
+        show_rows(view, "notes", "Findings of the loader", tip)
         view.setSortingEnabled(True)
         view.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
         view.setWordWrap(False)
@@ -84,14 +84,14 @@ class NotesPanel(QWidget):
         copy.activated.connect(self.copy)
 
     def fill(self, stage: LoadedStage | None) -> None:
-        """Lists what was found in a stage."""
+        """Lists the findings of a stage."""
         self.model.fill(rows_of(stage) if stage is not None else [])
         self._refilter()
 
     def _refilter(self) -> None:
         self._filter.set(self.kinds.currentData(), self.field.text().strip())
         shown, there = self._filter.rowCount(), len(self.model.rows)
-        self.count.setText(f"{shown} of {there}" if there else "nothing to say about this stage")
+        self.count.setText(f"{shown} of {there}" if there else "no findings for this stage")
 
     def _row(self, index: QModelIndex) -> Row:
         return self.model.rows[self._filter.mapToSource(index).row()]
@@ -102,7 +102,7 @@ class NotesPanel(QWidget):
             self._session.select(place)
 
     def copy(self) -> None:
-        """Puts the selected lines on the clipboard, all where none is selected."""
+        """Copies the selected lines to the clipboard, or all lines if none is selected."""
         chosen = self.view.selectionModel().selectedRows()
         if not chosen:
             chosen = [self._filter.index(row, 0) for row in range(self._filter.rowCount())]

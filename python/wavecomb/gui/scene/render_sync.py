@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Brings edits of a stage into the scene that is rendered, without reading it again.
+"""Updates the rendered scene after edits of a stage, without loading the stage again if possible.
 
-What is visible and which variants are chosen decides what is in the scene: that is read again.
-So are constants that are part of a graph, or of how a texture is read.
+Edits of visibility and variants change the contents of the scene, so the stage is loaded again. The
+same holds for constants inside a material graph or in the reading of a texture.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 
 class RenderSync:
-    """Base of ``SceneEdits``: materials and lights of the edited stage, and their render.
+    """Base of ``SceneEdits``, which reads materials and lights of the stage and updates the render.
 
     Attributes:
         session: The session whose scene follows the edits.
-        stage_edits: Edits of the stage that it has open.
+        stage_edits: Edits of its open stage.
     """
 
     session: Session
@@ -52,23 +52,26 @@ class RenderSync:
     # ---- materials -----------------------------------------------------------------------------
 
     def parameters(self, path: str) -> dict[str, Parameter]:
-        """Parameters of a material by name; empty of one that no prim is there for."""
+        """Returns the parameters of a material by name, empty if there is no such prim."""
         prim = self.prim(path)
         return material_parameters(prim, self.time) if prim else {}
 
     def parameter_value(self, path: str, parameter: Parameter) -> Any:
-        """What a parameter is now."""
+        """Returns the current value of a parameter."""
         return self.stage_edits.values.get((Sdf.Path(path), f"!{parameter.name}"), parameter.value)
 
     def is_edited(self, path: str, parameter: Parameter) -> bool:
-        """Whether a parameter was changed here."""
+        """Returns whether a parameter was edited in this window."""
         attribute = parameter.attribute
         if attribute is None:
             return (Sdf.Path(path), f"!{parameter.name}") in self.stage_edits.values
         return self.stage_edits.opinion((attribute.GetPrimPath(), f".{attribute.name}")) is not None
 
     def material_ids(self, path: str) -> list[int]:
-        """The materials that a prim gave: several where meshes bring values of their own."""
+        """Returns the indices of a prim's materials in the scene.
+
+        There are several if primvars of meshes provide different values.
+        """
         stage = self.session.stage
         paths = stage.material_paths if stage is not None else ()
         return [i for i, one in enumerate(paths) if one == path]
@@ -76,16 +79,17 @@ class RenderSync:
     # ---- lights --------------------------------------------------------------------------------
 
     def light_reason(self, path: str) -> str:
-        """Why edits of a light cannot be saved; "" where they can."""
+        """Returns why edits of a light cannot be saved, or "" if they can."""
         prim = self.prim(path)
         if not prim:
             return "it is not on the stage"
         return IN_INSTANCE if prim.IsInstanceProxy() else ""
 
     def light_value(self, path: str, name: str) -> Any:
-        """One of ``light_inputs()`` as it is now.
+        """Returns the current value of one of ``light_inputs()``.
 
-        Of a light whose edits cannot be saved: what its colour on the stage is multiplied by.
+        For a light whose edits cannot be saved, it is the factor on the light's colour on the
+        stage.
         """
         known = light_inputs()[name]
         if self.light_reason(path):
@@ -93,23 +97,23 @@ class RenderSync:
         return known.read(self.prim(path), self.time)
 
     def light_fields(self, path: str) -> list[LightInput]:
-        """What of a light can be edited: where that cannot be saved, its brightness alone."""
+        """Returns the editable inputs of a light: only brightness if edits cannot be saved."""
         return list(BRIGHTNESS) if self.light_reason(path) else inputs_of(self.prim(path))
 
     def light_key(self, path: str, name: str) -> Key:
-        """Where an input of a light is edited."""
+        """Returns the key under which an input of a light is edited."""
         if self.light_reason(path):
             return light_prim(path), f"!{name}"
         return Sdf.Path(path), f".{light_inputs()[name].attribute}"
 
     def light_is_edited(self, path: str, name: str) -> bool:
-        """Whether an input of a light was changed here."""
+        """Returns whether an input of a light was edited in this window."""
         return self.stage_edits.opinion(self.light_key(path, name)) is not None
 
     # ---- into the render -----------------------------------------------------------------------
 
     def make_step(self, step: Step) -> None:
-        """Makes a step on the stage and updates the render."""
+        """Applies a step to the stage and updates the render."""
         before = {} if step.structural else self.structures(step.prims)
         self.stage_edits.apply(step)
         if step.structural or self.structures(step.prims) != before:
@@ -118,26 +122,26 @@ class RenderSync:
             self.show_step(step)
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
-        """Materials in use that a prim is, or is in."""
+        """Returns the materials in use that a prim is or belongs to."""
         path, stage = str(prim), self.session.stage
         known = {one for one in stage.material_paths if one} if stage is not None else set()
         return {one for one in known if path == one or path.startswith(one + "/")}
 
     def live_values(self, path: str) -> dict[str, Any]:
-        """What was changed of a material and no attribute holds."""
+        """Returns the edited values of a material that no attribute can hold."""
         own = Sdf.Path(path)
         known = self.stage_edits.values.items()
         return {what[1:]: value for (prim, what), value in known if prim == own}
 
     def can_show(self, path: str, name: str, value: Any) -> bool:
-        """Whether a value that no attribute can hold can be brought into the picture."""
+        """Returns whether the render can show a value that no attribute can hold."""
         known = self.live_values(path)
         before = surface_values(self.prim(path), self.time, known)
         after = surface_values(self.prim(path), self.time, {**known, name: value})
         return before is None or after is None or before.structure == after.structure
 
     def structures(self, prims: Iterable[Sdf.Path]) -> dict[str, str]:
-        """What of materials cannot be edited in the scene that there is."""
+        """Returns the structure of materials, which the existing scene cannot change, by path."""
         out = {}
         for path in {one for prim in prims for one in self._materials_of(prim)}:
             found = surface_values(self.prim(path), self.time)
@@ -146,13 +150,14 @@ class RenderSync:
         return out
 
     def show_step(self, step: Step) -> None:
-        """Brings a step into the scene that is rendered."""
+        """Updates the rendered scene after a step."""
         stage = self.session.stage
         if stage is None:
             return
         emission = any("emissi" in what for _, what in step.after)
         if emission and not stage.lights:
-            # Whether a stage without lights gets the soft dome goes by what its materials emit.
+            # Whether the loader adds the soft dome to a stage without lights depends on the
+            # emission of its materials.
             self.session.rebuild(step.label)
         for prim in step.prims:
             for light in {one for one in stage.light_paths if light_prim(one) == prim}:
@@ -161,7 +166,7 @@ class RenderSync:
                 self._sync_material(material)
 
     def _sync_material(self, path: str) -> None:
-        """Gives the materials of a prim the values that the stage has now."""
+        """Updates the scene materials of a prim with the current values of the stage."""
         scene = self.session.scene
         if scene is None:
             return
@@ -179,7 +184,7 @@ class RenderSync:
                 continue
             have = scene.material(number)
             have |= have.get("openpbr", {})
-            # A mesh may bring a value for a name, which a graph reads then.
+            # A primvar of a mesh may replace a value that a graph reads by name.
             values = {
                 name: value
                 for name, value in wanted.items()
@@ -187,7 +192,7 @@ class RenderSync:
             }
             if values:
                 self.session.edit_material(number, **values)
-            # The stage holds the edit: it comes with the next reading.
+            # The stage holds the edit, so the next loading includes it.
             self.session.material_edits.pop(have["name"], None)
 
     def _sync_light(self, path: str) -> None:
@@ -220,5 +225,5 @@ class RenderSync:
 
 
 def light_prim(path: str) -> Sdf.Path:
-    """The key of a light; of the soft dome, which is no prim, one that no prim has."""
+    """Returns the key of a light; the soft dome has a path that no prim has."""
     return Sdf.Path(path) if path else Sdf.Path("/soft_dome_of_wavecomb")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the scene panels do: edits go to the stage, and from there into the live render."""
+"""Edits by the scene panels, which change the stage and update the live render."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
 
 
 class SceneEdits(QObject, RenderSync):
-    """Edits of the stage that a session has open. Every one is a step of ``history``.
+    """Edits of the session's open stage. Each is an undo step of ``history``.
 
-    What is visible and which variants are chosen decides what is in the scene: the stage is read
-    again. Materials and lights change in the scene that there is, at once.
+    Edits of visibility and variants load the stage again. Edits of materials and lights change the
+    existing scene immediately.
 
     Signals:
-        reset(): Another stage is open, or none: prims known before are no more.
-        structure_changed(): Prims may have come and gone.
-        scene_changed(): The stage was read (again): materials and lights have other numbers.
-        changed(): Something was edited, undone or done again.
+        reset(): Another stage is open, or none; earlier prims are invalid.
+        structure_changed(): Prims may have been added or removed.
+        scene_changed(): The stage was loaded (again); indices of materials and lights changed.
+        changed(): Something was edited, undone or redone.
 
     Attributes:
-        history: Steps that can be taken back.
-        edits: Of the stage that is open; None while there is none to edit.
+        history: Undo history.
+        edits: Edits of the open stage; None without a stage.
         solo: The light that is shown alone, or None.
     """
 
@@ -66,7 +66,7 @@ class SceneEdits(QObject, RenderSync):
 
     @property
     def edits(self) -> StageEdits | None:
-        """Edits of the stage that is open, or None."""
+        """Edits of the open stage, or None."""
         return self.stage_edits if self._is_open else None
 
     @property
@@ -76,24 +76,24 @@ class SceneEdits(QObject, RenderSync):
 
     @property
     def stage(self) -> LoadedStage | None:
-        """What was read."""
+        """The loaded stage, or None."""
         return self.session.stage
 
     @property
     def solo(self) -> str | None:
-        """The light that is shown alone."""
+        """Path of the light that is shown alone, or None."""
         return self._solo.path
 
     def is_hidden(self, path: str) -> bool:
-        """Whether a prim is hidden, by itself or from above."""
+        """Returns whether a prim is hidden, by itself or by an ancestor."""
         return state(self.prim(path), self.time)[0] in (HIDDEN, HIDDEN_ABOVE)
 
     def can_undo(self) -> str:
-        """What could be undone; "": nothing."""
+        """Returns the text of the step that undo would revert, or ""."""
         return self.history.stack.undoText()
 
     def lines(self) -> list[str]:
-        """All edits, one line each."""
+        """Returns all edits, one line each."""
         return self.stage_edits.lines()
 
     # ---- visibility and variants ---------------------------------------------------------------
@@ -104,21 +104,21 @@ class SceneEdits(QObject, RenderSync):
         self._do(lambda edits: edits.visible(wanted, visible))
 
     def toggle_visible(self, paths: Iterable[str]) -> None:
-        """Hides what is shown; where all of it is hidden, shows it."""
+        """Hides prims if any of them is visible, else shows them."""
         can = [path for path in paths if not uneditable(self.prim(path))]
         if can:
             self.set_visible(can, all(self.is_hidden(path) for path in can))
 
     def select_variant(self, path: str, name: str, choice: str | None) -> None:
-        """Selects a variant; None: what the stage itself selects."""
+        """Selects a variant; None restores the selection of the stage."""
         self._do(lambda edits: edits.variant(Sdf.Path(path), name, choice))
 
     def solo_light(self, path: str | None, lights: Iterable[str]) -> None:
-        """Shows one light and hides all others, as one step; None: as it was before.
+        """Shows one light and hides all others, as one undo step.
 
         Args:
-            path: The light.
-            lights: All lights.
+            path: Path of the light; None restores the state before.
+            lights: Paths of all lights.
         """
         if self.edits is None:
             return
@@ -128,7 +128,7 @@ class SceneEdits(QObject, RenderSync):
             for other in lights:
                 if other != path and not uneditable(self.prim(other)):
                     opinions[(Sdf.Path(other), ".visibility")] = _word("invisible")
-            # The one that had the solo before is hidden by now, in the session layer alone.
+            # The light that was shown alone before is now hidden, but only in the session layer.
             opinions.pop((Sdf.Path(path), ".visibility"), None)
             for at, word in show(self.prim(path), self.time).items():
                 opinions[(at, ".visibility")] = _word(word)
@@ -142,13 +142,13 @@ class SceneEdits(QObject, RenderSync):
             self.changed.emit()
 
     def set_typing(self, typing: bool) -> None:
-        """Whether a value is being typed: however slowly, it is one step of undo."""
+        """Marks the start and end of typing a value, which becomes one undo step at any speed."""
         self.history.set_typing(typing)
 
     # ---- materials -----------------------------------------------------------------------------
 
     def set_parameter(self, path: str, name: str, value: Any) -> None:
-        """Changes a parameter of a material; None: as the stage has it."""
+        """Edits a parameter of a material; None restores the value of the stage."""
         parameter = self.parameters(path).get(name)
         label = f"{name} of {path}"
         if parameter is None or parameter.driven_by:
@@ -171,7 +171,7 @@ class SceneEdits(QObject, RenderSync):
     # ---- lights --------------------------------------------------------------------------------
 
     def set_light(self, path: str, name: str, value: Any) -> None:
-        """Changes an input of a light; None: as the stage has it."""
+        """Edits an input of a light; None restores the value of the stage."""
         opinion: Opinion | None = None
         if value is not None and self.light_reason(path):
             opinion = Opinion(as_stored(value))
@@ -184,15 +184,15 @@ class SceneEdits(QObject, RenderSync):
     # ---- history -------------------------------------------------------------------------------
 
     def undo(self) -> None:
-        """Takes the last edit back."""
+        """Undoes the last edit."""
         self.history.undo()
 
     def redo(self) -> None:
-        """Makes the edit again that was taken back last."""
+        """Redoes the last undone edit."""
         self.history.redo()
 
     def save(self, path: str) -> bool:
-        """Writes the edits as a layer over the stage; whether that went well."""
+        """Writes the edits as a layer over the stage; returns whether it succeeded."""
         if self.edits is None:
             self.session.failed.emit("there is no stage: open one first")
             return False
@@ -204,7 +204,7 @@ class SceneEdits(QObject, RenderSync):
         if self.edits.values:
             count = len(self.edits.values)
             self.session.warned.emit(
-                f"{path}: {count} edit(s) are not in it: the stage has no place for them"
+                f"{path}: {count} edit(s) are not in it: no attribute can hold them"
             )
         self.history.stack.setClean()
         self.session.saved.emit(path)
@@ -214,7 +214,7 @@ class SceneEdits(QObject, RenderSync):
         self._do(lambda edits: edits.plan(label, {key: opinion}))
 
     def _do(self, plan: Callable[[StageEdits], Step | None]) -> None:
-        """Makes what is planned, as a step of undo."""
+        """Applies a planned step and adds it to the history."""
         if self.edits is None:
             return
         try:
@@ -226,7 +226,7 @@ class SceneEdits(QObject, RenderSync):
             self.history.push(step)
 
     def _perform(self, step: Step) -> None:
-        """Makes a step, new, again or back, and brings it into the picture."""
+        """Applies a step of the history and updates the render."""
         if not self._is_open:
             return
         self._touched |= set(step.prims)
@@ -237,7 +237,8 @@ class SceneEdits(QObject, RenderSync):
             self.structure_changed.emit()
         self.changed.emit()
 
-    # ---- what the session says -----------------------------------------------------------------
+    # ---- signals of the session
+    # ----------------------------------------------------------------------
 
     def _on_opened(self, loaded: LoadedStage) -> None:
         usd = self.session.usd
@@ -248,14 +249,14 @@ class SceneEdits(QObject, RenderSync):
             self.changed.emit()
             return
         self.scene_changed.emit()
-        # What was edited, or taken back, while the stage was read is not in the scene yet.
+        # Edits that were made or undone during loading are not in the scene yet.
         for prim in {path for path, _ in self.stage_edits.edited()} | self._touched:
             self.show_step(Step("", {}, {(prim, ""): None}))
         self._touched = set()
         self.changed.emit()
 
     def _forget(self, edits: StageEdits | None = None) -> None:
-        """Drops all steps: another stage is open, or none."""
+        """Drops all steps, because another stage or none is open."""
         self.stage_edits, self._is_open = edits or _no_edits(), edits is not None
         self._solo, self._touched = Solo(), set()
         self.history.clear()
@@ -264,10 +265,10 @@ class SceneEdits(QObject, RenderSync):
 
 
 def _no_edits() -> StageEdits:
-    """Edits of an empty stage, for when none is open."""
+    """Returns edits of an empty stage, for use while no stage is open."""
     return StageEdits(Usd.Stage.CreateInMemory(), Usd.TimeCode.Default())
 
 
 def _word(word: str) -> Opinion:
-    """A value for an attribute ``visibility``."""
+    """Returns a value for an attribute ``visibility``."""
     return Opinion(word, Sdf.ValueTypeNames.Token)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The prims of a stage as a tree for a view: read where somebody looks, never as a whole."""
+"""The prims of a stage as a tree model that is read on demand."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ NAME, TYPE, VISIBILITY, VARIANTS = range(4)
 HEADERS = ("Name", "Type", "Visible", "Variants")
 PathRole = Qt.ItemDataRole.UserRole
 StateRole = Qt.ItemDataRole.UserRole + 1
-"""``visibility.state`` of a row, for the eye."""
+"""Role of ``visibility.state`` of a row, for the eye icon."""
 
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 ROOT = QModelIndex()
 
 CHUNK = 500
-"""Children that a view gets at once; it asks for more when it comes to their end."""
+"""Number of children that a view gets at once. The view requests more when it scrolls to the
+end."""
 
 
 class _Node:
-    """A row. Names of its children are None until they were asked for; rows are made one by one."""
+    """A row. Names of children are None until requested; child nodes are created on demand."""
 
     __slots__ = ("made", "names", "parent", "path", "row", "shown")
 
@@ -44,7 +45,10 @@ class _Node:
 
 
 class SceneModel(QAbstractItemModel):
-    """Columns: name, type, visibility, variants. Instances show what is in them, in italics."""
+    """Tree model with the columns name, type, visibility, variants.
+
+    Shows the prims inside instances.
+    """
 
     def __init__(self, edits: SceneEdits, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -54,7 +58,7 @@ class SceneModel(QAbstractItemModel):
         self._root = _Node(Sdf.Path.absoluteRootPath, None, 0)
 
     def reset(self, matches: Collection[Sdf.Path] | None = None) -> None:
-        """Reads all again; with matches shows only those and the way to them."""
+        """Reads everything again; with matches, shows only those and their ancestors."""
         self.beginResetModel()
         self._matches = matches or ()
         self._filter = None
@@ -64,12 +68,12 @@ class SceneModel(QAbstractItemModel):
         self.endResetModel()
 
     def prim(self, index: QModelIndex) -> Usd.Prim:
-        """The prim of a row."""
+        """Returns the prim of a row."""
         usd = self._edits.usd
         return usd.GetPrimAtPath(self._node(index).path) if usd is not None else Usd.Prim()
 
     def index_of(self, path: Sdf.Path) -> QModelIndex:
-        """The row of a prim, or an invalid index where it has none."""
+        """Returns the row of a prim, or an invalid index."""
         node = self._root
         for prefix in path.GetPrefixes():
             try:
@@ -82,7 +86,7 @@ class SceneModel(QAbstractItemModel):
         return QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
 
     def refresh(self) -> None:
-        """What rows say may have changed; the rows are the same."""
+        """Updates the cells of all rows."""
         top = self.rowCount()
         if top:
             self.dataChanged.emit(self.index(0, 0), self.index(top - 1, len(HEADERS) - 1))
@@ -106,19 +110,19 @@ class SceneModel(QAbstractItemModel):
         return node.names
 
     def _show_more(self, node: _Node, count: int) -> None:
-        """Lets the view have so many children."""
+        """Makes ``count`` children visible to the view."""
         at = QModelIndex() if node is self._root else self.createIndex(node.row, NAME, node)
         self.beginInsertRows(at, node.shown, count - 1)
         node.shown = count
         self.endInsertRows()
 
     def canFetchMore(self, parent: QModelIndex = ROOT) -> bool:
-        """As Qt has it."""
+        """Returns whether a row has children that the view does not have yet."""
         node = self._node(parent)
         return node.shown < len(self._names(node))
 
     def fetchMore(self, parent: QModelIndex = ROOT) -> None:
-        """As Qt has it."""
+        """Gives the view more children of a row."""
         node = self._node(parent)
         count = min(len(self._names(node)), node.shown + CHUNK)
         if count > node.shown:
@@ -132,25 +136,25 @@ class SceneModel(QAbstractItemModel):
         return made
 
     def index(self, row: int, column: int, parent: QModelIndex = ROOT) -> QModelIndex:
-        """As Qt has it."""
+        """Returns the index of a cell."""
         node = self._node(parent)
         if not (0 <= row < len(self._names(node)) and 0 <= column < len(HEADERS)):
             return QModelIndex()
         return self.createIndex(row, column, self._child(node, row))
 
     def parent(self, index: QModelIndex = ROOT) -> Any:
-        """As Qt has it."""
+        """Returns the index of a row's parent."""
         above = self._node(index).parent if index.isValid() else None
         if above is None or above is self._root:
             return QModelIndex()
         return self.createIndex(above.row, NAME, above)
 
     def hasChildren(self, parent: QModelIndex = ROOT) -> bool:
-        """As Qt has it."""
+        """Returns whether a row has children."""
         return parent.column() <= 0 and bool(self._names(self._node(parent)))
 
     def rowCount(self, parent: QModelIndex = ROOT) -> int:
-        """As Qt has it."""
+        """Returns the number of rows that the view has."""
         if parent.column() > 0:
             return 0
         node = self._node(parent)
@@ -158,7 +162,7 @@ class SceneModel(QAbstractItemModel):
         return node.shown
 
     def columnCount(self, parent: QModelIndex = ROOT) -> int:
-        """As Qt has it."""
+        """Returns the number of columns."""
         return len(HEADERS)
 
     def headerData(
@@ -167,13 +171,13 @@ class SceneModel(QAbstractItemModel):
         orientation: Qt.Orientation,
         role: int = Qt.ItemDataRole.DisplayRole,
     ) -> Any:
-        """As Qt has it."""
+        """Returns the title of a column."""
         if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
             return HEADERS[section]
         return None
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it, and ``PathRole``, ``StateRole`` and ``ToneRole``."""
+        """Returns a cell's data, also for ``PathRole``, ``StateRole`` and ``ToneRole``."""
         prim = self.prim(index)
         if not prim:
             return None
@@ -223,13 +227,13 @@ class SceneModel(QAbstractItemModel):
             count = len(prim.GetPrototype().GetInstances())
             lines.append(f"one of {count} instances that share their contents")
         if prim.IsInstanceProxy():
-            lines.append("inside an instance: shown, and not to be edited here")
+            lines.append("inside an instance: cannot be edited here")
         if column == VISIBILITY:
             seen, by = state(prim, self._edits.time)
             if reason := uneditable(prim):
                 lines.append(reason)
             elif seen == HIDDEN_ABOVE:
-                lines.append(f"hidden by {by}; a click shows this prim alone of what is in it")
+                lines.append(f"hidden by {by}; click to show only this prim in it")
             else:
                 lines.append("click to hide" if seen == VISIBLE else "click to show")
         if column == VARIANTS and self._text(prim, VARIANTS):
@@ -238,12 +242,13 @@ class SceneModel(QAbstractItemModel):
 
 
 def search(usd: Usd.Stage, text: str, step: int = 500) -> Iterator[list[Sdf.Path]]:
-    """Prims whose name or type has the text in it (with a "/": whose path), in slices.
+    """Finds prims whose name or type contains a text, or whose path does if the text has a "/".
 
     Args:
         usd: The stage.
-        text: Upper and lower case are the same.
-        step: Prims that are looked at for each slice, so that whoever asks can do other things.
+        text: The text; case is ignored.
+        step: Number of prims searched per yielded list, so that the caller can do other work
+            between.
     """
     wanted = text.casefold()
     by_path = "/" in wanted

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scene: tree with visibility and variants, materials, lights, and what loading found."""
+"""Scene panel: tree with visibility and variants, materials, lights, and findings of the loader."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 
 class ScenePanel(QWidget):
-    """Tabs. What is selected here is selected in the session, and the other way round.
+    """Panel with tabs, whose selection is synchronised with the session.
 
     Signals:
-        selected(str): Prim that was chosen, in any panel or in the picture.
-        frame_wanted(): F was pressed in the tree: what is selected is to fill the picture.
+        selected(str): A prim was selected, in any panel or in the image.
+        frame_wanted(): F was pressed in the tree, to frame the selected prims.
     """
 
     selected = Signal(str)
@@ -91,11 +91,11 @@ class ScenePanel(QWidget):
         self._count_notes()
 
     def shutdown(self) -> None:
-        """Forgets all steps of undo: Qt's stack goes before Python's side of it does."""
+        """Clears the undo history, because Qt destroys its stack before Python's objects."""
         self.edits.history.clear()
 
     def _make_actions(self) -> None:
-        # Without keys: the menus of the window have them.
+        # These actions have no shortcuts, because the menus of the window define them.
         self.undo_action = self._action("Undo", self.edits.undo)
         self.redo_action = self._action("Redo", self.edits.redo)
         self.save_action = self._action("Save edits as layer\u2026", self.ask_save)
@@ -103,7 +103,7 @@ class ScenePanel(QWidget):
 
     def _action(self, name: str, call: Callable[[], None]) -> QAction:
         action = QAction(name, self)
-        action.setIconText(name)  # what the button says; the text names the edit, too
+        action.setIconText(name)  # text of the button; the action's text also names the edit
         action.setObjectName(name.rstrip("\u2026").lower().replace(" ", "-"))
         action.triggered.connect(lambda checked=False: call())
         return action
@@ -111,7 +111,7 @@ class ScenePanel(QWidget):
     # ---- edits ---------------------------------------------------------------------------------
 
     def ask_save(self) -> None:
-        """Asks where to write the edits, and writes them."""
+        """Asks for a file and writes the edits to it."""
         stage = self.session.stage
         start = ""
         if stage is not None:
@@ -150,7 +150,7 @@ class ScenePanel(QWidget):
         self.variants.show_prim(self.variants_path())
 
     def variants_path(self) -> str | None:
-        """The prim that variants are shown of."""
+        """Returns the prim whose variants are shown, or None."""
         path = (self.session.selection or "").partition("[")[0]
         return path if path and Sdf.Path.IsValidPathString(path) else None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tree of the stage: what there is, what is visible, which variants are chosen."""
+"""Tree of the stage with visibility and variants."""
 
 from __future__ import annotations
 
@@ -60,12 +60,12 @@ if TYPE_CHECKING:
 
 
 class EyeDelegate(QStyledItemDelegate):
-    """Paints an eye: open, crossed out, or faint where something above hides the prim."""
+    """Delegate that paints an eye: open, crossed out, or faint if an ancestor hides the prim."""
 
     def sizeHint(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
     ) -> QSize:
-        """As Qt has it: rows are high enough to be hit."""
+        """Returns a size that is large enough to click."""
         return QSize(theme.em(2), theme.em(1.5))
 
     def paint(
@@ -74,7 +74,7 @@ class EyeDelegate(QStyledItemDelegate):
         option: QStyleOptionViewItem,
         index: QModelIndex | QPersistentModelIndex,
     ) -> None:
-        """As Qt has it."""
+        """Paints the cell and the eye."""
         super().paint(painter, option, index)
         seen = index.data(StateRole)
         if seen == NOT_DRAWN or seen is None:
@@ -103,14 +103,14 @@ class EyeDelegate(QStyledItemDelegate):
 
 
 MAX_FOUND = 2000
-"""Prims that a search shows."""
+"""Largest number of prims that a search shows."""
 
 MAX_EXPANDED = 300
-"""With more found, only the way to the first is opened."""
+"""With more matches, only the ancestors of the first are expanded."""
 
 
 class _View(QTreeView):
-    """The view; Space and a click on the eye toggle what is visible.
+    """Tree view. Space and a click on the eye toggle visibility.
 
     Signals:
         frame_wanted(): F was pressed.
@@ -125,11 +125,11 @@ class _View(QTreeView):
         self.setModel(model)
 
     def chosen(self) -> list[str]:
-        """Paths of the selected rows."""
+        """Returns the paths of the selected rows."""
         return [index.data(PathRole) for index in self.selectionModel().selectedRows(NAME)]
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Space toggles, F frames; the rest as in any tree."""
+        """Handles Space (visibility) and F (frame), and all other keys as Qt does."""
         if event.modifiers() or event.key() not in (Qt.Key.Key_Space, Qt.Key.Key_F):
             super().keyPressEvent(event)
             return
@@ -140,7 +140,7 @@ class _View(QTreeView):
         event.accept()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """A click on an eye toggles it, or all that is selected where it is among that."""
+        """Toggles visibility by a click on an eye, for all selected prims if it is one of them."""
         index = self.indexAt(event.position().toPoint())
         if event.button() == Qt.MouseButton.LeftButton and index.isValid():
             path = index.data(PathRole)
@@ -176,7 +176,7 @@ class _View(QTreeView):
 
 
 class SceneTree(QWidget):
-    """Search field, tree, and a line about what was found."""
+    """Search field, tree, and a line with the number of matches."""
 
     def __init__(self, edits: SceneEdits, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -186,8 +186,8 @@ class SceneTree(QWidget):
         self.view = _View(edits, self.model)
         self.field = search_field(
             "scene-search", "Search prims",
-            "Shows the prims whose name or type contains this text; text with a / in it is looked "
-            "for in paths", "Search names, types or paths",
+            "Shows the prims whose name or type contains this text; a text with / is "
+            "searched in paths", "Search names, types or paths",
         )  # fmt: skip
         self.found = QLabel()
         self._search: Iterator[list[Sdf.Path]] | None = None
@@ -211,7 +211,7 @@ class SceneTree(QWidget):
         self.found.setObjectName("scene-found")
         self.found.hide()
         view = self.view
-        tip = "Space or a click on the eye shows and hides; F frames what is selected"
+        tip = "Space or a click on the eye shows and hides; F frames the selected prims"
         named(view, "scene-tree", "Prims of the stage", tip)
         view.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         view.setUniformRowHeights(True)
@@ -225,7 +225,7 @@ class SceneTree(QWidget):
         header.setMinimumSectionSize(theme.em(2))
         for column, wide in ((NAME, 11), (TYPE, 8), (VISIBILITY, 3.6)):
             header.resizeSection(column, theme.em(wide))
-        # The eye next to the name: it is seen in a narrow panel, too.
+        # The eye is next to the name, so that it is visible in a narrow panel.
         header.moveSection(VISIBILITY, 1)
         header.setSectionResizeMode(VISIBILITY, QHeaderView.ResizeMode.Fixed)
         assert view.model().columnCount() == len(HEADERS)
@@ -240,7 +240,7 @@ class SceneTree(QWidget):
     # ---- what is selected ----------------------------------------------------------------------
 
     def choose(self, path: str | None) -> None:
-        """Selects and shows a prim, as ``Renderer.pick`` names it or by its path."""
+        """Selects and shows a prim, given its path or the name from ``Renderer.pick``."""
         plain = (path or "").partition("[")[0].rstrip("/")
         index = QModelIndex()
         if plain and Sdf.Path.IsValidPathString(plain):
@@ -295,7 +295,7 @@ class SceneTree(QWidget):
             self.view.expand(self.model.index(row, 0))
 
     def _on_structure(self) -> None:
-        """Reads the rows anew and opens those again that were open."""
+        """Reads the rows again and restores the expanded ones."""
         opened: list[Sdf.Path] = []
         stack = [self.model.index(row, 0) for row in range(self.model.rowCount())]
         while stack:
@@ -316,7 +316,7 @@ class SceneTree(QWidget):
 
     def _fill(self, matches: list[Sdf.Path] | None) -> None:
         self.model.reset(matches)
-        # The view makes a selection model for each reset of the model's.
+        # The view creates a new selection model whenever the model is reset.
         self.view.selectionModel().currentRowChanged.connect(
             self._on_current, Qt.ConnectionType.UniqueConnection
         )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits of a stage in its session layer: planned, made, listed. Knows nothing of Qt.
+"""Edits of a stage in its session layer: planning, applying and listing them. Independent of Qt.
 
-Contract: used by one thread, the one that owns the stage. The files of the stage are never written.
+Must be used on the thread that owns the stage. Never writes to the files of the stage.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from wavecomb.errors import WavecombError
 from wavecomb.gui.scene.visibility import hide, show, uneditable
 
 Key = tuple[Sdf.Path, str]
-"""A prim and what of it: ``.NAME`` of an attribute, ``{NAME}`` of a variant set, ``!NAME`` of a
-value that no attribute of the stage holds."""
+"""Key of an edit: a prim, and ``.NAME`` of an attribute, ``{NAME}`` of a variant set, or ``!NAME``
+of a value that no attribute of the stage can hold."""
 
 
 @dataclass(frozen=True)
 class Opinion:
-    """What the session layer says of one thing.
+    """Value that the session layer has for one key.
 
     Attributes:
-        value: Of the attribute, or the variant's name.
-        type_name: Of the attribute.
+        value: Value of the attribute, or name of the variant.
+        type_name: Type of the attribute.
     """
 
     value: Any
@@ -35,7 +35,7 @@ class Opinion:
 
 @dataclass(frozen=True)
 class VariantSet:
-    """A variant set of a prim; ``choice`` is "" where none is selected."""
+    """A variant set of a prim; ``choice`` is "" if no variant is selected."""
 
     name: str
     choices: tuple[str, ...]
@@ -44,7 +44,7 @@ class VariantSet:
 
 @dataclass(frozen=True)
 class Solo:
-    """The light that is shown alone, None where none is, and what was said before of all."""
+    """The light that is shown alone, or None, and the opinions before of all lights."""
 
     path: str | None = None
     before: Mapping[Key, Opinion | None] = field(default_factory=dict)
@@ -52,13 +52,13 @@ class Solo:
 
 @dataclass(frozen=True)
 class Step:
-    """One step of undo.
+    """One undo step.
 
     Attributes:
-        label: For people: "intensity of /Key".
-        before: Opinions, None where there is none.
-        after: Of the same things.
-        solo: Before and after; None: it stays.
+        label: Description for people, such as "intensity of /Key".
+        before: Opinions before the step by key, None for no opinion.
+        after: Opinions after the step, with the same keys.
+        solo: Solo state before and after; None if unchanged.
     """
 
     label: str
@@ -67,27 +67,27 @@ class Step:
     solo: tuple[Solo, Solo] | None = None
 
     def inverse(self) -> Step:
-        """What takes it back."""
+        """Returns the step that reverts this one."""
         solo = self.solo[::-1] if self.solo is not None else None
         return Step(f"undo {self.label}", self.after, self.before, solo)
 
     def then(self, later: Step) -> Step:
-        """This and a later one of the same things as one."""
+        """Returns this step and a later one with the same keys as a single step."""
         return Step(later.label, self.before, later.after, self.solo)
 
     @property
     def drags(self) -> bool:
-        """Whether it may be part of a drag: a value that is taken back is a step of its own."""
+        """Whether it may be part of a drag. Resetting a value is always a separate step."""
         return not self.structural and self.solo is None and None not in self.after.values()
 
     @property
     def structural(self) -> bool:
-        """Whether the stage must be read again: visibility and variants decide what is there."""
+        """Whether the stage must be loaded again, because visibility or variants changed."""
         return any(what == ".visibility" or what.startswith("{") for _, what in self.after)
 
     @property
     def prims(self) -> tuple[Sdf.Path, ...]:
-        """Prims that hold what changed."""
+        """Prims of the changed keys."""
         return tuple(dict.fromkeys(path for path, _ in self.after))
 
 
@@ -96,10 +96,10 @@ class StageEdits:
     """The edits of one stage.
 
     Attributes:
-        stage: It; edits go to its session layer.
-        time: At which its attributes are read.
-        values: What is changed and no attribute holds, by prim and parameter: it is in the picture,
-            and is not saved.
+        stage: The stage, whose session layer holds the edits.
+        time: Time code at which attributes are read.
+        values: Edited values that no attribute can hold, by prim and parameter. They affect the
+            image but cannot be saved.
     """
 
     stage: Usd.Stage
@@ -109,7 +109,7 @@ class StageEdits:
     # ---- what there is -------------------------------------------------------------------------
 
     def variant_sets(self, path: Sdf.Path) -> list[VariantSet]:
-        """The variant sets of a prim."""
+        """Returns the variant sets of a prim."""
         prim = self.stage.GetPrimAtPath(path)
         if not prim or not prim.HasVariantSets():
             return []
@@ -121,7 +121,7 @@ class StageEdits:
         return out
 
     def opinion(self, key: Key) -> Opinion | None:
-        """What was edited of one thing; None: nothing."""
+        """Returns the edited value of a key, or None."""
         path, what = key
         if what.startswith("!"):
             return Opinion(self.values[key]) if key in self.values else None
@@ -138,7 +138,10 @@ class StageEdits:
         return Opinion(attribute.default, attribute.typeName)
 
     def edited(self) -> list[Key]:
-        """All that is edited, in the stage's order; what is not saved last."""
+        """Returns the keys of all edits, in the order of the stage.
+
+        Those that cannot be saved come last.
+        """
         found: list[Key] = []
 
         def visit(path: Sdf.Path) -> None:
@@ -153,27 +156,28 @@ class StageEdits:
         return [*sorted(found), *sorted(self.values)]
 
     def lines(self) -> list[str]:
-        """The edits, one line each."""
+        """Returns the edits, one line each."""
         out = []
         for key in self.edited():
             path, what = key
             known = self.opinion(key)
             value = _text(known.value) if known is not None else ""
             if what.startswith("!"):
-                out.append(
-                    f"{path} {what[1:]} = {value} (not saved: the stage has no place for it)"
-                )
+                out.append(f"{path} {what[1:]} = {value} (not saved: no attribute can hold it)")
             else:
                 out.append(f"{path}{what} = {value}")
         return out
 
-    # ---- changes: each gives a step, None where nothing changes; ``apply`` makes it -------------
+    # ---- changes: each returns a step for ``apply``, or None if nothing would change
+    # ------------------
 
     def visible(self, paths: Iterable[Sdf.Path], visible: bool) -> Step | None:
-        """To show or hide prims, as ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible`` do.
+        """Plans to show or hide prims.
+
+        The opinions are those of ``UsdGeom.Imageable.MakeVisible`` and ``MakeInvisible``.
 
         Raises:
-            WavecombError: One is inside an instance.
+            WavecombError: A prim is inside an instance.
         """
         wanted = list(paths)
         opinions: dict[Key, Opinion | None] = {}
@@ -189,7 +193,7 @@ class StageEdits:
         return self.plan(f"{'show' if visible else 'hide'} {name}", opinions)
 
     def variant(self, path: Sdf.Path, name: str, choice: str | None) -> Step | None:
-        """To select a variant; None: what the stage itself selects.
+        """Plans to select a variant; None restores the selection of the stage.
 
         Raises:
             WavecombError: There is no such set or variant, or the prim is inside an instance.
@@ -205,7 +209,7 @@ class StageEdits:
         return self.plan(f"{name} of {path}", {(path, f"{{{name}}}"): opinion})
 
     def plan(self, label: str, opinions: Mapping[Key, Opinion | None]) -> Step | None:
-        """To set or remove (None) opinions."""
+        """Plans to set or remove (None) opinions."""
         before = {key: self.opinion(key) for key in opinions}
         step = Step(
             label,
@@ -215,7 +219,7 @@ class StageEdits:
         return step if step.after else None
 
     def apply(self, step: Step) -> None:
-        """Makes it so."""
+        """Applies a step."""
         layer = self.stage.GetSessionLayer()
         with Sdf.ChangeBlock():
             for (path, what), opinion in step.after.items():
@@ -231,7 +235,7 @@ class StageEdits:
 
 
 def _selections(spec: Sdf.PrimSpec) -> dict[str, str]:
-    """Variant set -> variant, as authored here."""
+    """Returns the variant selections that are authored on a prim spec."""
     return dict(spec.GetInfo("variantSelection")) if spec.HasInfo("variantSelection") else {}
 
 
@@ -260,7 +264,7 @@ def _remove(layer: Sdf.Layer, path: Sdf.Path, what: str) -> None:
 
 
 def _text(value: Any) -> str:
-    """A value for people: numbers to four digits."""
+    """Formats a value for people, with numbers of four digits."""
     if isinstance(value, str):
         return value
     if hasattr(value, "__len__"):

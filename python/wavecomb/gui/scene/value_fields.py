@@ -30,11 +30,11 @@ Control = Qt.KeyboardModifier.ControlModifier
 
 SLIDER_STEPS = 1000
 _BAR = 6
-"""Width of the swatch of a colour that can be changed, of its height."""
+"""Width of the colour button's swatch, as a multiple of its height."""
 
 
 def _is_history(event: Any) -> bool:
-    """Whether keys ask for undo or redo."""
+    """Returns whether a key event means undo or redo."""
     undo, redo = QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo
     if event.matches(undo) or event.matches(redo):
         return True
@@ -42,12 +42,12 @@ def _is_history(event: Any) -> bool:
 
 
 class _Spin(QDoubleSpinBox):
-    """A number that changes as it is typed, with the point as decimal mark.
+    """Number field that emits changes while typing and uses a point as decimal mark.
 
-    It has no history of its own: the keys of undo and redo are those of the window.
+    It leaves undo and redo to the window and has no undo history.
 
     Signals:
-        typing(bool): Somebody has begun to type a value, or is done with it.
+        typing(bool): The user began (True) or finished typing a value.
     """
 
     typing = Signal(bool)
@@ -65,20 +65,20 @@ class _Spin(QDoubleSpinBox):
         self.setMinimumWidth(theme.em(3.4))
 
     def show_value(self, value: float) -> None:
-        """Shows a value, also one that nobody would choose here; tells nobody."""
+        """Shows a value, extending the range if needed, without emitting a signal."""
         with QSignalBlocker(self):
             self.setRange(min(self.minimum(), value), max(self.maximum(), value))
             self.setValue(value)
 
     def event(self, event: QEvent) -> bool:
-        """Leaves undo and redo to the window."""
+        """Leaves the shortcuts of undo and redo to the window."""
         if event.type() == QEvent.Type.ShortcutOverride and _is_history(event):
             event.ignore()
             return False
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Undo and redo of the text would change the value behind the stage's back."""
+        """Ignores undo and redo of the text, which would change the value without an edit."""
         if _is_history(event):
             event.ignore()
             return
@@ -93,7 +93,7 @@ class _Spin(QDoubleSpinBox):
             self.typing.emit(False)
 
     def wheelEvent(self, event: Any) -> None:
-        """Only where it has the focus: lists are scrolled over it."""
+        """Changes the value only with the focus, so that scrolling a list does not edit fields."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
@@ -101,12 +101,12 @@ class _Spin(QDoubleSpinBox):
 
 
 class Field(QWidget):
-    """What is common: a row with a reset button.
+    """Base class of fields: a row with a reset button.
 
     Signals:
-        changed(value): By the user: a number, a colour or a bool.
-        reset(): The value of the stage is wanted.
-        typing(bool): A value is being typed, key by key, or that is over.
+        changed(value): The user changed the value: a number, a colour or a bool.
+        reset(): The user wants the value of the stage.
+        typing(bool): The user began (True) or finished typing a value.
     """
 
     changed = Signal(object)
@@ -122,25 +122,25 @@ class Field(QWidget):
         self.lines.setSpacing(theme.em(0.1))
         self.row = QHBoxLayout()
         self.lines.addLayout(self.row)
-        self.back = named(QToolButton(), "reset", f"Reset {name}", "Back to the value of the stage")
+        self.back = named(QToolButton(), "reset", f"Reset {name}", "Reset to the stage's value")
         self.back.setText("\N{ANTICLOCKWISE OPEN CIRCLE ARROW}")
         self.back.setAutoRaise(True)
         self.back.clicked.connect(self.reset)
 
     def finish(self) -> None:
-        """Adds the reset button, last."""
+        """Adds the reset button at the end of the row."""
         self.row.addWidget(self.back)
 
     def value(self) -> Any:
-        """What is shown."""
+        """Returns the shown value."""
         raise NotImplementedError
 
     def set_value(self, value: Any) -> None:
-        """Shows a value; tells nobody."""
+        """Shows a value without emitting a signal."""
         raise NotImplementedError
 
     def set_edited(self, edited: bool) -> None:
-        """Whether there is something to reset."""
+        """Enables the reset button if there is an edit."""
         self.back.setEnabled(edited)
 
 
@@ -160,7 +160,7 @@ class NumberField(Field):
         self.row.addWidget(self.spin)
         self.finish()
         self._place(self.spin.value())
-        # Its range would have it wider.
+        # By its range alone the field would be wider.
         widest = max(f"{bounds.soft_high:.{bounds.decimals}f}", "-0.000", key=len)
         text = self.spin.fontMetrics().horizontalAdvance(widest)
         self.spin.setFixedWidth(max(text + theme.em(2.2), theme.em(5)))
@@ -169,11 +169,11 @@ class NumberField(Field):
         self.spin.valueChanged.connect(self._on_spin)
 
     def value(self) -> float:
-        """What the number says."""
+        """Returns the value of the number."""
         return self.spin.value()
 
     def set_value(self, value: float) -> None:
-        """Shows a value; tells nobody."""
+        """Shows a value without emitting a signal."""
         self.spin.show_value(value)
         self._place(value)
 
@@ -193,7 +193,7 @@ class NumberField(Field):
 
 
 class SwitchField(Field):
-    """A box to be ticked."""
+    """A check box."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -204,11 +204,11 @@ class SwitchField(Field):
         self.box.toggled.connect(lambda on: self.changed.emit(on))
 
     def value(self) -> bool:
-        """Whether it is ticked."""
+        """Returns whether the box is checked."""
         return self.box.isChecked()
 
     def set_value(self, value: Any) -> None:
-        """Shows a value; tells nobody."""
+        """Shows a value without emitting a signal."""
         with QSignalBlocker(self.box):
             self.box.setChecked(bool(value))
 
@@ -230,7 +230,7 @@ class ColourField(Field):
         numbers = QHBoxLayout()
         numbers.setSpacing(theme.em(0.2))
         self.spins = [_Spin(bounds, f"{name}, {part}") for part in ("red", "green", "blue")]
-        # Exact; the fields show rounded ones, and only what is typed counts.
+        # Exact values. The fields show rounded ones, and only typed values replace exact ones.
         self._parts = [0.0, 0.0, 0.0]
         for part, spin in enumerate(self.spins):
             spin.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)
@@ -244,12 +244,12 @@ class ColourField(Field):
         theme.on_change(self._paint)
 
     def value(self) -> Colour:
-        """What is shown."""
+        """Returns the shown colour."""
         r, g, b = self._parts
         return r, g, b
 
     def set_value(self, value: Colour) -> None:
-        """Shows a colour; tells nobody."""
+        """Shows a colour without emitting a signal."""
         self._parts = [float(part) for part in value]
         for spin, part in zip(self.spins, value, strict=True):
             spin.show_value(part)
@@ -265,7 +265,7 @@ class ColourField(Field):
         self.changed.emit(self.value())
 
     def _choose(self) -> None:
-        """Opens the dialog, which blocks nothing; a colour brighter than white keeps its peak."""
+        """Opens a modeless colour dialog. A colour brighter than white keeps its peak value."""
         before = self.value()
         peak = max(1.0, *before)
         r, g, b = (part / peak for part in before)
@@ -294,7 +294,7 @@ class ColourField(Field):
 
 
 class PlainText(QLineEdit):
-    """A line that can be read and copied, however little room there is for it."""
+    """A read-only line that can be copied, even if it is too narrow for its text."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -309,7 +309,7 @@ class PlainText(QLineEdit):
 
 
 class DrivenField(QWidget):
-    """What stands for a parameter that a texture or a primvar gives."""
+    """Placeholder for a parameter whose value comes from a texture or a primvar."""
 
     def __init__(self, name: str, driver: str) -> None:
         super().__init__()
@@ -319,6 +319,6 @@ class DrivenField(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(PlainText(driver), 1)
         self.setToolTip(
-            f"{name} comes from {driver}, so there is no number to change; "
-            "edit that, or the network of the material"
+            f"{name} comes from {driver}, so it has no number; "
+            "edit that source or the material network"
         )

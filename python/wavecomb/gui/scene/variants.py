@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A combo for each variant set of the prim that is selected."""
+"""Combo boxes for the variant sets of the selected prim."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STAGE_CHOICE = "as in the stage"
 
 
 class VariantBar(QWidget):
-    """A combo for each variant set of the prim that is selected."""
+    """A combo box for each variant set of the selected prim."""
 
     def __init__(self, edits: SceneEdits) -> None:
         super().__init__()
@@ -30,7 +30,7 @@ class VariantBar(QWidget):
         self.hide()
 
     def show_prim(self, path: str | None) -> None:
-        """Another prim."""
+        """Shows the variants of another prim."""
         self.model.show_prim(path)
 
     def _fill(self) -> None:
@@ -51,9 +51,10 @@ class VariantBar(QWidget):
         self.setVisible(bool(model.sets))
 
     def _clear(self) -> None:
-        """Takes all rows away.
+        """Removes all rows.
 
-        One of the combos may be what asked for that: it must live on until its event is over.
+        The widgets are deleted later, because a combo box may be handling the event that leads
+        here.
         """
         self.combos = {}
         while self._form.rowCount():

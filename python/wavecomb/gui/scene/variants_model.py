@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The variants of the prim that is selected. No widgets."""
+"""The variants of the selected prim. No widgets."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class VariantsModel(QObject):
     """Variant sets of one prim.
 
     Signals:
-        changed(): ``sets`` says something else.
+        changed(): ``sets`` changed.
 
     Attributes:
-        path: Of the prim, or None.
+        path: Path of the prim, or None.
         sets: Its variant sets.
-        editable: Whether they can be chosen: not inside an instance.
+        editable: Whether variants can be selected, which is not possible inside an instance.
     """
 
     changed = Signal()
@@ -37,17 +37,17 @@ class VariantsModel(QObject):
         edits.reset.connect(self._forget)
 
     def show_prim(self, path: str | None) -> None:
-        """Another prim."""
+        """Shows another prim."""
         self.path = path
         self._read()
 
     def choose(self, name: str, choice: str | None) -> None:
-        """Selects a variant; None: what the stage itself selects."""
+        """Selects a variant; None restores the selection of the stage."""
         if self.path is not None:
             self._edits.select_variant(self.path, name, choice)
 
     def tip(self, name: str) -> str:
-        """What choosing does, or why it cannot be done."""
+        """Returns a tooltip that names the variant set or says why it cannot be edited."""
         if self.editable:
             return f"Variant {name} of {self.path}"
         return "Inside an instance: choose variants of the instance itself"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is visible on a stage, and what must be said to make it so. Authors nothing."""
+"""Visibility on a stage, and the opinions needed to change it. Authors nothing."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Mapping
 from pxr import Sdf, Usd, UsdGeom
 
 Words = dict[Sdf.Path, str]
-"""Prim -> "invisible" or "inherited"."""
+"""Value "invisible" or "inherited" by prim."""
 
 VISIBLE, HIDDEN, HIDDEN_ABOVE, NOT_DRAWN = "visible", "hidden", "hidden above", ""
-"""``state``: drawn; hidden itself; by an ancestor; not a thing to be drawn."""
+"""Values of ``state``: drawn; hidden itself; hidden by an ancestor; not drawable."""
 
 
 def uneditable(prim: Usd.Prim) -> str:
-    """Why the visibility of a prim cannot be edited; "" where it can."""
+    """Returns why the visibility of a prim cannot be edited, or "" if it can."""
     if not prim:
         return "it is not on the stage"
     if prim.IsInstanceProxy() or prim.IsInPrototype():
@@ -26,12 +26,12 @@ def uneditable(prim: Usd.Prim) -> str:
 
 
 def says_hidden(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
-    """Whether the prim's own attribute says invisible."""
+    """Returns whether the prim's attribute is "invisible"."""
     return bool(prim.GetAttribute("visibility").Get(time) == "invisible")
 
 
 def state(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str, Sdf.Path | None]:
-    """The state of a prim, and the prim that hides it."""
+    """Returns the state of a prim, and the prim that hides it or None."""
     if not prim or not prim.IsA(UsdGeom.Imageable):
         return NOT_DRAWN, None
     if says_hidden(prim, time):
@@ -47,12 +47,12 @@ def state(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str, Sdf.Path | None]:
 def hide(
     prim: Usd.Prim, time: Usd.TimeCode, pending: Mapping[Sdf.Path, bool] | None = None
 ) -> Words:
-    """What ``UsdGeom.Imageable.MakeInvisible`` would author.
+    """Returns the opinions that ``UsdGeom.Imageable.MakeInvisible`` would author.
 
     Args:
-        prim: Imageable.
-        time: Of the stage.
-        pending: Prims that are about to be hidden (True) or not.
+        prim: An imageable prim.
+        time: Time code of the stage.
+        pending: Prims that will be hidden (True) or shown (False).
     """
     known = (pending or {}).get(prim.GetPath())
     hidden = says_hidden(prim, time) if known is None else known
@@ -62,10 +62,10 @@ def hide(
 def show(
     prim: Usd.Prim, time: Usd.TimeCode, pending: Mapping[Sdf.Path, bool] | None = None
 ) -> Words:
-    """What ``UsdGeom.Imageable.MakeVisible`` would author: shows this prim and nothing else.
+    """Returns the opinions that ``UsdGeom.Imageable.MakeVisible`` would author.
 
-    An ancestor that hides it no longer does, and so that all else below that one stays hidden,
-    what is beside the way to the prim is hidden itself.
+    They show this prim and nothing else. An invisible ancestor becomes visible. Siblings along the
+    path to the prim become invisible, so that everything else below the ancestor stays hidden.
     """
     chain = [prim]
     while chain[-1].GetParent() and not chain[-1].GetParent().IsPseudoRoot():

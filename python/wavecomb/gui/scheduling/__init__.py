@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policies and what they are worth."""
+"""Panels for scheduling settings and for measuring their effect."""

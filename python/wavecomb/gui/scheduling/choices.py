@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the scheduling panel offers: choices, what each does, presets; no Qt."""
+"""Choices, descriptions and presets of the scheduling panel. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from wavecomb.options import names, settings
 
 @dataclass(frozen=True)
 class Choice:
-    """One setting that has names to choose from."""
+    """A setting with named values."""
 
     field: str
     label: str
     tip: str
     values: Mapping[Any, str]
-    """Value -> what it does."""
+    """Description of each value."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """One setting that is a number; 0 means ``zero``."""
+    """A numeric setting. The value 0 has the meaning ``zero``."""
 
     field: str
     label: str
@@ -39,7 +39,7 @@ class Number:
 
 
 def lane_choices() -> dict[Any, str]:
-    """Lane widths of this build."""
+    """Returns the SIMD widths of this build, with descriptions."""
     from wavecomb import _core
 
     widths = _core.lane_widths()
@@ -53,13 +53,13 @@ def lane_choices() -> dict[Any, str]:
 
 
 WAVE_SIZES: dict[Any, str] = {
-    0: "As wide as the caches of this machine ask for.",
-    **{1 << n: f"{1 << n} paths a wave." for n in range(8, 21)},
+    0: "Chosen by the caches of this machine.",
+    **{1 << n: f"{1 << n} paths per wave." for n in range(8, 21)},
 }
 
 
 def choice(name: str) -> Choice:
-    """A setting of the table as a choice."""
+    """Returns a setting of the core's table as a choice."""
     row = settings()[name]
     values: dict[Any, str] = dict(row.choices)
     if name == "wave_size":
@@ -80,11 +80,11 @@ _SHOWN: dict[str, dict[str, Any]] = {
     "roulette_depth": {"most": 64},
     "min_spp": {"most": 65536},
 }
-"""How fields show numbers, where that is not as the table has it."""
+"""Display options of fields that differ from the core's table."""
 
 
 def number(name: str) -> Number:
-    """A setting of the table as a number."""
+    """Returns a setting of the core's table as a number."""
     row = settings()[name]
     values: dict[str, Any] = {"least": row.least or 0, "most": row.most, "zero": row.zero}
     if row.kind == "number":
@@ -95,24 +95,24 @@ def number(name: str) -> Number:
 
 
 def fields_of(group: str, without: tuple[str, ...] = ()) -> tuple[Choice | Number, ...]:
-    """The settings of a group, as fields, in the table's order."""
+    """Returns the settings of a group as fields, in the order of the table."""
     rows = (settings()[name] for name in names(group, without=without))
     is_choice = lambda row: row.kind == "choice" or row.name in ("lanes", "wave_size")  # noqa: E731
     return tuple(choice(row.name) if is_choice(row) else number(row.name) for row in rows)
 
 
 ADAPTIVE_MODES = {
-    "off": "Every pixel gets as many samples.",
-    "pixel": "Pixels stop when their own error is small enough.",
-    "noise": "The render ends when the picture's mean error is small enough; samples go where "
-    "the noise is.",
+    "off": "Every pixel gets the same number of samples.",
+    "pixel": "A pixel stops when its error is small enough.",
+    "noise": "The render ends when the image's mean error is small enough; noisy pixels get more "
+    "samples.",
 }
 ORDER_FIELDS = names("order", without=("progressive",))
 WORK_FIELDS = names("work")
 
 
 def scheduling_of(setup: Setup) -> dict[str, Any]:
-    """The settings by which series are told apart, with names for what was loaded."""
+    """Returns the settings that distinguish series, with names of loaded policies and profiles."""
     values = {name: getattr(setup, name) for name in FIELDS}
     if setup.own_policy is not None:
         values["policy"] = setup.own_policy.name
@@ -122,7 +122,10 @@ def scheduling_of(setup: Setup) -> dict[str, Any]:
 
 
 def promise(setup: Setup) -> str:
-    """What the settings of order do to the picture: nothing, with two exceptions."""
+    """Returns a text that says how the settings of order affect the image.
+
+    They do not, except with a time limit or with cost-aware roulette.
+    """
     if setup.time_limit:
         return (
             "Nothing in this group changes a bit of a sample, but the time limit ends the render "
@@ -133,41 +136,39 @@ def promise(setup: Setup) -> str:
             "Nothing in this group but Costs changes a bit of the picture: cost-aware roulette "
             "goes by them."
         )
-    return "Nothing in this group changes a bit of the picture."
+    return "These settings do not change the picture."
 
 
 def recipe_of(setup: Setup) -> dict[str, Any]:
-    """What to set to have these settings again."""
+    """Returns the fields of a setup that restore these settings."""
     return {name: getattr(setup, name) for name in (*FIELDS, "own_policy", "profile")}
 
 
 def defaults(names: tuple[str, ...]) -> dict[str, Any]:
-    """The default values of settings."""
+    """Returns the default values of settings."""
     known = {one.name: one.default for one in fields(Setup)}
     return {name: known[name] for name in names}
 
 
 def presets() -> dict[str, tuple[str, dict[str, Any]]]:
-    """Name -> (what it is for, settings); all but the first are of order only."""
+    """Returns presets as (description, settings) by name. All but the first set only the order."""
     order = defaults((*ORDER_FIELDS, "own_policy", "profile"))
     return {
-        "Default": ("What a render does unless told otherwise.", order),
+        "Default": ("Default settings.", order),
         "Reference: none, 1 lane": (
-            "Arrival order, one lane, rays as generated: what orders and lanes are measured "
-            "against.",
+            "Arrival order, one lane, rays as generated: the baseline for orders and lanes.",
             order | {"policy": "none", "lanes": 1, "ray_order": "slot", "shadow_order": "slot"},
         ),
         "Lanes only: none, widest": (
-            "Arrival order in full lanes: what lanes give without an order.",
+            "Arrival order in full lanes: the gain of lanes without an order.",
             order | {"policy": "none", "ray_order": "slot", "shadow_order": "slot"},
         ),
         "Placebo: random-runs": (
-            "Runs of one material in an order that means nothing: what the order of runs has to "
-            "beat.",
+            "Runs of one material in random order: the baseline for the order of runs.",
             order | {"policy": "random-runs"},
         ),
         "Oracle: reference integrator": (
-            "One path at a time, depth first: what every picture must equal.",
+            "One path at a time, depth first: the reference for every picture.",
             order | {"integrator": "reference", "traversal": "single"},
         ),
     }

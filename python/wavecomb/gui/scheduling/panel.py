@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scheduling panel: every choice of order and amount of work, switched while it renders."""
+"""Scheduling panel: settings of order and amount of work, which can change during a render."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _PROFILE_FILTER = "Cost profile (*.json);;All files (*)"
 
 
 class SchedulingPanel(QScrollArea):
-    """Shows and changes the session's scheduling; keeps nothing but loaded policies."""
+    """Panel of the session's scheduling settings. Its only state are loaded policies."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -73,14 +73,15 @@ class SchedulingPanel(QScrollArea):
         self._show(session.setup)
 
     def shutdown(self) -> None:
-        """Ends the thread of the light."""
+        """Ends the thread of the picture light."""
         self.light.shutdown()
 
-    # ---- what it is made of ---------------------------------------------------------------------
+    # ---- construction
+    # --------------------------------------------------------------------------------
 
     def _presets_row(self) -> QHBoxLayout:
         row = QHBoxLayout()
-        self._preset = named(QComboBox(), "preset", "Preset", "Sets the whole group below.")
+        self._preset = named(QComboBox(), "preset", "Preset", "Sets the group below.")
         self._preset.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
@@ -93,7 +94,7 @@ class SchedulingPanel(QScrollArea):
         self._preset.activated.connect(
             lambda index: self._session.change(**self._preset.itemData(index))
         )
-        tip = "Sets all of this panel back to what a render does by default."
+        tip = "Resets this panel to the default settings."
         reset = named(QPushButton("Reset"), "reset", "Reset", tip)
         reset.clicked.connect(self._reset)
         row.addWidget(self._preset, 1)
@@ -111,21 +112,21 @@ class SchedulingPanel(QScrollArea):
         form.addRow(self.light)
         self._try = named(
             QPushButton("Try every policy"), "try_every_policy", "Try every policy",
-            "Renders the picture with each policy in turn and compares the bits; then sets the "
-            "policy back. Press the button again to stop.",
+            "Renders the picture with each policy in turn and compares the bits; then restores "
+            "the policy. Press again to stop.",
         )  # fmt: skip
         self._try.clicked.connect(self._try_every_policy)
         form.addRow(self._try)
         buttons: dict[str, tuple[tuple[str, str, str, Any], ...]] = {
             "policy": (
-                ("load_policy", "Load…", "Load a policy of your own: a Python file that "
+                ("load_policy", "Load…", "Load a custom policy: a Python file that "
                  "defines a subclass of wavecomb.SchedulingPolicy.", self._ask_policy),
-                ("reload_policy", "↻", "Load the file again, after an edit.",
+                ("reload_policy", "↻", "Reload the file after an edit.",
                  self._reload_policy),
             ),
             "costs": (
-                ("load_profile", "File…", "Start from the costs of an earlier render: the "
-                 "file that its --costs FILE.json wrote.", self._ask_profile),
+                ("load_profile", "File…", "Start with the costs of an earlier render: "
+                 "the file written by --costs FILE.json.", self._ask_profile),
             ),
         }  # fmt: skip
         for one in choices.fields_of("order", without=("progressive",)):
@@ -143,7 +144,8 @@ class SchedulingPanel(QScrollArea):
             add_row(form, one.label, control, field)
         return group
 
-    # ---- what it does ---------------------------------------------------------------------------
+    # ---- actions
+    # -------------------------------------------------------------------------------------
 
     def _choose(self, field: str, value: Any) -> None:
         if field == "policy":
@@ -198,7 +200,10 @@ class SchedulingPanel(QScrollArea):
         ask_file(self, "Load a policy", _POLICY_FILTER, self.load_policy, start=start)
 
     def load_policy(self, path: str) -> None:
-        """Offers the policies of a Python file and chooses the first; errors become messages."""
+        """Offers the policies of a Python file and selects the first.
+
+        Errors are shown as messages.
+        """
         try:
             policies = load_policies(path)
         except Exception as error:
@@ -208,7 +213,7 @@ class SchedulingPanel(QScrollArea):
         box = self._box("policy")
         for policy in policies:
             count = self._loads[policy.name] = self._loads.get(policy.name, 0) + 1
-            # An edited policy is another one: its runs make a series of their own.
+            # An edited policy counts as another one, so its runs form a separate series.
             name = policy.name if count == 1 else f"{policy.name} {count}"
             own = OwnPolicy(policy, path, name)
             box.add(own, name, f"{first_line(policy)} ({Path(path).name})")
@@ -223,7 +228,7 @@ class SchedulingPanel(QScrollArea):
         ask_file(self, "Load costs", _PROFILE_FILTER, self.load_profile)
 
     def load_profile(self, path: str) -> None:
-        """Starts renders from the costs in a file; errors become messages."""
+        """Starts renders with the costs in a file. Errors are shown as messages."""
         from wavecomb.run.costs import load_costs
 
         try:
@@ -234,7 +239,8 @@ class SchedulingPanel(QScrollArea):
         self._box("costs").add(profile, Path(path).name, f"From {path}, then measured.")
         self._choose("costs", profile)
 
-    # ---- every policy in turn -------------------------------------------------------------------
+    # ---- trying all policies
+    # -------------------------------------------------------------------------
 
     def _try_every_policy(self) -> None:
         if self.rounds.running:

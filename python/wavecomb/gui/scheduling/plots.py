@@ -32,7 +32,7 @@ pg.setConfigOptions(antialias=True)
 
 @dataclass(frozen=True)
 class Bar:
-    """A rectangle of a horizontal bar chart: from ``start`` to ``end`` in row ``y``."""
+    """A rectangle of a horizontal bar chart, from ``start`` to ``end`` in row ``y``."""
 
     y: float
     height: float
@@ -43,15 +43,15 @@ class Bar:
 
 
 class AmountAxis(pg.AxisItem):
-    """Ticks as 20 k and 1.5 M."""
+    """Axis with tick labels such as 20 k and 1.5 M."""
 
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
-        """Texts of ticks."""
+        """Returns the labels of ticks."""
         return [count_text(value * scale) for value in values]
 
 
 class Plot(pg.PlotWidget):
-    """A plot without mouse traps: it follows the theme, and its data are always all in view."""
+    """Plot that follows the theme, always shows all data and ignores the mouse."""
 
     def __init__(self, name: str, title: str, parent: QWidget | None = None) -> None:
         axes = {side: AmountAxis(side) for side in ("left", "bottom")}
@@ -68,31 +68,31 @@ class Plot(pg.PlotWidget):
         self.retheme()
 
     def retheme(self) -> None:
-        """Takes the colours of the theme."""
+        """Applies the colours of the theme."""
         self.setBackground(theme.surface())
         for name in ("left", "bottom"):
             axis = self.getAxis(name)
             axis.setPen(theme.dim())
             axis.setTextPen(theme.text())
             axis.setTickPen(theme.grid())
-            axis.setZValue(-1000)  # lines behind bars and curves
+            axis.setZValue(-1000)  # draws grid lines behind bars and curves
         colour = theme.text().name()
         self.getPlotItem().setTitle(html.escape(self._title), color=colour, size=_points())
 
     def name_it(self, title: str) -> None:
-        """Another title."""
+        """Changes the title."""
         if title != self._title:
             self._title = title
             self.setAccessibleName(title)
             self.retheme()
 
     def wheelEvent(self, event: object) -> None:
-        """Scrolls what is around it."""
+        """Passes the wheel on to the surrounding scroll area."""
         event.ignore()  # type: ignore[attr-defined]
 
 
 class Curves(Plot):
-    """Curves over seconds of rendering, one for each series; from zero up."""
+    """Curves over seconds of rendering, one for each series, with a y axis that starts at 0."""
 
     def __init__(self, name: str, title: str) -> None:
         super().__init__(name, title)
@@ -103,7 +103,7 @@ class Curves(Plot):
     def show_curves(
         self, curves: Sequence[tuple[Sequence[float], Sequence[float], QColor, bool]]
     ) -> None:
-        """Draws (times, values, colour, strong); strong: the one that goes on."""
+        """Draws (times, values, colour, strong) curves; strong marks the current run."""
         self.clear()
         for times, values, colour, strong in curves:
             width = max(1.0, 0.2 * theme.em() if strong else 0.12 * theme.em())
@@ -122,7 +122,7 @@ class Curves(Plot):
 
 
 class Bars(Plot):
-    """Horizontal bars in rows with names; the first row is at the top."""
+    """Horizontal bars in named rows, the first row at the top."""
 
     def __init__(self, name: str, title: str, *, names: bool = True) -> None:
         super().__init__(name, title)
@@ -135,11 +135,11 @@ class Bars(Plot):
 
     @property
     def bars(self) -> list[Bar]:
-        """What is drawn."""
+        """The bars that are drawn."""
         return self._bars
 
     def show_bars(self, rows: Sequence[str], bars: Sequence[Bar], most: float = 0.0) -> None:
-        """Draws bars; ``most``: where the axis ends, 0: at the longest bar."""
+        """Draws bars. The axis ends at ``most`` or, if that is 0, at the longest bar."""
         self._bars = list(bars)
         self.clear()
         by_colour: dict[str, list[Bar]] = {}
@@ -172,7 +172,7 @@ class Bars(Plot):
         left.setWidth(round(widest + theme.em(0.9)))
 
     def bar_at(self, x: float, y: float) -> Bar | None:
-        """The bar at a place in data coordinates."""
+        """Returns the bar at a position in data coordinates, or None."""
         for bar in self._bars:
             if bar.start <= x <= bar.end and abs(y - bar.y) <= bar.height / 2:
                 return bar
@@ -189,7 +189,7 @@ class Bars(Plot):
 
 
 class Legend(QLabel):
-    """Names with their colours, below a plot, so that it can lie over no bar; wraps."""
+    """Names with their colours, in wrapped text below a plot, where they cover no bars."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -201,12 +201,12 @@ class Legend(QLabel):
         theme.on_change(self.retheme)
 
     def show_entries(self, entries: Callable[[], Sequence[tuple[str, QColor]]]) -> None:
-        """Takes what gives (name, colour): asked again when the theme changes."""
+        """Shows (name, colour) pairs. The function is called again when the theme changes."""
         self._entries = entries
         self.retheme()
 
     def retheme(self) -> None:
-        """Takes the colours of the theme."""
+        """Applies the colours of the theme."""
         text = " &nbsp; ".join(
             f'<span style="color:{colour.name()}">&#9632;</span>&nbsp;'
             + html.escape(name).replace(" ", "&nbsp;")
@@ -220,15 +220,15 @@ def _points() -> str:
     return f"{QApplication.font().pointSizeF():.1f}pt"
 
 
-# ---- Where the time of the threads goes: a stacked bar for each series ---------------------------
+# ---- Thread time by phase: a stacked bar for each series
+# ------------------------------------------
 
 
 SHARE, EACH, TIME = "share of time", "ns per sample", "over time"
 MODES = {
-    SHARE: "What part of the threads' time each phase took, for each series.",
-    EACH: "Thread nanoseconds that a camera path takes in each phase: shorter is faster, where "
-    "the work is the same.",
-    TIME: "The share of each phase in the run that goes on, from its start at the top to now.",
+    SHARE: "Fraction of thread time in each phase, for each series.",
+    EACH: "Thread nanoseconds per camera path in each phase. At equal work, shorter is faster.",
+    TIME: "Fraction of each phase in the current run, from its start (top) to now.",
 }
 _TITLES = {
     SHARE: "Phases: % of thread time",
@@ -236,7 +236,7 @@ _TITLES = {
     TIME: "Phases of this run, from its start (top) to now: % of thread time",
 }
 _MOST_STRETCHES = 12
-# Of a colour: phases that belong together; the number lightens or darkens it.
+# Base colour and brightness of each phase. Related phases share a base colour.
 _COLOURS = {
     "generate": (2, 100),
     "order_rays": (3, 100),
@@ -252,18 +252,18 @@ _COLOURS = {
 
 
 def phase_colour(name: str) -> QColor:
-    """The colour of a phase: shades of one for keys, sort and materialize, and for traversal."""
+    """Returns the colour of a phase."""
     number, lighter = _COLOURS[name]
     return theme.series(number).lighter(lighter)
 
 
 def phases_between(a: Look, b: Look) -> dict[str, float]:
-    """Thread seconds of each phase between two looks."""
+    """Returns the thread seconds of each phase between two readings of the counters."""
     return {name: b.phases.get(name, 0.0) - a.phases.get(name, 0.0) for name in PHASES}
 
 
 def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode: str) -> list[Bar]:
-    """The bars of one row, end to end; ``scale``: from seconds to what is shown."""
+    """Returns the bars of one row, end to end. ``scale`` converts seconds to the shown unit."""
     bars = []
     start = 0.0
     total = sum(seconds.values())
@@ -279,19 +279,19 @@ def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode:
 
 
 def rows_over_time(run: Run) -> list[tuple[Look, Look]]:
-    """At most a dozen stretches of a run, of about the same length."""
+    """Returns at most a dozen intervals of a run, of similar length."""
     least = run.last.seconds / _MOST_STRETCHES
     return stretches(run, least_s=0.999 * least) or stretches(run)
 
 
 class PhasePlot(QWidget):
-    """The plot, what it shows, and its legend."""
+    """Plot of phases with its legend and a choice of units."""
 
     def __init__(self) -> None:
         super().__init__()
         self.mode = QComboBox()
         self.mode.setObjectName("phase_mode")
-        self.mode.setAccessibleName("What the bars of phases show")
+        self.mode.setAccessibleName("Unit of the bars of phases")
         for i, (name, tip) in enumerate(MODES.items()):
             self.mode.addItem(name)
             self.mode.setItemData(i, tip, Qt.ItemDataRole.ToolTipRole)
@@ -314,7 +314,7 @@ class PhasePlot(QWidget):
     def show_series(
         self, series: Sequence[Series], labels: Sequence[str], current: Series | None
     ) -> None:
-        """Draws."""
+        """Draws the phases of the series."""
         mode = self.mode.currentText()
         self.plot.name_it(_TITLES[mode])
         bars: list[Bar] = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live plots: where time goes, how coherent queues are, what materials cost, how runs compare."""
+"""Live plots: time by phase, coherence of queues, costs of materials, comparison of runs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Curve = Callable[[Run], tuple[list[float], list[float]]]
 
 
 class PlotsPanel(QWidget):
-    """Collects the session's statistics into runs and draws them, the tab that is seen only."""
+    """Panel that sorts the session's statistics into runs, and draws them in the visible tab."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -46,10 +46,10 @@ class PlotsPanel(QWidget):
         self.tabs.addTab(self.runs, "Runs")
         for i, tip in enumerate(
             (
-                "Phases of the threads, and samples and rays a second.",
+                "Phases of the threads, and samples and rays per second.",
                 "Lane utilisation, run length and homogeneity of queues.",
-                "What a record of each material costs, and how many there are.",
-                "The last runs and how they compare.",
+                "Cost per record and number of records of each material.",
+                "Comparison of recent runs.",
             )
         ):
             self.tabs.setTabToolTip(i, tip)
@@ -71,11 +71,12 @@ class PlotsPanel(QWidget):
         theme.on_change(self.refresh)
         self.refresh()
 
-    # ---- what it is made of ---------------------------------------------------------------------
+    # ---- construction
+    # --------------------------------------------------------------------------------
 
     def _time_tab(self) -> QWidget:
-        samples = self._add_curves("samples_rate", "Samples a second", _rates("samples"))
-        rays = self._add_curves("rays_rate", "Rays a second", _rates("rays"))
+        samples = self._add_curves("samples_rate", "Samples per second", _rates("samples"))
+        rays = self._add_curves("rays_rate", "Rays per second", _rates("rays"))
         return self._grid(
             (self.phases, 0, 0, 2), (samples, 1, 0, 1), (rays, 1, 1, 1), stretch=(3, 2)
         )
@@ -101,9 +102,9 @@ class PlotsPanel(QWidget):
             (self._add_curves("lane_utilisation", "Lane utilisation, %", lanes), 0, 0, 1),
             (self._add_curves("run_length", "Run length, records",
                               coherence("run_length")), 0, 1, 1),
-            (self._add_curves("material_homogeneity", "Neighbours: one material, %",
+            (self._add_curves("material_homogeneity", "Neighbours: same material, %",
                               coherence("material_homogeneity", 100.0)), 1, 0, 1),
-            (self._add_curves("texture_homogeneity", "Neighbours: one texture place, %",
+            (self._add_curves("texture_homogeneity", "Neighbours: same texture position, %",
                               coherence("texture_homogeneity", 100.0)), 1, 1, 1),
             stretch=(1, 1),
         )  # fmt: skip
@@ -125,7 +126,8 @@ class PlotsPanel(QWidget):
             grid.setRowStretch(row, weight)
         return tab
 
-    # ---- what comes in --------------------------------------------------------------------------
+    # ---- incoming statistics
+    # -------------------------------------------------------------------------
 
     def _take(self, statistics: dict[str, Any]) -> None:
         if not statistics.get("seconds", {}).get("render"):
@@ -143,10 +145,11 @@ class PlotsPanel(QWidget):
         if whole and self.log.finish():
             self.refresh()
 
-    # ---- what is shown --------------------------------------------------------------------------
+    # ---- display
+    # -------------------------------------------------------------------------------------
 
     def shown(self) -> list[Series]:
-        """The newest series of the picture that is looked at, and what they are compared with."""
+        """Returns the newest series of the current picture, and their reference series."""
         current = self.log.current
         if current is None:
             return []
@@ -154,7 +157,7 @@ class PlotsPanel(QWidget):
         return last_of(same, MAX_CURVES, self.log.base)
 
     def refresh(self) -> None:
-        """Draws the tab that is seen."""
+        """Draws the visible tab."""
         if not self.isVisible():
             return
         series = self.shown()
@@ -181,7 +184,7 @@ class PlotsPanel(QWidget):
         self._line.setText(summary(current))
 
     def showEvent(self, event: object) -> None:
-        """Draws what came in while it was hidden."""
+        """Draws data that arrived while the panel was hidden."""
         super().showEvent(event)  # type: ignore[arg-type]
         self.refresh()
 
@@ -195,13 +198,13 @@ def _entries(series: Sequence[Series], names: Sequence[str]) -> list[tuple[str, 
 
 
 def summary(series: Series | None) -> str:
-    """The run that goes on, in one line."""
+    """Returns a summary of the current run in one line."""
     if series is None:
         return EMPTY
     run = series.run
     samples = rate(run, "samples")
     text = f"{count_text(samples.value)} samples/s and {count_text(rate(run, 'rays').value)} rays/s"
     if samples.is_short:
-        return f"{text} over {samples.seconds:.1f} s: too few looks to mean anything."
-    spread = f"± {100 * samples.spread:.0f} % from stretch to stretch"
+        return f"{text} over {samples.seconds:.1f} s: too short to have meaning."
+    spread = f"± {100 * samples.spread:.0f} % between intervals"
     return f"{text} over {samples.seconds:.1f} s ({spread})."

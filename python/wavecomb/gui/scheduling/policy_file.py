@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scheduling policies of a researcher's own, from a Python file; no Qt."""
+"""User-written scheduling policies, loaded from a Python file. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from wavecomb.scheduling import SchedulingPolicy, check_policy
 
 
 def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
-    """One object of each SchedulingPolicy that the file defines, in the order of the file.
+    """Creates one object of each SchedulingPolicy that a file defines, in the order of the file.
 
-    The file is run. It is run anew each time, so an edited file can be loaded again.
+    Executes the file on each call, so an edited file can be loaded again.
 
     Raises:
-        WavecombError: It cannot be read or run, or has no policy that could serve; one line that
-            names the file and, where it is known, the line in it.
+        WavecombError: The file cannot be read or executed, or has no valid policy. The message is
+            one line that names the file and, if known, the line in it.
     """
     path = Path(path)
     module = _run(path)
@@ -43,11 +43,11 @@ def load_policies(path: str | os.PathLike[str]) -> list[SchedulingPolicy]:
 
 
 class OwnPolicy(SchedulingPolicy):
-    """A loaded policy for a live render: what its ``order`` raises is told in one line.
+    """A loaded policy for a live render, whose exceptions become one-line errors.
 
     Attributes:
-        path: Its file.
-        policy: What was loaded.
+        path: File of the policy.
+        policy: The loaded policy.
     """
 
     def __init__(self, policy: SchedulingPolicy, path: str | os.PathLike[str], name: str) -> None:
@@ -57,16 +57,19 @@ class OwnPolicy(SchedulingPolicy):
         self.columns = policy.columns  # type: ignore[misc]
 
     def order(self, queue: Any, costs: Any, keys: Any) -> bool | None:
-        """Passes on to the policy."""
+        """Calls the loaded policy."""
         try:
             return self.policy.order(queue, costs, keys)
         except Exception as error:
             message = describe_failure(error, self.path)
-            raise WavecombError(f"{message}; mend it and load it again") from error
+            raise WavecombError(f"{message}; fix it and load it again") from error
 
 
 def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
-    """One line that says what went wrong in a policy, and where in its file if it was there."""
+    """Describes an error of a policy in one line.
+
+    Includes the line number if the error is in the policy's file.
+    """
     name = os.fspath(path)
     if isinstance(error, SyntaxError):
         line = error.lineno
@@ -79,7 +82,7 @@ def describe_failure(error: BaseException, path: str | os.PathLike[str]) -> str:
 
 
 def first_line(policy: SchedulingPolicy) -> str:
-    """What its docstring says in the first line; its name where there is none."""
+    """Returns the first line of a policy's docstring, or its name."""
     text = vars(type(policy)).get("__doc__") or ""
     return text.strip().splitlines()[0] if text.strip() else policy.name
 
@@ -92,7 +95,7 @@ def _run(path: Path) -> types.ModuleType:
         why = str(error) if error.strerror is None else f"{path}: {error.strerror}"
         raise WavecombError(why) from None
     except UnicodeDecodeError:
-        raise WavecombError(f"{path}: is no text in UTF-8; choose a Python file") from None
+        raise WavecombError(f"{path}: is not UTF-8 text; choose a Python file") from None
     module = types.ModuleType(f"wavecomb_policy_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickle look there

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the same picture with several settings in turn, and then goes back to what there was."""
+"""Renders the same image with several settings in turn, then restores the original settings."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from wavecomb.gui.viewport.session import Frame, Session
 
 LIMIT_MS = 20_000
-"""So long a step may take: of a slower render the part that was done counts."""
+"""Largest duration of a step in milliseconds. A slower render counts with its progress so far."""
 
 
 class Rounds(QObject):
-    """One step is some settings, rendered to the end or for ``LIMIT_MS``.
+    """Sequence of steps, each of which renders with some settings to the end or for ``LIMIT_MS``.
 
-    Whoever changes something meanwhile takes over: the rounds end there and nothing is put back.
+    Any change from outside ends the sequence, without restoring the original settings.
 
     Signals:
-        moved(int, int): Steps done and steps in all.
+        moved(int, int): Number of finished steps, and of all steps.
         ended(bool): Whether all steps were done.
     """
 
@@ -44,11 +44,11 @@ class Rounds(QObject):
 
     @property
     def running(self) -> bool:
-        """Whether there is a step to come or under way."""
+        """Whether there are unfinished steps."""
         return bool(self._steps)
 
     def start(self, steps: Sequence[Mapping[str, Any]]) -> None:
-        """Begins; a step is fields of the setup. All steps name the same fields."""
+        """Starts the sequence. Steps are fields of the setup, with the same names in all steps."""
         if not steps or self.running or self._session.stage is None:
             return
         self._steps = list(steps)
@@ -58,25 +58,25 @@ class Rounds(QObject):
         self._begin()
 
     def stop(self) -> None:
-        """Ends, and goes back to the settings that were there."""
+        """Stops, and restores the original settings."""
         if self.running:
             self._end(False, put_back=True)
 
     def _begin(self) -> None:
         session = self._session
-        self._version = -1  # a change of ours
+        self._version = -1  # marks the following change as one of this object
         version = session.version
         if not session.change(**self._steps[self._done]):
-            return  # told by failed, which ends the rounds
+            return  # the failed signal ends the sequence
         if session.version == version:
-            session.restart()  # the settings were there already
+            session.restart()  # the settings are the current ones
         self._version = session.version
         self._timer.start(LIMIT_MS)
 
     def _look(self, frame: Frame) -> None:
         ours = self.running and frame.version == self._version
         if ours and frame.final and frame.scale == 1 and not frame.status.get("cancelled"):
-            self._version = -1  # denoised versions of this frame are no news
+            self._version = -1  # ignores denoised versions of this frame
             self._timer.start(0)
 
     def _next(self) -> None:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of live renders, kept as runs and series; no Qt.
+"""Statistics of live renders, sorted into runs and series. Independent of Qt.
 
-A *look* is what the counters of a render said at one moment. A *run* is one render from its start
-to the next restart: its settings held all the while. Runs of the same settings and the same
-picture are repeats and make up a *series*.
+A *look* is a reading of a render's counters at one moment. A *run* is one render from its start to
+the next restart, with constant settings. Runs with the same settings and the same picture are
+repeats and form a *series*.
 """
 
 from __future__ import annotations
@@ -16,24 +16,25 @@ from wavecomb.options import names
 from wavecomb.run.stats import COHERENCE, PHASES, SORTING
 
 WORK = names("work", without=("spp",))
-"""Settings that change how much is done, and with it the noise."""
+"""Settings that change the amount of work, and thus the noise."""
 
 FIELDS = (*names("order", without=("progressive",)), *WORK)
-"""Settings by which series are told apart; all but those of ``WORK`` leave the picture as it is."""
+"""Settings that distinguish series. All but those of ``WORK`` leave the image unchanged."""
 
 MAX_LOOKS = 240
-"""More are thinned out, so that a long render costs no more memory than a short one."""
+"""Largest number of looks in a run. More are thinned out, so that memory use is bounded."""
 MAX_SERIES = 100
 SHORTEST_S = 0.25
-"""An abandoned run that was shorter is forgotten: it says nothing, as while orbiting."""
+"""Shortest abandoned run that is kept, in seconds. Shorter ones, as while orbiting, have no
+meaning."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """Counters since the start of a run."""
+    """Values of the counters since the start of a run."""
 
     seconds: float
-    """Wall time of rendering, without pauses."""
+    """Wall time of rendering in seconds, without pauses."""
     samples: int = 0
     rays: int = 0
     """Camera, bounce and shadow rays."""
@@ -42,11 +43,12 @@ class Look:
     phases: Mapping[str, float] = field(default_factory=dict)
     """Thread seconds by phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Run length and homogeneities over the run so far: they come as ratios, not as counters."""
+    """Run length and homogeneity, as means over the run so far. The core reports ratios instead of
+    counters for them."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:
-    """The counters of a statistics dict (docs/statistics.md), finished or not."""
+    """Reads the counters of a statistics dictionary (docs/statistics.md)."""
     counts = stats.get("counts", {})
     phases = stats.get("phases_s", {})
     coherence = stats.get("coherence", {})
@@ -64,80 +66,81 @@ def take_look(stats: Mapping[str, Any]) -> Look:
 
 @dataclass
 class Run:
-    """One render: looks in order of time, the first of all zeros."""
+    """One render, as looks in order of time, of which the first has only zeros."""
 
     looks: list[Look] = field(default_factory=lambda: [Look(0.0)])
     stats: Mapping[str, Any] = field(default_factory=dict)
-    """The last statistics."""
+    """The latest statistics."""
     finished: bool = False
 
     @property
     def last(self) -> Look:
-        """What the counters say now."""
+        """The latest look."""
         return self.looks[-1]
 
     def add(self, stats: Mapping[str, Any]) -> None:
-        """One more look."""
+        """Adds a look."""
         look = take_look(stats)
         self.stats = stats
         if look.seconds <= self.last.seconds:
-            return  # nothing has passed since the one before
+            return  # no time has passed since the previous look
         self.looks.append(look)
         if len(self.looks) > MAX_LOOKS:
             self.looks = [*self.looks[:-1:2], look]
 
     def continues(self, look: Look) -> bool:
-        """Whether a look can be a later one of this run: counters only go up."""
+        """Returns whether a look can belong to this run, whose counters never decrease."""
         last = self.last
         return not self.finished and look.seconds >= last.seconds and look.samples >= last.samples
 
     def lane_utilisation(self) -> float:
-        """Records / (packets x lanes), 0 to 1; 0 before anything was shaded."""
+        """Returns records / (packets x lanes), 0 to 1; 0 before anything was shaded."""
         return ratio(self.last.records, self.last.packet_lanes)
 
     def shading_ns(self) -> float:
-        """Thread nanoseconds a record for order and shading: keys, sort, materialize and shade."""
+        """Returns thread ns per record for keys, sort, materialize and shade."""
         seconds = sum(self.last.phases.get(name, 0.0) for name in (*SORTING, "shade"))
         return 1e9 * ratio(seconds, self.last.records)
 
     def run_length(self) -> float:
-        """Mean length of runs of one material, in records."""
+        """Returns the mean length of runs of one material, in records."""
         return self.last.coherence.get("run_length", 0.0)
 
 
 @dataclass
 class Series:
-    """All runs of the same settings on the same picture."""
+    """All runs with the same settings and the same picture."""
 
     number: int
     settings: Mapping[str, Any]
     picture: Hashable
-    """What else decides how much there is to do: scene, edits, camera, size, seed ..."""
+    """Everything else that determines the amount of work, such as scene, edits, camera, size and
+    seed."""
     changed: str
-    """What is different from the series before."""
+    """Description of the differences from the previous series."""
     runs: list[Run] = field(default_factory=list)
     recipe: Mapping[str, Any] = field(default_factory=dict)
-    """What to set to have these settings again."""
+    """Fields of a setup that restore these settings."""
 
     @property
     def run(self) -> Run:
-        """The newest."""
+        """The newest run."""
         return self.runs[-1]
 
     @property
     def best(self) -> Run:
-        """The one to show: the longest, since that is the surest."""
+        """The longest run, which has the smallest statistical error."""
         return max(self.runs, key=lambda run: run.last.seconds)
 
     def does_the_work_of(self, other: Series) -> bool:
-        """Whether both do the same work, so that times can be compared."""
+        """Returns whether both do the same work, so that their times can be compared."""
         return self.picture == other.picture and all(
             self.settings.get(name) == other.settings.get(name) for name in WORK
         )
 
 
 class RunLog:
-    """Sorts statistics into runs, and runs into series."""
+    """Log that sorts statistics into runs, and runs into series."""
 
     def __init__(self) -> None:
         self.series: list[Series] = []
@@ -153,10 +156,14 @@ class RunLog:
         finished: bool = False,
         recipe: Mapping[str, Any] | None = None,
     ) -> Series:
-        """Takes one statistics dict; gives the series that it went into.
+        """Adds statistics and returns the series that they belong to.
 
-        ``settings``: those of ``FIELDS`` that are known. ``finished``: the render is at its end.
-        ``recipe``: what to set to have them again.
+        Args:
+            stats: Statistics of the render.
+            settings: Values of the fields in ``FIELDS``, as far as known.
+            picture: Everything else that determines the amount of work.
+            finished: Whether the render has ended.
+            recipe: Fields of a setup that restore the settings.
         """
         known = {name: settings[name] for name in FIELDS if name in settings}
         look = take_look(stats)
@@ -168,7 +175,7 @@ class RunLog:
             series.runs.append(Run())
         elif not series.run.continues(look):
             if series.run.finished and look.samples == series.run.last.samples:
-                return series  # the last statistics of a finished run, once more
+                return series  # repeated statistics of a finished run
             self._end_run()
             if series not in self.series:
                 self.series.append(series)
@@ -179,7 +186,7 @@ class RunLog:
         return series
 
     def finish(self) -> bool:
-        """The render that goes on came to its end; False where that was known."""
+        """Marks the current run as finished. Returns False if it was already."""
         if self._current is None or self._current.run.finished:
             return False
         self._current.run.finished = True
@@ -187,12 +194,12 @@ class RunLog:
 
     @property
     def current(self) -> Series | None:
-        """The one that renders now, or did last."""
+        """The current series, which renders now or rendered last."""
         return self._current
 
     @property
     def base(self) -> Series | None:
-        """What others are compared with: the pinned series, else the first of this picture."""
+        """Series that others are compared with: the pinned one, else the first of this picture."""
         if self.pinned is not None:
             return self.pinned
         if self._current is None:
@@ -202,11 +209,11 @@ class RunLog:
         )
 
     def pin(self, series: Series | None) -> None:
-        """Chooses what others are compared with; None: the first of the picture."""
+        """Pins the series that others are compared with; None means the first of the picture."""
         self.pinned = series
 
     def clear(self) -> None:
-        """Forgets all but the run that goes on."""
+        """Removes all runs but the current one."""
         self.pinned = None
         self.series = [self._current] if self._current is not None else []
         for series in self.series:
@@ -233,7 +240,7 @@ class RunLog:
         return series
 
     def _end_run(self) -> None:
-        """Forgets the run that goes on if it was too short to mean anything."""
+        """Removes the current run if it was too short to have meaning."""
         series = self._current
         if series is None or series.run.finished or series.run.last.seconds >= SHORTEST_S:
             return
@@ -245,7 +252,7 @@ class RunLog:
 
 
 def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """What of ``after`` is not as in ``before``, in the order of ``FIELDS``."""
+    """Returns the values of ``after`` that differ from ``before``, in the order of ``FIELDS``."""
     return {
         name: after[name] for name in FIELDS if name in after and before.get(name) != after[name]
     }
@@ -275,7 +282,7 @@ _OFF = ("adaptive", "noise", "time_limit")
 
 
 def describe(settings: Mapping[str, Any]) -> str:
-    """Settings in few words, for labels.
+    """Describes settings in few words, for labels.
 
     >>> describe({"policy": "material", "lanes": 1, "wave_size": 0, "ray_order": "slot"})
     'material, 1 lane, wave auto, rays slot'
@@ -296,9 +303,9 @@ def describe(settings: Mapping[str, Any]) -> str:
 
 
 def labels(series: Sequence[Series]) -> list[str]:
-    """A label for each: its values of those settings that are not the same in all.
+    """Returns a label for each series: the values of those settings that are not equal in all.
 
-    The policy leads, since that is what is compared most; series of other pictures get a number.
+    The policy comes first, because policies are compared most often. Equal labels get numbers.
     """
     varying = [
         name
@@ -316,12 +323,12 @@ def labels(series: Sequence[Series]) -> list[str]:
 
 
 def ratio(above: float, below: float) -> float:
-    """Their quotient; 0 where there is nothing to divide by."""
+    """Returns the quotient of two numbers, or 0 for a divisor of 0."""
     return above / below if below > 0 else 0.0
 
 
 def last_of(series: Iterable[Series], count: int, keep: Series | None = None) -> list[Series]:
-    """The newest ``count``, among them ``keep`` (say, the pinned one) if it is there at all."""
+    """Returns the newest ``count`` series, including ``keep`` if the log has it."""
     every = list(series)
     newest = every[-count:]
     if keep is not None and keep in every and keep not in newest:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fast a run is, how sure that is, and how it compares with another; no Qt.
+"""Speed of runs, its uncertainty, and comparison of runs. Independent of Qt.
 
-A rate is taken over the whole of a run, in which its settings held, never over a moment. Its
-spread is that of the stretches between looks. Two runs of one picture are compared stretch by
-stretch at equal samples: both have then done the same work, since paths do not depend on the
-order of shading, and what is dear in the picture weighs alike. What both share, above all a
-machine that is slower at one time than at another, no single pair of runs can show: a difference
-is *held* only where repeats agree.
+A rate is measured over a whole run with constant settings, never over a moment. Its spread is the
+one between the intervals of consecutive looks. Two runs of one picture are compared interval by
+interval at equal samples. Both have then done the same work, since paths do not depend on the order
+of shading, and expensive parts of the image have equal weights. No single pair of runs can reveal
+effects on a whole run, above all a machine whose speed drifts. A difference therefore *holds* only
+if repeated pairs agree.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ MIN_SECONDS = 1.0
 MIN_REPEATS = 3
 _MAX_STRETCHES = 20
 
-# 97.5 % quantiles of Student's t by degrees of freedom 1 ... 30; beyond, the normal's.
+# 97.5 % quantiles of Student's t for 1 ... 30 degrees of freedom. Above, the normal quantile is
+# used.
 _T975 = (
     12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
     2.201, 2.179, 2.160, 2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
@@ -34,20 +35,20 @@ _T975 = (
 
 @dataclass(frozen=True)
 class Rate:
-    """Something a second."""
+    """A number of events per second."""
 
     value: float
     spread: float
-    """Standard deviation of the stretches over the mean; 0 where there are fewer than two."""
+    """Standard deviation over intervals divided by the mean; 0 with fewer than two intervals."""
     stretches: int
-    """Or runs; what the spread is over."""
+    """Number of intervals or runs that the spread is computed from."""
     seconds: float
 
     least: int = MIN_STRETCHES
 
     @property
     def is_short(self) -> bool:
-        """Too little was measured to mean anything."""
+        """Whether the measurement is too short to have meaning."""
         return self.stretches < self.least or self.seconds < MIN_SECONDS
 
 
@@ -58,23 +59,23 @@ class Ratio:
     value: float
     low: float
     high: float
-    """End of a 95 % interval that begins at ``low``; 0 and infinity where nothing can be said."""
+    """End of a 95 % interval that begins at ``low``; 0 and infinity if it is unknown."""
     repeats: int
-    """Pairs of runs; 1: the interval is over stretches of one pair, and misses drift."""
+    """Number of pairs of runs. With 1, the interval is over one pair and does not cover drift."""
     short: bool = False
 
     @property
     def differs(self) -> bool:
-        """The interval leaves out 1."""
+        """Whether the interval excludes 1."""
         return not self.short and (self.low > 1.0 or self.high < 1.0)
 
     @property
     def holds(self) -> bool:
-        """Differs, and repeats say so."""
+        """Whether the ratio differs from 1 with enough repeats."""
         return self.differs and self.repeats >= MIN_REPEATS
 
     def verdict(self) -> str:
-        """In words, for a table."""
+        """Returns the verdict in words, for a table."""
         if self.short:
             return "too short"
         if self.repeats < MIN_REPEATS:
@@ -85,7 +86,7 @@ class Ratio:
 
 
 def stretches(run: Run, least_s: float = 0.0) -> list[tuple[Look, Look]]:
-    """Neighbouring looks, where shorter stretches than ``least_s`` are part of the next one."""
+    """Returns pairs of consecutive looks, joining intervals shorter than ``least_s``."""
     pairs = []
     start = run.looks[0]
     for look in run.looks[1:]:
@@ -96,7 +97,7 @@ def stretches(run: Run, least_s: float = 0.0) -> list[tuple[Look, Look]]:
 
 
 def rate(run: Run, counter: str) -> Rate:
-    """The rate of "samples", "rays" or "records" over the whole run."""
+    """Returns the rate of "samples", "rays" or "records" over the whole run."""
     last = run.last
     value = ratio(getattr(last, counter), last.seconds)
     pairs = stretches(run, least_s=0.05)
@@ -104,7 +105,7 @@ def rate(run: Run, counter: str) -> Rate:
     if n < 2 or value <= 0.0:
         return Rate(value, 0.0, n, last.seconds)
     total = sum(b.seconds - a.seconds for a, b in pairs)
-    # Weighted by time: a stretch half as long says half as much.
+    # Weights are proportional to time.
     squares = sum(
         (getattr(b, counter) - getattr(a, counter) - value * (b.seconds - a.seconds)) ** 2
         / (b.seconds - a.seconds)
@@ -115,7 +116,10 @@ def rate(run: Run, counter: str) -> Rate:
 
 
 def rate_of(series: Series, counter: str) -> Rate:
-    """Over all whole runs of a series; its spread is that of the runs, where there are several."""
+    """Returns the rate over all finished runs of a series.
+
+    With several, its spread is over runs.
+    """
     runs = _whole(series.runs)
     if len(runs) == 1:
         return rate(runs[0], counter)
@@ -128,7 +132,7 @@ def rate_of(series: Series, counter: str) -> Rate:
 
 
 def moments(run: Run, counter: str) -> tuple[list[float], list[float]]:
-    """For a curve: times (the middle of each stretch) and the rate in it."""
+    """Returns the middle of each interval, in seconds, and the rate in it, for a curve."""
     pairs = stretches(run)
     times = [(a.seconds + b.seconds) / 2 for a, b in pairs]
     values = [
@@ -138,7 +142,7 @@ def moments(run: Run, counter: str) -> tuple[list[float], list[float]]:
 
 
 def compare_runs(run: Run, base: Run) -> Ratio:
-    """Speed of ``run`` over that of ``base``, as far as both have come."""
+    """Returns the speed of ``run`` over that of ``base``, up to the samples that both have."""
     samples = min(run.last.samples, base.last.samples)
     seconds = min(time_of(run, samples), time_of(base, samples))
     if samples <= 0 or seconds <= 0.0:
@@ -154,7 +158,7 @@ def compare_runs(run: Run, base: Run) -> Ratio:
     ends = [samples * k / n for k in range(n + 1)]
     mine = [time_of(run, b) - time_of(run, a) for a, b in pairwise(ends)]
     theirs = [time_of(base, b) - time_of(base, a) for a, b in pairwise(ends)]
-    # The ratio estimator sum(theirs) / sum(mine); its variance is that of theirs - value * mine.
+    # The estimator is sum(theirs) / sum(mine). Its variance is the one of theirs - value * mine.
     rest = [b - value * a for a, b in zip(mine, theirs, strict=True)]
     error = math.sqrt(sum(r * r for r in rest) * n / (n - 1)) / sum(mine)
     half = t975(n - 1) * error / value
@@ -162,9 +166,9 @@ def compare_runs(run: Run, base: Run) -> Ratio:
 
 
 def compare(series: Series, base: Series) -> Ratio | None:
-    """Speed of ``series`` as a multiple of the base's; None where they do not the same work.
+    """Returns the speed of ``series`` as a multiple of the base's, or None if their work differs.
 
-    The i-th runs of both are a pair, so that repeats taken in turn meet what is nearest in time.
+    The i-th runs of both form a pair, so that alternating repeats pair runs that are close in time.
     """
     if not series.does_the_work_of(base):
         return None
@@ -184,7 +188,7 @@ def compare(series: Series, base: Series) -> Ratio | None:
 
 
 def time_of(run: Run, samples: float) -> float:
-    """Seconds after which a run had so many samples, linear between looks."""
+    """Returns the seconds that a run took for a number of samples, interpolated between looks."""
     looks = run.looks
     i = bisect_left([look.samples for look in looks], samples)
     if i == 0:
@@ -197,7 +201,7 @@ def time_of(run: Run, samples: float) -> float:
 
 
 def t975(degrees: int) -> float:
-    """The 97.5 % quantile of Student's t distribution.
+    """Returns the 97.5 % quantile of Student's t distribution.
 
     >>> t975(2), t975(1000)
     (4.303, 1.96)
@@ -206,5 +210,5 @@ def t975(degrees: int) -> float:
 
 
 def _whole(runs: Sequence[Run]) -> list[Run]:
-    """Runs that came to their end, if there are any: others may have seen half a picture."""
+    """Returns the finished runs, or all runs if none is finished."""
     return [run for run in runs if run.finished] or list(runs)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of runs, as rows, text and CSV; no Qt."""
+"""Table of runs, as rows, text and CSV. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ COLUMNS = (
     "changed",
 )
 _TIPS = {
-    "settings": "Those that are not the same in all rows.",
-    "changed": "What is different from the series before.",
-    "runs": "Renders with these settings. What is no rate is of the longest.",
-    "samples/s": "Over all time in which the settings held. In brackets where that was too short "
-    "to mean anything.",
-    "spread": "Standard deviation of samples/s: over runs, or over the stretches of a single one.",
+    "settings": "Settings that differ between rows.",
+    "changed": "Differences from the previous series.",
+    "runs": "Renders with these settings. Columns without rates show the longest one.",
+    "samples/s": "Over the whole time with these settings. In brackets if that was too short "
+    "to have meaning.",
+    "spread": "Standard deviation of samples/s: over runs, or over intervals of a single run.",
     "rays/s": "Camera, bounce and shadow rays.",
-    "ns/record": "Thread time of keys, sort, materialize and shade, for each record.",
+    "ns/record": "Thread time of keys, sort, materialize and shade, per record.",
     "lanes used": "Records / (packets x lanes).",
     "run length": "Records in an unbroken run of one material.",
-    "speed": "As a multiple of the pinned row, or of the first of this picture, at equal samples.",
-    "95 %": "Interval of the speed: over repeats, or over stretches where there is one pair only.",
-    "verdict": "A difference holds where three repeats agree that there is one.",
+    "speed": "Relative to the pinned row, or to the first of this picture, at equal samples.",
+    "95 %": "Interval of the speed: over repeats, or over intervals of a single pair.",
+    "verdict": "A difference holds if three repeats confirm it.",
 }
 TIPS = {name: _TIPS[name] for name in COLUMNS}
 LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))
@@ -50,18 +50,18 @@ LEFT = tuple(COLUMNS.index(name) for name in ("settings", "verdict", "changed"))
 
 @dataclass(frozen=True)
 class Row:
-    """One series."""
+    """A row of the table, for one series."""
 
     series: Series
     label: str
     texts: tuple[str, ...]
-    """One for each of ``COLUMNS``."""
+    """Texts for ``COLUMNS``."""
     ratio: Ratio | None
     is_base: bool
 
 
 def rows(log: RunLog, count: int = 20) -> list[Row]:
-    """The last series, oldest first, compared with the base."""
+    """Returns rows of the newest series, the oldest first, compared with the base."""
     base = log.base
     shown = [one for one in last_of(log.series, count, log.pinned) if one.runs]
     names = labels(shown)
@@ -104,7 +104,7 @@ def _ratio_texts(ratio: Ratio | None) -> tuple[str, str, str]:
 
 
 def as_text(table: Sequence[Row]) -> str:
-    """Columns in line, for a mail or a notebook."""
+    """Formats the table as aligned text, for a mail or a notebook."""
     cells = [COLUMNS, *(row.texts for row in table)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(COLUMNS))]
     return "\n".join(
@@ -117,7 +117,10 @@ def as_text(table: Sequence[Row]) -> str:
 
 
 def as_csv(table: Sequence[Row]) -> str:
-    """One line for each run, all settings, plain numbers; times in seconds."""
+    """Formats the table as CSV.
+
+    Each run has one line, with all settings as plain values and times in seconds.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     phases = list(table[0].series.best.last.phases) if table else []

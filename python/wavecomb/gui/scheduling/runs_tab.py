@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the last runs: pinned, compared, repeated, copied, saved."""
+"""Tab with the table of recent runs, which can be pinned, repeated, copied and saved."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from wavecomb.gui.widgets import ask_file, named
 from wavecomb.picture.files import reason, replacing
 
 NOTE = (
-    f"Rates are over the whole time in which the settings held; in brackets: less than "
-    f"{MIN_SECONDS:g} s or too few looks, so that they mean nothing. Speeds are at equal samples "
-    f"of the same picture. A difference counts only when {MIN_REPEATS} repeats agree: machines "
-    "drift. For figures to publish, use wavecomb bench."
+    f"Rates are over the whole time with these settings; those in brackets are over less than "
+    f"{MIN_SECONDS:g} s and have no meaning. Speeds are at equal samples of the same picture. A "
+    f"difference holds only if {MIN_REPEATS} repeats agree, because the speed of machines "
+    "drifts. For results to publish, use wavecomb bench."
 )
 
 
 class RunsTab(QWidget):
-    """Shows a log; asks for its redrawing where it changed it.
+    """Tab that shows a log of runs.
 
     Signals:
-        changed(): Another run was pinned, or runs were forgotten.
+        changed(): Another run was pinned, or runs were removed, so plots must be redrawn.
     """
 
     changed = Signal()
@@ -73,15 +73,15 @@ class RunsTab(QWidget):
         row = QHBoxLayout()
         self._made: dict[str, QPushButton] = {}
         for name, text, tip, call in (
-            ("pin", "Pin", "Compares the others with the chosen row; again: with the first.",
+            ("pin", "Pin", "Compares all rows with the chosen one; press again for the first.",
              self.pin),
             ("repeat", "Repeat both", "Renders the settings of the base and of the chosen row (or "
-             f"the current ones) {MIN_REPEATS} times in turn, then goes back. Press again to "
+             f"the current ones) {MIN_REPEATS} times, then the old settings. Press again to "
              "stop.", self.repeat),
             ("copy", "Copy", "Copies the table as text.", self.copy),
             ("save", "Save CSV…", "Writes all runs shown, with all settings and phases, one line "
              "each.", self._ask_save),
-            ("clear", "Clear", "Forgets all runs but the one that goes on.", self.clear),
+            ("clear", "Clear", "Removes all runs but the current one.", self.clear),
         ):  # fmt: skip
             button = named(QPushButton(text), f"runs_{name}", text, tip)
             button.clicked.connect(call)
@@ -90,10 +90,11 @@ class RunsTab(QWidget):
         row.addStretch(1)
         return row
 
-    # ---- what is shown --------------------------------------------------------------------------
+    # ---- display
+    # -------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Shows the log as it is."""
+        """Shows the current contents of the log."""
         self._rows = rows(self._log)
         colours: dict[tuple[int, int], QColor] = {}
         for i, row in enumerate(self._rows):
@@ -109,7 +110,7 @@ class RunsTab(QWidget):
         self._enable()
 
     def chosen(self) -> Series | None:
-        """The series of the selected row."""
+        """Returns the series of the selected row, or None."""
         lines = self.view.selectionModel().selectedRows()
         if not lines or lines[0].row() >= len(self._rows):
             return None
@@ -130,16 +131,17 @@ class RunsTab(QWidget):
             return None
         return (base, other) if base.picture == other.picture else None
 
-    # ---- what it does ---------------------------------------------------------------------------
+    # ---- actions
+    # -------------------------------------------------------------------------------------
 
     def pin(self) -> None:
-        """Pins the chosen row, or unpins it."""
+        """Pins the selected row, or unpins it."""
         chosen = self.chosen()
         self._log.pin(None if chosen is self._log.pinned else chosen)
         self.changed.emit()
 
     def repeat(self) -> None:
-        """Renders base and chosen in turn, or stops that."""
+        """Renders the base and the selected series in turn, or stops doing so."""
         if self.rounds.running:
             self.rounds.stop()
             return
@@ -155,14 +157,14 @@ class RunsTab(QWidget):
         self._enable()
 
     def copy(self) -> None:
-        """The table as text, on the clipboard."""
+        """Copies the table to the clipboard as text."""
         QGuiApplication.clipboard().setText(as_text(self._rows))
 
     def _ask_save(self) -> None:
         ask_file(self, "Save runs", "CSV (*.csv)", self.save, start="runs.csv", ending="csv")
 
     def save(self, path: str) -> None:
-        """Writes the runs as CSV, whole or not at all; errors become messages."""
+        """Writes the runs as CSV, never partially. Errors are shown as messages."""
         text = as_csv(self._rows)
 
         def work() -> None:
@@ -175,6 +177,6 @@ class RunsTab(QWidget):
         self._session.run("saving runs", work)
 
     def clear(self) -> None:
-        """Forgets all runs but the one that goes on."""
+        """Removes all runs but the current one."""
         self._log.clear()
         self.changed.emit()

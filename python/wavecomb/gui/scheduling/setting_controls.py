@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controls that show a setting and change it: no state of their own."""
+"""Stateless controls that show and change a setting."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from PySide6.QtWidgets import (
 from wavecomb.gui.scheduling.choices import Choice, Number
 
 Changed = Callable[[str, Any], None]
-"""Called with field and value when a person chose something."""
+"""Callback with field and value, called when the user chose a value."""
 
 
 class _CalmWheel(QObject):
-    """Lets the wheel scroll the panel unless the control has the focus."""
+    """Event filter that leaves the wheel to the panel unless the control has the focus."""
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Passes the wheel on."""
+        """Ignores wheel events without focus."""
         is_wheel = event.type() == QEvent.Type.Wheel
         passes = is_wheel and isinstance(watched, QWidget) and not watched.hasFocus()
         if passes:
@@ -36,13 +36,16 @@ class _CalmWheel(QObject):
 
 
 def calm(widget: QWidget) -> None:
-    """The wheel changes it only where it has the focus, so that scrolling restarts no render."""
+    """Makes a widget react to the wheel only with focus.
+
+    Otherwise scrolling a panel would change settings and restart renders.
+    """
     widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
     widget.installEventFilter(_CalmWheel(widget))
 
 
 class ChoiceBox(QComboBox):
-    """A setting with names to choose from; 0 is shown as "auto"."""
+    """Combo box of a setting with named values; 0 is shown as "auto"."""
 
     def __init__(self, choice: Choice, changed: Changed, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -59,7 +62,7 @@ class ChoiceBox(QComboBox):
         self.activated.connect(lambda index: changed(self.field, self.itemData(index)))
 
     def fill(self, values: Mapping[Any, str]) -> None:
-        """Offers these values."""
+        """Replaces the offered values."""
         with QSignalBlocker(self):
             self.clear()
             for value, tip in values.items():
@@ -67,12 +70,12 @@ class ChoiceBox(QComboBox):
         self._retell()
 
     def add(self, value: Any, text: str, tip: str) -> None:
-        """Offers one more value."""
+        """Adds an offered value."""
         self.addItem(text, value)
         self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
 
     def show_value(self, value: Any) -> None:
-        """Shows what is set, without changing anything; a value that is not offered is added."""
+        """Shows a value without emitting a change. Adds the value if it is not offered."""
         index = self.find(value)
         with QSignalBlocker(self):
             if index < 0:
@@ -82,7 +85,7 @@ class ChoiceBox(QComboBox):
         self._retell()
 
     def find(self, value: Any) -> int:
-        """The index of a value, -1 where it is not offered."""
+        """Returns the index of a value, or -1 if it is not offered."""
         for index in range(self.count()):
             data = self.itemData(index)
             if data is value or (type(data) is type(value) and data == value):
@@ -97,7 +100,7 @@ class ChoiceBox(QComboBox):
 
 
 def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
-    """A setting that is a number; it counts when typing is done."""
+    """Creates a number box whose value takes effect when typing ends."""
     box: QSpinBox | QDoubleSpinBox
     if number.decimals:
         box = QDoubleSpinBox()
@@ -123,18 +126,18 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
 
 
 def control_of(row: Choice | Number, changed: Changed) -> Control:
-    """The control of a setting, whatever it is: all bars and panels have theirs from here."""
+    """Creates the control of a setting, for all bars and panels."""
     return ChoiceBox(row, changed) if isinstance(row, Choice) else number_box(row, changed)
 
 
 def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | None = None) -> None:
-    """Adds a control with its label, whose tooltip is that of the control.
+    """Adds a control with its label, which shares the control's tooltip.
 
     Args:
         form: The form.
-        label: Text.
+        label: Text of the label.
         control: The control.
-        field: The control with buttons beside it, where it has some.
+        field: Widget with the control and its buttons, if it has any.
     """
     text = QLabel(label)
     text.setBuddy(control)
@@ -143,7 +146,7 @@ def add_row(form: QFormLayout, label: str, control: QWidget, field: QWidget | No
 
 
 def show_control(control: Control, value: Any) -> None:
-    """Shows what is set, without changing anything."""
+    """Shows a value without emitting a change."""
     if isinstance(control, ChoiceBox):
         control.show_value(value)
     else:
@@ -151,7 +154,7 @@ def show_control(control: Control, value: Any) -> None:
 
 
 def show_number(box: QSpinBox | QDoubleSpinBox, value: float) -> None:
-    """Shows what is set, without changing anything."""
+    """Shows a value without emitting a change."""
     with QSignalBlocker(box):
         if isinstance(box, QSpinBox):
             box.setValue(int(value))
@@ -163,7 +166,7 @@ Control = ChoiceBox | QSpinBox | QDoubleSpinBox
 
 
 def value_text(value: Any) -> str:
-    """A value for people.
+    """Formats a value for people.
 
     >>> value_text(0), value_text(65536), value_text("slot")
     ('auto', '65\u202f536', 'slot')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The amount of work: roulette, choice of lights and adaptive sampling."""
+"""Controls for the amount of work: roulette, light selection and adaptive sampling."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from wavecomb.gui.scheduling.setting_controls import (
 )
 from wavecomb.gui.viewport.session import Session, Setup
 
-_MODE = Choice("adaptive_mode", "Adaptive", "How samples are spread.", choices.ADAPTIVE_MODES)
+_MODE = Choice("adaptive_mode", "Adaptive", "Distribution of samples.", choices.ADAPTIVE_MODES)
 _FIRST = {"adaptive": 0.02, "noise": 0.02}
-"""What a target is when it is first switched on."""
+"""Initial targets when adaptive sampling is switched on."""
 
 
 class WorkGroup(QGroupBox):
-    """Settings that change how much is done, and so the noise."""
+    """Group of settings that change the amount of work, and thus the noise."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__("Amount of work", parent)
@@ -37,7 +37,7 @@ class WorkGroup(QGroupBox):
         self._targets = dict(_FIRST)
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        note = QLabel("These change the noise, and not what the picture converges to.")
+        note = QLabel("These change the noise, but not the expectation of the picture.")
         note.setWordWrap(True)
         form.addRow(note)
         self._mode = ChoiceBox(_MODE, self._choose_mode)
@@ -61,7 +61,7 @@ class WorkGroup(QGroupBox):
         }
         setup = self._session.setup
         if mode != "off" and setup.spp < setup.min_spp:
-            values["min_spp"] = setup.spp  # or the core refuses it
+            values["min_spp"] = setup.spp  # the core requires spp to be at least min_spp
         if not self._session.change(**values):
             self._show(setup)
 
@@ -80,5 +80,5 @@ class WorkGroup(QGroupBox):
 
 
 def mode_of(setup: Setup) -> str:
-    """Which of the two targets is set; the core takes one of them."""
+    """Returns the adaptive mode of a setup, which has at most one of the two targets."""
     return "pixel" if setup.adaptive else "noise" if setup.noise else "off"

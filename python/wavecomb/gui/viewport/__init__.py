@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live picture: what is shown, how, and from where."""
+"""The live image: rendering, display and camera."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras that can be looked through: a free one, then those of the stage. No widgets."""
+"""Cameras of the view: a free one, then those of the stage. No widgets."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _ROOT = QModelIndex()
 
 
 class CamerasModel(QAbstractListModel):
-    """Names, and paths as ``Qt.ItemDataRole.UserRole``; None of the free camera.
+    """List of camera names, with paths as ``Qt.ItemDataRole.UserRole`` (None for the free camera).
 
     Signals:
-        moved(): Another row is looked through: ``row``.
+        moved(): ``row``, the current camera, changed.
     """
 
     moved = Signal()
@@ -37,13 +37,13 @@ class CamerasModel(QAbstractListModel):
 
     @property
     def row(self) -> int:
-        """The row of the camera that is looked through."""
+        """Row of the current camera."""
         pose = self._session.pose
         path = pose.path if pose is not None else None
         return self.paths.index(path) if path in self.paths else 0
 
     def choose(self, row: int) -> None:
-        """Looks through another."""
+        """Changes to another camera."""
         self._session.use_camera(self.paths[row])
 
     def _fill(self, stage: LoadedStage | None) -> None:
@@ -56,11 +56,11 @@ class CamerasModel(QAbstractListModel):
         self.moved.emit()
 
     def rowCount(self, parent: Any = _ROOT) -> int:
-        """As Qt has it."""
+        """Returns the number of cameras."""
         return 0 if parent.isValid() else len(self.paths)
 
     def data(self, index: Any, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """As Qt has it."""
+        """Returns the name or path of a camera."""
         path = self.paths[index.row()]
         if role == Qt.ItemDataRole.UserRole:
             return path

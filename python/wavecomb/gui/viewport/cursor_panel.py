@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A panel about one pixel: that under the cursor, or the one that was clicked."""
+"""Base of panels about one pixel, which is under the cursor or was clicked."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from wavecomb.gui.viewport.session import Session
 
 
 class CursorPanel(QWidget):
-    """Is filled anew, a moment later, when the pixel or the picture is another.
+    """Panel that is refilled with a short delay when the pixel or the image changes.
 
     Attributes:
-        follow: Whether the pixel is that under the cursor.
+        follow: Check box for following the cursor.
     """
 
     def __init__(
         self, session: Session, name: str, later_ms: int, parent: QWidget | None = None
     ) -> None:
-        """``name``: of the object, and of what is in it."""
+        """Creates the panel. ``name`` is the object name of the panel and prefix of its parts."""
         super().__init__(parent)
         self.setObjectName(name)
         self._session = session
@@ -34,12 +34,12 @@ class CursorPanel(QWidget):
         session.frame.connect(lambda frame: self._soon())
 
     def hover(self, pixel: tuple[int, int] | None) -> None:
-        """The cursor is over this pixel."""
+        """Handles the pixel under the cursor."""
         if self.follow.isChecked() and pixel is not None:
             self.pick(pixel)
 
     def pick(self, pixel: tuple[int, int]) -> None:
-        """This pixel was clicked."""
+        """Handles a clicked pixel."""
         self._pixel = pixel
         self._soon()
 
@@ -48,5 +48,5 @@ class CursorPanel(QWidget):
             self._timer.start()
 
     def _fill(self) -> None:
-        """Shows what there is of the pixel."""
+        """Shows the data of the pixel."""
         raise NotImplementedError

@@ -16,7 +16,7 @@ from wavecomb.picture.layer_view import heat
 
 
 class DirectionsView(QWidget):
-    """Shows an array of twice as many columns as rows; nothing until ``show_map``."""
+    """View of an array with twice as many columns as rows; empty until ``show_map``."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -28,21 +28,21 @@ class DirectionsView(QWidget):
 
     @property
     def image(self) -> QImage | None:
-        """What is shown."""
+        """The shown image, or None."""
         return self._image
 
     def sizeHint(self) -> QSize:
-        """Twice as wide as high."""
+        """Returns a size twice as wide as high."""
         return QSize(theme.em(20), theme.em(10))
 
     def show_map(
         self, values: NDArray[Any] | None, mark: tuple[float, float] | None = None
     ) -> None:
-        """Draws values from 0 to their largest, and a ring.
+        """Draws values from 0 to their maximum in false colours, with a ring.
 
         Args:
-            values: (height, 2 height); None: nothing.
-            mark: Place of the ring, from 0 to 1 each way.
+            values: Array (height, 2 height); None clears the view.
+            mark: Position of the ring, from 0 to 1 in each direction, or None.
         """
         self._image, self._mark = None, mark
         if values is not None:
@@ -50,7 +50,7 @@ class DirectionsView(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draws the map as large as there is room for, and the ring."""
+        """Draws the map as large as possible, and the ring."""
         if self._image is None:
             return
         wide = min(self.width(), 2 * self.height())

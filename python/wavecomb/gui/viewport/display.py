@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Float layers to what a screen shows: exposure, views of OpenColorIO, false colours. No Qt."""
+"""Conversion of float layers to screen pixels: exposure, OpenColorIO views, false colours.
+
+Independent of Qt.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +24,14 @@ _NAN = (255, 0, 255)
 
 @dataclass(frozen=True)
 class Look:
-    """How a layer is shown.
+    """Settings for displaying a layer.
 
     Attributes:
-        layer: Its name.
-        exposure: In stops, of light.
+        layer: Name of the layer.
+        exposure: Exposure of colours, in stops.
         view: "Linear", "Neutral" or an OCIO view.
-        low: Of the false colours; None: from the picture.
-        high: Likewise.
+        low: Lower end of the false colours; None takes it from the image.
+        high: Upper end of the false colours; None takes it from the image.
     """
 
     layer: str = "beauty"
@@ -39,12 +42,12 @@ class Look:
 
 
 def views() -> list[str]:
-    """Names for ``Look.view``."""
+    """Returns the names for ``Look.view``."""
     return [LINEAR, NEUTRAL, *ocio.views()]
 
 
 def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
-    """Linear Rec.709 to 8-bit codes.
+    """Converts linear Rec.709 to 8-bit values.
 
     "Linear" and "Neutral" are ``wavecomb.picture.image.display`` with "clamp" and "neutral".
 
@@ -63,22 +66,23 @@ def develop(rgb: NDArray[Any], exposure: float, view: str) -> NDArray[np.uint8]:
 
 
 def show(layer: NDArray[Any], look: Look) -> Shown:
-    """A layer as the screen shows it.
+    """Converts a layer to screen pixels.
 
     Args:
         layer: (height, width) or (height, width, channels).
-        look: ``look.layer`` says what it is.
+        look: Display settings; ``look.layer`` is the name of the layer.
     """
     light = functools.partial(develop, exposure=look.exposure, view=look.view)
     return show_layer(layer, look.layer, light, low=look.low, high=look.high)
 
 
-# ---- Turns a layer of a frame into what the screen shows. No Qt ----------------------------------
+# ---- Conversion of a layer of a frame to screen pixels. Independent of Qt
+# -------------------------
 
 
 @dataclass(frozen=True)
 class Developed:
-    """A frame, how it is looked at, and what that gives."""
+    """A frame, its display settings, and the resulting pixels."""
 
     frame: Frame
     look: Look
@@ -86,7 +90,7 @@ class Developed:
 
 
 def develop_frame(frame: Frame, look: Look) -> Developed:
-    """A layer of a frame for the screen; the beauty where it does not have the layer yet."""
+    """Converts a layer of a frame to screen pixels, or the beauty if the frame lacks the layer."""
     layer = frame.layer(look.layer)
     if layer is None:
         return Developed(frame, look, show(frame.beauty, replace(look, layer="beauty")))

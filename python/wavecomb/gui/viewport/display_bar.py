@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the picture is shown: layer, exposure, view, range of false colours, zoom."""
+"""Tool bar for displaying the image: layer, exposure, view, range of false colours, zoom."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ from wavecomb.run import aovs as aov_names
 from wavecomb.run import expressions
 
 EXPOSURE = 10.0
-"""Stops, to both sides."""
+"""Range of the exposure in stops, in both directions."""
 EXPRESSION = expressions.PREFIX
-"""Among the layers: asks for a light path expression."""
+"""Entry of the layer box that opens the dialog for light path expressions."""
 _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 
 
 @cache
 def _titles() -> dict[str, str]:
-    """Layers that the bar offers, in its order."""
+    """Returns the titles of the offered layers, in their order."""
     own = {name: row.title for name, row in aov_names.core_aovs().items() if row.title}
     last = {"samples": "Samples", "error": "Error", "variance": "Variance"}
     return {"beauty": "Beauty", "denoised": "Denoised", **own, **last}
 
 
 def _title(layer: str) -> str:
-    """A layer as the bar calls it."""
+    """Returns the title of a layer."""
     if layer == EXPRESSION:
         return "Light path\u2026"
     if layer.startswith(expressions.LAYER):
@@ -55,12 +55,12 @@ def _title(layer: str) -> str:
 
 
 class DisplayBar(QToolBar):
-    """Controls of what the viewport shows. Choosing a layer that is not kept restarts the render.
+    """Tool bar of display settings. Choosing a layer that is not rendered restarts the render.
 
     Attributes:
-        layer: Which layer.
-        exposure: In stops.
-        view: Tone mapping.
+        layer: Control of the layer.
+        exposure: Control of the exposure in stops.
+        view: Control of the tone mapping.
     """
 
     def __init__(self, session: Session, viewport: Viewport, parent: QWidget | None = None) -> None:
@@ -72,7 +72,7 @@ class DisplayBar(QToolBar):
         self.layer = choice(
             "display.layer",
             "Layer",
-            "Which layer is shown; one that is not kept yet starts the render again",
+            "Displayed layer; a layer that is not rendered yet restarts the render",
             [],
             lambda text: self.choose_layer(self.layer.currentData()),
         )
@@ -95,7 +95,7 @@ class DisplayBar(QToolBar):
         self.view = choice(
             "display.view",
             "View",
-            "How light becomes colour: Linear (as `wavecomb render --png`), Neutral (highlights "
+            "Tone mapping: Linear (as `wavecomb render --png`), Neutral (highlights "
             "rolled off), or a view of OpenColorIO; $OCIO chooses the configuration",
             display.views(),
             self.set_view,
@@ -108,16 +108,16 @@ class DisplayBar(QToolBar):
             box.view().setTextElideMode(Qt.TextElideMode.ElideNone)
         self.automatic = named(
             QCheckBox("Auto range"), "display.auto", "Automatic range",
-            "False colours from the picture's least to its greatest value",
+            "False colours from the smallest to the largest value of the picture",
         )  # fmt: skip
         self.automatic.setChecked(True)
         self.automatic.toggled.connect(self._range_changed)
-        self.low = self._bound("display.low", "Least value of the false colours")
-        self.high = self._bound("display.high", "Greatest value of the false colours")
+        self.low = self._bound("display.low", "Smallest value of the false colours")
+        self.high = self._bound("display.high", "Largest value of the false colours")
         self.zoom = choice(
             "display.zoom",
             "Zoom",
-            "Device pixels a pixel; Ctrl+wheel zooms, right drag shifts the picture",
+            "Screen pixels per image pixel; Ctrl+wheel zooms, right drag pans",
             _ZOOMS,
             self._zoom_chosen,
         )
@@ -154,7 +154,10 @@ class DisplayBar(QToolBar):
     # ---- layers ----------------------------------------------------------------------------------
 
     def _fill_layers(self) -> None:
-        """Those with titles, light groups where there are several, expressions that are kept."""
+        """Fills the box of layers.
+
+        It offers layers with titles, light groups if there are several, and rendered expressions.
+        """
         scene, names = self._session.scene, list(_titles())
         groups = () if scene is None else scene.light_groups
         further = [aov_names.LIGHT + group for group in groups] if len(groups) > 1 else []
@@ -171,7 +174,7 @@ class DisplayBar(QToolBar):
         self.layer.setCurrentIndex(max(self.layer.findData(self._viewport.look.layer), 0))
 
     def ask_expression(self) -> ExpressionDialog:
-        """Asks for a light path expression, whose layer is then shown."""
+        """Opens the dialog for a light path expression, whose layer is then shown."""
         if self._dialog is None:
             self._dialog = ExpressionDialog(self._session, self.choose_layer, self)
         self._dialog.show()
@@ -179,7 +182,7 @@ class DisplayBar(QToolBar):
         return self._dialog
 
     def choose_layer(self, name: str) -> None:
-        """Shows a layer; asks the render for it where it is not kept."""
+        """Shows a layer. Restarts the render with the layer if it is missing."""
         setup = self._session.setup
         if name == EXPRESSION:
             self._show_current()
@@ -202,7 +205,7 @@ class DisplayBar(QToolBar):
         return self._session.change(aovs=(*setup.aovs, name))
 
     def step_layer(self, by: int) -> None:
-        """The next layer that is there already, or the one before."""
+        """Shows the next or previous layer of the current frame."""
         frame = self._session.last_frame
         if frame is None:
             return
@@ -212,7 +215,7 @@ class DisplayBar(QToolBar):
         self.choose_layer(names[(at + by) % len(names)])
 
     def _setup_changed(self, setup: Setup) -> None:
-        """Denoising switched on or off changes what is shown of the beauty."""
+        """Switches between beauty and denoised layer when denoising changes."""
         shown = self._viewport.look.layer
         if setup.denoise and not self._denoising and shown == "beauty":
             self.choose_layer("denoised")
@@ -226,14 +229,14 @@ class DisplayBar(QToolBar):
     # ---- exposure and view -----------------------------------------------------------------------
 
     def set_exposure(self, stops: float) -> None:
-        """In stops."""
+        """Sets the exposure in stops."""
         stops = min(max(stops, -EXPOSURE), EXPOSURE)
         set_quietly(self.exposure, stops)
         set_quietly(self.slider, round(stops * 20))
         self._apply(exposure=stops)
 
     def set_view(self, name: str) -> None:
-        """Tone mapping; one that is not there is passed over."""
+        """Sets the tone mapping. Ignores an unknown name."""
         index = self.view.findText(name)
         if index >= 0:
             self.view.setCurrentIndex(index)
@@ -281,14 +284,15 @@ class DisplayBar(QToolBar):
             self.zoom.addItem(text)
         self.zoom.setCurrentText(text)
 
-    # ---- kept between runs -----------------------------------------------------------------------
+    # ---- saved settings
+    # ------------------------------------------------------------------------------
 
     def restore(self, settings: QSettings) -> None:
-        """View and exposure of the last time."""
+        """Restores the saved view."""
         self.set_view(str(settings.value("display/view", display.LINEAR)))
         if (problem := ocio.problem()) is not None:
             self._session.warned.emit(problem)
 
     def keep(self, settings: QSettings) -> None:
-        """For the next time."""
+        """Saves the view for the next session."""
         settings.setValue("display/view", self._viewport.look.view)

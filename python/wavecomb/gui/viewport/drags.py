@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What buttons and modifiers mean in the picture."""
+"""Mouse buttons and modifiers of the viewport."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 
 class Drag(Enum):
-    """What a pressed button does."""
+    """Action of a pressed button."""
 
     NONE = auto()
     ORBIT = auto()
@@ -33,7 +33,7 @@ Alt, Control, Shift = (
 
 
 def drag_of(button: Qt.MouseButton, modifiers: Qt.KeyboardModifier) -> Drag:
-    """As in Blender (middle button) and usdview (Alt)."""
+    """Returns the action of a button, as in Blender (middle button) and usdview (Alt)."""
     if button == Middle:
         if modifiers & Shift:
             return Drag.PAN

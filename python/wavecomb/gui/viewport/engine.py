@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The thread that renders: takes the newest task, ends the running one, hands out frames.
+"""Render thread of a live render: takes the newest task, stops the previous one, returns frames.
 
-Knows nothing of Qt. A task first gives a reduced picture, where the whole one would take long,
-and then the whole one, pass by pass.
+Independent of Qt. If the full image would take long, a task first renders a reduced image. Then it
+renders the full image pass by pass.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ if TYPE_CHECKING:
 
 SCALES = (1, 2, 3, 4, 6, 8, 12)
 MOVING_S = 1 / 15
-"""Aim for a picture while something moves."""
+"""Target time of an image during movements, in seconds."""
 QUICK_S = 0.15
-"""A whole pass that takes longer than this has a reduced picture before it."""
+"""Time of a full pass above which a reduced image comes first, in seconds."""
 LOOK_S = 0.05
 STATISTICS_S = 0.5
 
 
 @dataclass
 class Edit:
-    """Changes to a scene, to be made together; later ones win."""
+    """Changes of a scene that are applied together. Later values replace earlier ones."""
 
     camera: dict[str, Any] | None = None
     materials: dict[int, dict[str, Any]] = field(default_factory=dict)
     lights: dict[int, dict[str, Any]] = field(default_factory=dict)
 
     def add(self, other: Edit) -> None:
-        """Takes in a later edit."""
+        """Merges a later edit."""
         self.camera = other.camera or self.camera
         for mine, others in ((self.materials, other.materials), (self.lights, other.lights)):
             for index, values in others.items():
                 mine[index] = {**mine.get(index, {}), **values}
 
     def copied(self) -> Edit:
-        """A copy: each live render adds later edits to its own."""
+        """Returns a copy, because each live render merges later edits separately."""
         return Edit(self.camera, dict(self.materials), dict(self.lights))
 
     def __bool__(self) -> bool:
@@ -57,15 +57,15 @@ class Edit:
 
 @dataclass
 class Task:
-    """What to render next.
+    """Description of the next render.
 
     Attributes:
-        setup: Checked.
-        version: That its frames carry.
-        edit: To be made first.
-        moving: Only a reduced picture is wanted.
-        loaded: For statistics.
-        renderer: To use from now on; None: the one there is.
+        setup: Checked settings.
+        version: Version number of its frames.
+        edit: Changes to apply first.
+        moving: Whether only a reduced image is wanted.
+        loaded: The loaded stage, for statistics.
+        renderer: Renderer to use from now on; None keeps the current one.
     """
 
     setup: Setup
@@ -77,23 +77,23 @@ class Task:
 
 
 class Listener(Protocol):
-    """Called on the render thread."""
+    """Receiver of results, called on the render thread."""
 
     def on_frame(self, frame: Frame) -> None:
-        """A picture."""
+        """Takes a frame."""
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Figures so far, docs/statistics.md, of the task with that version."""
+        """Takes the statistics so far (docs/statistics.md) of the task with that version."""
 
     def on_failed(self, message: str) -> None:
-        """One line; the task is given up."""
+        """Takes an error in one line. The task has ended."""
 
     def on_ready(self, renderer: Renderer) -> None:
-        """There is a new renderer."""
+        """Takes a new renderer."""
 
 
 class Engine:
-    """Owns the render thread and the renderer."""
+    """Owner of the render thread and the renderer."""
 
     def __init__(self, listener: Listener) -> None:
         self._listener = listener
@@ -114,7 +114,10 @@ class Engine:
     # ---- from any thread -----------------------------------------------------------------------
 
     def submit(self, task: Task) -> None:
-        """Ends what runs and begins this; edits of a task that was not begun yet are kept."""
+        """Stops the current task and starts this one.
+
+        Keeps the edits of a task that had not started.
+        """
         with self._condition:
             before = self._task
             if before is not None and task.renderer is None:
@@ -126,10 +129,10 @@ class Engine:
             self._condition.notify_all()
 
     def stop(self) -> None:
-        """Ends what runs; its picture is kept."""
+        """Stops the current task and keeps its image."""
         with self._condition:
             if self._task is not None:
-                self._task.moving = True  # its edits are made, a reduced picture is enough
+                self._task.moving = True  # applies its edits, for which a reduced image is enough
             self._end_running()
 
     def _end_running(self) -> None:
@@ -138,21 +141,21 @@ class Engine:
             self._renderer.stop()
 
     def pause(self) -> None:
-        """The render stands still from its next look on."""
+        """Pauses the render at its next callback."""
         self._going.clear()
 
     def resume(self) -> None:
-        """Goes on."""
+        """Resumes the render."""
         self._going.set()
 
     def is_busy(self) -> bool:
-        """Whether a task is under way or waits."""
+        """Returns whether a task is running or waiting."""
         with self._condition:
             return self._working or self._task is not None
 
     @property
     def paused(self) -> bool:
-        """Whether pause() was called last."""
+        """Whether the render is paused."""
         return not self._going.is_set()
 
     def close(self) -> None:
@@ -225,7 +228,10 @@ class Engine:
         return frame
 
     def _learn(self, seconds: float, samples: int) -> None:
-        """Samples a second, of short renders; slower news count at once, faster ones by halves."""
+        """Updates the sample rate from a short render.
+
+        Slower values count fully, faster ones by half.
+        """
         rate = samples / max(seconds - self._overhead, 1e-4)
         self._rate = rate if self._rate == 0.0 else min(rate, 0.5 * (rate + self._rate))
 
@@ -285,13 +291,13 @@ def _apply(renderer: Renderer, edit: Edit) -> None:
 
 
 def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> int:
-    """The least reduction by which one sample a pixel is expected within ``limit`` seconds.
+    """Returns the smallest reduction that renders one sample per pixel within a time limit.
 
     Args:
-        pixels: Of the whole picture.
-        rate: Samples a second; 0: not known.
-        overhead: Of any render, seconds.
-        limit: Seconds.
+        pixels: Pixels of the full image.
+        rate: Samples per second; 0 if unknown.
+        overhead: Constant time of a render, in seconds.
+        limit: Time limit in seconds.
 
     >>> reduced_scale(1_000_000, 2_000_000.0, 0.01, 0.06)
     4
@@ -305,7 +311,7 @@ def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> in
 
 
 def filled(beauty: Any, samples: Any, preview: Frame | None) -> Any:
-    """The beauty with what a reduced picture shows where there are no samples."""
+    """Returns the beauty, with pixels of a reduced image where there are no samples yet."""
     if preview is None:
         return beauty
     holes = samples == 0
@@ -316,34 +322,34 @@ def filled(beauty: Any, samples: Any, preview: Frame | None) -> Any:
 
 
 class _Stopper:
-    """Ends a render that is not wanted any more."""
+    """Watcher that stops a render when it is superseded."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
 
     def progress(self, status: Mapping[str, Any]) -> str | None:
-        """Asks for a stop, or for nothing."""
+        """Requests a stop, or nothing."""
         return "stop" if self._engine._superseded else None
 
     def snapshot(self, snapshot: Snapshot) -> None:
-        """Nobody asked for it."""
+        """Ignores snapshots, which are not requested."""
 
 
 class _Watch:
-    """What the core asks while it renders: takes frames, stands still, stops."""
+    """Watcher of a full render, which takes frames, pauses and stops."""
 
     def __init__(self, engine: Engine, task: Task, preview: Frame | None) -> None:
         self._engine = engine
         self._task = task
         self._preview = preview
         self.held_s = 0.0
-        """For so long it stood still, paused."""
+        """Total time in pauses, in seconds."""
         self._next = 0.0
         self._next_statistics = time.perf_counter() + 0.25
         self._begun = time.perf_counter()
 
     def progress(self, status: Mapping[str, Any]) -> str | None:
-        """Asks for a stop or a snapshot, or for nothing."""
+        """Requests a stop, a snapshot, or nothing."""
         engine = self._engine
         if engine._superseded:
             return "stop"
@@ -352,17 +358,17 @@ class _Watch:
         return None
 
     def snapshot(self, snapshot: Snapshot) -> None:
-        """Hands out a frame, and stands still while the engine is paused."""
+        """Sends a frame, and waits while the engine is paused."""
         if snapshot.finished or self._engine._superseded:
             return
         start = time.perf_counter()
         said = self._send(snapshot)
         now = time.perf_counter()
-        # Looking costs a tenth at most, unless that were rarer than once a second.
+        # Snapshots take at most a tenth of the time, but there is at least one per second.
         pause = max(10.0 * (now - start), 0.1 if now - self._begun < 5.0 else 0.4)
         self._next = now + min(pause, 1.0)
         if self._engine.paused:
-            if not said:  # the pause came while the frame was made
+            if not said:  # the pause began while the frame was made
                 self._send(snapshot)
             self._stand_still()
 
@@ -373,7 +379,7 @@ class _Watch:
         self.held_s += time.perf_counter() - start
 
     def _send(self, snapshot: Snapshot) -> bool:
-        """Hands out a frame; gives whether it says that the render is paused."""
+        """Sends a frame. Returns whether the frame states that the render is paused."""
         paused = self._engine.paused
         layers = layers_of_snapshot(snapshot, self._task.setup.layers())
         beauty = filled(snapshot.beauty(), layers["samples"], self._preview)
@@ -389,7 +395,7 @@ class _Watch:
 
 
 class _SoFar:
-    """A snapshot as ``make_stats`` takes results."""
+    """Adapter of a snapshot to the interface of results, for ``make_stats``."""
 
     cancelled = False
 

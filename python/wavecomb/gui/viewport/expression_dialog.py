@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A light path expression as a layer: typed, checked as it is typed, and shown."""
+"""Dialog for a light path expression, which is checked while typing and shown as a layer."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from wavecomb.gui.widgets import choice, named, set_text_colour
 from wavecomb.run import expressions
 from wavecomb.run.faults import describe
 
-OWN = "of your own"
-"""Stands for no named expression."""
+OWN = "custom"
+"""Entry that stands for an unnamed expression."""
 
 
 def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
-    """The AOVs of a setup and an expression; one of the same name makes way for it."""
+    """Returns the AOVs of a setup with an expression, which replaces one of the same name."""
     layer = expressions.LAYER + name
     others = [aov for aov in setup.aovs if expressions.layer_of(aov) != layer]
     return (*others, f"{expressions.PREFIX}{name}={text}")
 
 
 def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str:
-    """Why an expression is no layer; empty: it can be one.
+    """Returns why an expression cannot be a layer, or "" if it can.
 
     Args:
-        setup: Of the render that is to have it.
-        name: Of the layer, without ``lpe_``.
+        setup: Setup of the render.
+        name: Name of the layer, without ``lpe_``.
         text: The expression.
-        groups: The light groups of the stage.
+        groups: Light groups of the stage.
     """
     if not text.strip():
-        return "Write an expression, such as C<RD>L, or choose one that has a name."
+        return "Write an expression, such as C<RD>L, or choose a named one."
     try:
         setup.changed(aovs=aovs_with(setup, name, text))
     except Exception as error:
@@ -58,25 +58,25 @@ def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str
 
 
 class ExpressionDialog(QDialog):
-    """Asks for a name and an expression.
+    """Dialog that asks for a name and an expression.
 
     Attributes:
-        known: Named expressions to begin with.
-        name: Of the layer.
-        text: The expression.
-        note: What is wrong with it.
-        show_layer: Adds the layer and shows it.
+        known: Box of named expressions.
+        name: Field for the name of the layer.
+        text: Field for the expression.
+        note: Label with the problem of the expression.
+        show_layer: Button that adds and shows the layer.
     """
 
     def __init__(
         self, session: Session, shown: Callable[[str], object], parent: QWidget | None = None
     ) -> None:
-        """Nothing is asked of the render yet.
+        """Creates the dialog without changing the render.
 
         Args:
-            session: Whose render gets the layer.
-            shown: Called with the layer, once the render has been asked for it.
-            parent: Of the dialog.
+            session: Session whose render gets the layer.
+            shown: Called with the name of the layer after the render was restarted with it.
+            parent: Parent of the dialog.
         """
         super().__init__(parent)
         self.setObjectName("expression")
@@ -84,25 +84,25 @@ class ExpressionDialog(QDialog):
         self._session, self._shown = session, shown
         self.known = choice(
             "expression.known", "Known",
-            "Expressions that have names in Arnold and Karma; choosing one fills in the others",
+            "Expressions with names in Arnold and Karma; choosing one fills in the fields below",
             [OWN, *expressions.NAMED], self.take,
         )  # fmt: skip
         self.name = named(
             QLineEdit("lpe"), "expression.name", "Name",
-            "Of the layer, which is lpe_NAME: letters, digits and underscores",
+            "NAME of the layer lpe_NAME: letters, digits and underscores",
         )  # fmt: skip
         self.text = named(
             QLineEdit(), "expression.text", "Expression",
-            "From the camera to the light: C, then what scatters, then what shines. "
-            "C<RD>L is direct diffuse light, C<T.>.* what is seen through glass",
+            "From the camera to the light: C, then scattering events, then the emitter. "
+            "C<RD>L is direct diffuse light, C<T.>.* is everything behind glass",
         )  # fmt: skip
         self.text.setPlaceholderText("C<RD>L")
         self.text.setMinimumWidth(theme.em(24))
-        self.note = named(QLabel(), "expression.note", "Note", "What is wrong with the expression")
+        self.note = named(QLabel(), "expression.note", "Note", "Problem of the expression")
         self.note.setWordWrap(True)
         self.show_layer = named(
             QPushButton("&Show"), "expression.show", "Show",
-            "Keeps the layer from now on, which starts the render again, and shows it",
+            "Adds the layer, which restarts the render, and shows it",
         )  # fmt: skip
         self.show_layer.setDefault(True)
         self.show_layer.clicked.connect(self.accept)
@@ -140,7 +140,7 @@ class ExpressionDialog(QDialog):
         self.show_layer.setEnabled(not problem)
 
     def accept(self) -> None:
-        """Asks the render for the layer and closes."""
+        """Restarts the render with the layer and closes the dialog."""
         name = self.name.text()
         wanted = aovs_with(self._session.setup, name, self.text.text())
         if self._session.change(aovs=wanted):

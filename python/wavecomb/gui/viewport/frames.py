@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture as it stands at one moment of a live render."""
+"""Images of a live render at one moment."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ _FIELDS = ("albedo", "normal", "depth", "samples", "error", "variance")
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture of a live render; arrays are not to be written to.
+    """An image of a live render. Its arrays must not be modified.
 
     Attributes:
-        beauty: (height, width, 3), linear Rec.709. Where a pixel has no samples yet, what a reduced
-            picture of the same version showed there.
-        layers: By name, of ``setup.aovs``: (height, width) or (height, width, channels).
-        denoised: (height, width, 3); perhaps of an earlier frame of this version; None: not yet.
-        status: samples_done, samples_total, passes, seconds, error ... as ``Snapshot.status``.
-        version: Of the scene and the setup; a session shows no frame of an older one.
-        scale: 1: full size, 2: half the width and height, ...
-        final: The render has ended.
-        setup: What it was rendered with.
-        picture: What `wavecomb.render` returns; of a final frame at full size only.
+        beauty: (height, width, 3), linear Rec.709. Pixels without samples hold values of the
+            reduced image of the same version.
+        layers: Layers of ``setup.aovs`` by name: (height, width) or (height, width, channels).
+        denoised: (height, width, 3), perhaps of an earlier frame of this version; None if missing.
+        status: samples_done, samples_total, passes, seconds, error and so on, as in
+            ``Snapshot.status``.
+        version: Version of scene and setup. A session never shows an older version again.
+        scale: Divisor of width and height; 1 is full size.
+        final: Whether the render has ended.
+        setup: Settings of the render.
+        picture: Result as of `wavecomb.render`, for final frames at full size, else None.
     """
 
     beauty: NDArray[np.float32]
@@ -50,21 +51,21 @@ class Frame:
 
     @property
     def width(self) -> int:
-        """Pixels of a row."""
+        """Width in pixels."""
         return int(self.beauty.shape[1])
 
     @property
     def height(self) -> int:
-        """Rows of pixels."""
+        """Height in pixels."""
         return int(self.beauty.shape[0])
 
     def names(self) -> list[str]:
-        """Layers that can be shown, the beauty first."""
+        """Returns the names of layers that can be shown, the beauty first."""
         shown = ["beauty", *(["denoised"] if self.denoised is not None else [])]
         return [*shown, *(name for name in self.layers if name not in shown)]
 
     def layer(self, name: str) -> Array | None:
-        """A layer by name, beauty and denoised, too; None where there is none."""
+        """Returns a layer by name, including beauty and denoised, or None."""
         if name == "beauty":
             return self.beauty
         if name == "denoised":
@@ -72,19 +73,19 @@ class Frame:
         return self.layers.get(name)
 
     def pixel(self, x: int, y: int) -> tuple[int, int]:
-        """Column and row in the arrays of a pixel of the full-size picture."""
+        """Returns column and row in the arrays for a pixel of the full-size image."""
         column = min(max(x * self.width // self.setup.width, 0), self.width - 1)
         return column, min(max(y * self.height // self.setup.height, 0), self.height - 1)
 
 
 def layers_of_result(result: Result) -> dict[str, Array]:
-    """All layers of a result but the beauty."""
+    """Returns all layers of a result except the beauty."""
     named = {name: getattr(result, name) for name in _FIELDS}
     return {name: array for name, array in {**named, **result.aovs}.items() if array is not None}
 
 
 def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, Array]:
-    """Copies of the layers of a snapshot that are kept and asked for."""
+    """Returns copies of the requested layers that a snapshot has."""
     out: dict[str, Array] = {"samples": snapshot.samples()}
     for name in map(layer_of, names):
         if name not in ("beauty", "samples") and (array := snapshot.layer(name)) is not None:
@@ -93,17 +94,21 @@ def layers_of_snapshot(snapshot: Snapshot, names: tuple[str, ...]) -> dict[str, 
 
 
 def enlarged(image: Array, width: int, height: int) -> Array:
-    """Nearest pixels of a smaller picture, (height, width, ...)."""
+    """Enlarges an image to (height, width, ...) by nearest pixels."""
     rows = np.arange(height) * image.shape[0] // height
     columns = np.arange(width) * image.shape[1] // width
     return image[rows[:, None], columns[None, :]]
 
 
-# ---- A frame without its noise. No Qt ------------------------------------------------------------
+# ---- Denoising of frames. Independent of Qt
+# ---------------------------------------------------------
 
 
 def denoised_frame(frame: Frame) -> tuple[Frame, Any]:
-    """A frame and its beauty by Open Image Denoise; None where it lacks the layers for that."""
+    """Denoises a frame with Open Image Denoise.
+
+    Returns None as image if guide layers are missing.
+    """
     from wavecomb.picture.denoise import denoise
 
     albedo = frame.layers.get("guide_albedo")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of one pixel: values of the layers, what is seen there, what it cost."""
+"""Panel with the data of one pixel: layer values, visible object, cost."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _SEEN = (
 
 
 def value_text(value: Any) -> str:
-    """A number, several, or a name, for people.
+    """Formats a number, several numbers or a name for people.
 
     >>> value_text(0.25), value_text((1.0, 0.5, 2e-7)), value_text(3)
     ('0.25', '1  0.5  2e-07', '3')
@@ -56,9 +56,9 @@ def value_text(value: Any) -> str:
 def pixel_rows(
     frame: Frame, x: int, y: int, origin: Sequence[float] = NOWHERE
 ) -> list[tuple[str, str]]:
-    """Names and values of all layers of a frame at a pixel of the full-size picture.
+    """Returns names and values of all layers of a frame at a pixel of the full-size image.
 
-    ``origin``: world position of the scene's.
+    ``origin`` is the world position of the scene's origin.
     """
     column, row = frame.pixel(x, y)
     rows = []
@@ -72,7 +72,7 @@ def pixel_rows(
 
 
 def seen_rows(hit: dict[str, Any] | None, origin: Sequence[float]) -> list[tuple[str, str]]:
-    """Names and values of what ``Session.pick`` gave; ``origin``: world position of the scene's."""
+    """Returns names and values of a result of ``Session.pick``, with positions in world space."""
     if hit is None:
         return [("prim", "nothing")]
     if hit.get("position") is not None:
@@ -81,7 +81,7 @@ def seen_rows(hit: dict[str, Any] | None, origin: Sequence[float]) -> list[tuple
 
 
 class Inspector(CursorPanel):
-    """Follows the cursor over the viewport, or stays at the pixel that was clicked."""
+    """Panel that follows the cursor over the viewport, or keeps the clicked pixel."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(session, "inspector", _LATER_MS, parent)
@@ -95,13 +95,13 @@ class Inspector(CursorPanel):
         self.tree.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        self.follow.setToolTip("Off: values stay those of the pixel that was clicked last")
+        self.follow.setToolTip("Off: keep the values of the last clicked pixel")
         self.follow.setAccessibleName("Follow the cursor")
         self.copy = named(
             QPushButton("Copy"),
             "inspector.copy",
             "Copy the values",
-            "Put these values on the clipboard as text",
+            "Copy these values to the clipboard as text",
         )
         self.copy.clicked.connect(self._copy)
         layout = QVBoxLayout(self)
@@ -112,7 +112,7 @@ class Inspector(CursorPanel):
         layout.addWidget(self.copy)
 
     def rows(self) -> list[tuple[str, str]]:
-        """What is shown, group by group."""
+        """Returns all shown names and values, group by group."""
         return [
             (item.text(0), item.text(1))
             for i in range(self.tree.topLevelItemCount())

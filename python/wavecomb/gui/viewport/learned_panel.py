@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the render has learned of the surface under the cursor."""
+"""Panel with the learned distributions at the surface under the cursor."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from wavecomb.picture.directions import density_map, map_point
 _LATER_MS = 40
 _HEIGHT = 128
 MOST_LIGHTS = 12
-"""Lights that have bars; the others are one."""
+"""Largest number of lights with separate bars. All further lights share one."""
 
 
 def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
-    """What is said of the field at a place, or why there is none.
+    """Describes the guiding field at a surface point, or says why there is none.
 
     Args:
-        setup: Of the render.
-        learned: As ``Renderer.learned`` gives it.
+        setup: Setup of the render.
+        learned: Result of ``Renderer.learned``.
     """
     if learned is None:
-        return "Point at a surface of a render that goes on or has ended."
+        return "Point at a surface in the viewport."
     if learned["density"] is not None:
         density = learned["density"]
         text = (
@@ -44,11 +44,11 @@ def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
         return text
     if setup.guiding == "off" and setup.roulette != "efficient":
         return "Bounces are not guided: choose Guiding in the Scheduling panel."
-    return "No field here: too few samples to learn from, or it does not pay."
+    return "No guiding field here: too few samples to learn from, or no predicted gain."
 
 
 def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list[tuple[str, float]]:
-    """The largest shares, and what is left as one.
+    """Returns the largest shares, and the sum of the remaining ones as the last row.
 
     >>> light_rows([("a", 0.5), ("b", 0.3), ("c", 0.2)], 2)
     [('a', 0.5), ('2 others', 0.5)]
@@ -60,10 +60,10 @@ def light_rows(shares: list[tuple[str, float]], most: int = MOST_LIGHTS) -> list
 
 
 class LearnedPanel(CursorPanel):
-    """Follows the cursor over the viewport, or stays at the pixel that was clicked.
+    """Panel that follows the cursor over the viewport, or keeps the clicked pixel.
 
     Attributes:
-        learned: What is shown, as ``Renderer.learned`` gives it.
+        learned: The shown result of ``Renderer.learned``, or None.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -73,16 +73,16 @@ class LearnedPanel(CursorPanel):
         self.note.setObjectName("learned.note")
         self.note.setWordWrap(True)
         self.map = DirectionsView("learned.map")
-        self.map.setAccessibleName("Directions that guided bounces take")
+        self.map.setAccessibleName("Directions of guided bounces")
         self.map.setToolTip(
-            "All directions: up is up, the middle is where the camera looks, right is right. "
+            "All directions; the view direction of the camera is in the middle. "
             "The ring is the surface's normal."
         )
-        self.lights = Bars("learned_lights", "Lights chosen here, %")
-        self.lights.setAccessibleName("Lights chosen here")
+        self.lights = Bars("learned_lights", "Lights sampled here, %")
+        self.lights.setAccessibleName("Lights sampled here")
         self.lights.setMinimumHeight(theme.em(7))
-        self.follow.setToolTip("Off: what is shown stays that of the pixel that was clicked last")
-        self.follow.setAccessibleName("Follow the cursor with what was learned")
+        self.follow.setToolTip("Off: keep the data of the last clicked pixel")
+        self.follow.setAccessibleName("Follow the cursor with the learned data")
         layout = QVBoxLayout(self)
         margin = theme.em(0.3)
         layout.setContentsMargins(margin, margin, margin, margin)
@@ -92,7 +92,7 @@ class LearnedPanel(CursorPanel):
         layout.addWidget(self.follow)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Catches up: nothing is looked up while the panel is hidden."""
+        """Updates the panel, which is not updated while it is hidden."""
         super().showEvent(event)
         self._soon()
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live render on the UI's side: frames of the newest version only, edits while it runs."""
+"""A live render on the UI thread.
+
+It can be edited during the render, and shows only frames of the newest version.
+"""
 
 from __future__ import annotations
 
@@ -28,10 +31,10 @@ if TYPE_CHECKING:
 
 
 class News:
-    """An ``engine.Listener`` that keeps the newest of each kind until somebody takes them.
+    """An ``engine.Listener`` that keeps the newest item of each kind until it is taken.
 
     Args:
-        told: Gets None when there are news where there were none.
+        told: Port that gets None when the first new item arrives.
     """
 
     def __init__(self, told: Port) -> None:
@@ -40,7 +43,7 @@ class News:
         self._news: dict[tuple[str, str], Any] = {}
 
     def take(self) -> list[tuple[str, Any]]:
-        """Kind and content, in the order in which they came."""
+        """Removes and returns all items as (kind, content), in order of arrival."""
         with self._lock:
             news, self._news = self._news, {}
         return [(kind, content) for (kind, _), content in news.items()]
@@ -56,50 +59,51 @@ class News:
     # ---- on the render thread ------------------------------------------------------------------
 
     def on_frame(self, frame: Frame) -> None:
-        """A picture."""
+        """Keeps the newest frame."""
         self._put("frame", frame)
 
     def on_statistics(self, statistics: dict[str, Any], version: int) -> None:
-        """Figures so far, and the version that they are of."""
+        """Keeps the newest statistics and their version."""
         self._put("statistics", (statistics, version))
 
     def on_failed(self, message: str) -> None:
-        """An error; others stay."""
+        """Keeps an error. Different errors do not replace each other."""
         self._put("failed", message, message)
 
     def on_ready(self, renderer: Renderer) -> None:
-        """The renderer of a new scene."""
+        """Keeps the renderer of a new scene."""
         self._put("ready", renderer)
 
 
 SETTLE_MS = 200
-"""After the last movement, the whole picture begins."""
+"""Delay between the last movement and the full image, in milliseconds."""
 BURST_S = 0.15
-"""Edits that follow each other faster are a drag: reduced pictures while it lasts."""
+"""Edits at shorter intervals, in seconds, count as a drag with reduced images."""
 WAIT_S = 0.4
-"""So long may a moving picture take before the next edit ends it."""
+"""Largest time that an image may take during a movement before the next edit stops it, in
+seconds."""
 
 IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "stopped", "finished"
 
 
 class Live(QObject):
-    """One live render with its own settings. All methods are for the UI thread; none waits.
+    """A live render with separate settings. All methods are for the UI thread; none blocks.
 
     Attributes:
         setup: Settings.
-        last_frame: What ``frame`` gave last.
-        version: Of scene and settings.
-        oldest: Frames of a version below this must not come to the screen any more.
-        state: What ``state_changed`` gave last.
-        renderer: The core's, or None.
+        last_frame: The last emitted frame, or None.
+        version: Version of scene and settings.
+        oldest: Oldest version whose frames may still be shown.
+        state: The last emitted state.
+        renderer: The core's renderer, or None.
 
     Signals:
-        frame(Frame): A newer picture, of the newest version.
-        statistics(dict): docs/statistics.md, about twice a second while it renders.
-        setup_changed(Setup): Settings were changed.
-        edited(int): The scene or the settings were changed: the new version.
+        frame(Frame): A new frame of the newest version.
+        statistics(dict): Statistics (docs/statistics.md), about twice per second during a render.
+        setup_changed(Setup): Settings changed.
+        edited(int): Scene or settings changed; carries the new version.
         state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
-        failed(str), warned(str): One line.
+        failed(str), warned(str): Message in one line.
     """
 
     frame = Signal(object)
@@ -127,27 +131,28 @@ class Live(QObject):
         self._settle.setSingleShot(True)
         self._settle.setInterval(SETTLE_MS)
         self._settle.timeout.connect(self.settle)
-        # What the render thread has of this side is the news, which are no object of Qt's.
+        # The render thread only holds the News object, which is not a Qt object.
         self._news = News(port(self._receive))
         self._engine = Engine(self._news)
         self._denoiser = Worker("denoise", self)
         self._denoiser.done.connect(self._take_denoised)
         self._denoiser.failed.connect(self._warn)
 
-    # ---- what widgets call ---------------------------------------------------------------------
+    # ---- methods for widgets
+    # -------------------------------------------------------------------------
 
     def begin(self, make: Callable[[], Renderer], loaded: LoadedStage | None, edit: Edit) -> None:
-        """A new scene; ``make`` is called on the render thread."""
+        """Starts with a new scene. ``make`` creates its renderer on the render thread."""
         self._pending = Edit()
         self._moving = False
         self.renderer = None
         self._submit(Task(self.setup, 0, edit, False, loaded, make))
 
     def change(self, **values: Any) -> bool:
-        """Changes fields of the setup and restarts; a value that is no good is told by ``failed``.
+        """Changes fields of the setup and restarts. Emits ``failed`` if a value is invalid.
 
         Returns:
-            Whether it was changed.
+            Whether the setup was changed.
         """
         try:
             new = self.setup.changed(**values)
@@ -172,9 +177,9 @@ class Live(QObject):
         """Changes the scene and restarts.
 
         Args:
-            edit: What.
-            moving: More of the like follows: reduced pictures until ``settle``, or until nothing
-                came for a while.
+            edit: The changes.
+            moving: Whether similar edits follow. Images are reduced until ``settle``, or until no
+                edit came for some time.
         """
         self._pending.add(edit)
         now = time.perf_counter()
@@ -182,28 +187,29 @@ class Live(QObject):
         if self._moving:
             self._settle.start()
             if self._awaiting and now - self._submitted < WAIT_S:
-                return  # the picture under way is shown first, or nothing ever would be
+                # shows the current image first, so that frequent edits do not suppress all images
+                return
         self._flush()
 
     def settle(self) -> None:
-        """The movement has ended: the whole picture."""
+        """Ends a movement and starts the full image."""
         self._settle.stop()
         if self._moving:
             self._moving = False
             self._flush()
 
     def restart(self) -> None:
-        """Begins again from the first sample."""
+        """Restarts from the first sample."""
         self._flush()
 
     def pause(self) -> None:
-        """The render stands still; what is shown stays."""
+        """Pauses the render and keeps the image."""
         if self.state == RENDERING:
             self._engine.pause()
             self._set_state(PAUSED)
 
     def resume(self) -> None:
-        """Goes on, or begins again where the render was stopped."""
+        """Resumes a paused render, or restarts a stopped one."""
         if self.state == PAUSED:
             self._engine.resume()
             self._set_state(RENDERING)
@@ -211,7 +217,7 @@ class Live(QObject):
             self.restart()
 
     def stop(self) -> None:
-        """Ends the render; the picture stays."""
+        """Stops the render and keeps the image."""
         self._settle.stop()
         if self.state in (RENDERING, PAUSED):
             self._set_state(STOPPED)
@@ -219,7 +225,7 @@ class Live(QObject):
             self._engine.resume()
 
     def shutdown(self) -> None:
-        """Ends the threads; takes some 10 ms."""
+        """Ends the threads, which takes about 10 ms."""
         self._settle.stop()
         self._engine.close()
         self._denoiser.close()
@@ -235,7 +241,7 @@ class Live(QObject):
 
     def _submit(self, task: Task) -> None:
         self.version = task.version = next(self._numbers)
-        # While something moves the last picture may still be on its way to the screen.
+        # During a movement, the previous image may still be on its way to the screen.
         last = self.last_frame.version if self.last_frame is not None else self.version
         self.oldest = last if task.moving else self.version
         self._awaiting, self._submitted = True, time.perf_counter()
@@ -251,7 +257,7 @@ class Live(QObject):
             self.state_changed.emit(state)
 
     def _receive(self, letter: None) -> None:
-        """The newest of each kind of news."""
+        """Handles the newest item of each kind."""
         takes: dict[str, Callable[[Any], None]] = {
             "frame": self._take,
             "statistics": self._take_statistics,
@@ -266,7 +272,7 @@ class Live(QObject):
 
     def _take_statistics(self, news: tuple[dict[str, Any], int]) -> None:
         statistics, version = news
-        if version == self.version:  # those of an older one would be taken for the newer one's
+        if version == self.version:  # statistics of an older version do not describe this one
             self.statistics.emit(statistics)
 
     def _warn(self, key: object, line: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a camera moves: orbit, pan, dolly, frame. Pure functions of poses."""
+"""Camera movements: orbit, pan, dolly, frame. Pure functions of poses."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ UPS = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A camera as ``Renderer.edit(camera=...)`` takes it.
+    """A camera, with the parameters of ``Renderer.edit(camera=...)``.
 
     Attributes:
-        to_world: (4, 4), row vectors; looks along -z.
-        window: x0, x1, y0, y1 on the plane z = -1; of an orthographic camera across its axis, of a
-            latlong one in radians.
-        others: The other ones of ``camera_parameters()``, where they are not the default.
-        path: Camera prim that this is; None: a free camera.
+        to_world: (4, 4) for row vectors; the camera looks along -z.
+        window: x0, x1, y0, y1 on the plane z = -1, for an orthographic camera across its axis, for
+            a latlong camera in radians.
+        others: Other values of ``camera_parameters()`` that differ from their defaults.
+        path: Path of the camera prim with this pose; None for a free camera.
     """
 
     to_world: Matrix
@@ -39,29 +39,29 @@ class Pose:
     path: str | None = None
 
     def options(self) -> dict[str, Any]:
-        """For ``Renderer.edit``."""
+        """Returns the arguments for ``Renderer.edit``."""
         here = {"transform": self.to_world, "window": self.window}
         return {**here, **camera_defaults(), **self.others}
 
     def value(self, name: str) -> Any:
-        """A value of ``others``, or its default."""
+        """Returns a value of ``others``, or its default."""
         return self.others[name] if name in self.others else camera_parameters()[name].default
 
     def changed(self, **others: Any) -> Pose:
-        """With other values of ``others``."""
+        """Returns a copy with some values of ``others`` replaced."""
         return replace(self, others={**self.others, **others})
 
     @property
     def projection(self) -> str:
-        """Perspective, orthographic or latlong."""
+        """Projection: perspective, orthographic or latlong."""
         return str(self.value("projection"))
 
     def fitted(self, width: int, height: int) -> tuple[float, float, float, float]:
-        """The window as a picture of this size shows it."""
+        """Returns the window that an image of this size shows."""
         return camera_window(self.options(), width, height)
 
     def around(self, before: Sequence[float], now: Sequence[float]) -> Pose:
-        """The same place in the world for a scene that is built around another origin."""
+        """Returns the pose for a scene with another origin, at the same place in the world."""
         if tuple(before) == tuple(now):
             return self
         to_world = self.to_world.copy()
@@ -70,58 +70,58 @@ class Pose:
 
     @property
     def position(self) -> Vector:
-        """In the scene's space."""
+        """Position in scene space."""
         return self.to_world[3, :3]
 
     @property
     def right(self) -> Vector:
-        """Unit vector."""
+        """Unit vector to the right."""
         return self.to_world[0, :3]
 
     @property
     def up(self) -> Vector:
-        """Unit vector."""
+        """Unit vector upwards."""
         return self.to_world[1, :3]
 
     @property
     def back(self) -> Vector:
-        """Unit vector, away from what is looked at."""
+        """Unit vector opposite to the view direction."""
         return self.to_world[2, :3]
 
     def depth_of(self, point: Vector) -> float:
-        """Distance of a point along the axis; negative behind."""
+        """Returns the distance of a point along the axis, negative behind the camera."""
         return float((self.position - point) @ self.back)
 
 
 def pose_of(to_world: Matrix, values: Mapping[str, Any], path: str | None) -> Pose:
-    """The pose of a camera with these values of ``camera_parameters()``, and maybe others."""
+    """Returns the pose of a camera from a mapping with values of ``camera_parameters()``."""
     others = {name: values[name] for name in camera_defaults() if name in values}
     return Pose(to_world, tuple(values["window"]), others, path)
 
 
 def pose_of_scene(camera: dict[str, Any], path: str | None) -> Pose:
-    """The pose of ``Scene.camera``."""
+    """Returns the pose of ``Scene.camera``."""
     return pose_of(np.array(camera["to_world"], np.float64), camera, path)
 
 
 STEEPEST = math.radians(89.9)
-"""An orbit stops short of the poles, where the way up is lost."""
+"""Largest elevation of an orbit. At the poles, the up direction would be undefined."""
 VIEWS = ("front", "back", "right", "left", "top", "bottom")
 
 
 def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> Pose:
-    """Turns about a point, the horizon stays level: a turntable.
+    """Rotates the camera about a point like a turntable, with a level horizon.
 
     Args:
-        pose: From.
-        pivot: Stays where it is in the picture.
-        yaw: Radians about the stage's up; above 0: the camera moves to its right.
-        pitch: Radians about the camera's right; above 0: the camera rises.
+        pose: Initial pose.
+        pivot: Point that keeps its position in the image.
+        yaw: Radians about the stage's up axis; positive moves the camera to its right.
+        pitch: Radians about the camera's right; positive raises the camera.
         up_axis: "X", "Y" or "Z".
     """
     up = np.array(UPS[up_axis])
     elevation = math.asin(float(np.clip(pose.back @ up, -1.0, 1.0)))
-    # A camera that is steeper than that already may only turn back.
+    # A camera that is already steeper may only rotate back.
     low, high = min(-STEEPEST, elevation), max(STEEPEST, elevation)
     pitch = min(max(elevation + pitch, low), high) - elevation
     turn = rotation(pose.right, -pitch) @ rotation(up, yaw)
@@ -129,14 +129,14 @@ def orbit(pose: Pose, pivot: Vector, yaw: float, pitch: float, up_axis: str) -> 
 
 
 def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[float, float]) -> Pose:
-    """Shifts the camera so that what lies at ``depth`` moves along with the cursor.
+    """Moves the camera so that points at ``depth`` follow the cursor.
 
     Args:
-        pose: From.
-        depth: Along the axis, above 0.
-        across: Pixels that the cursor moved to the right.
-        upwards: Pixels that it moved up.
-        size: Of the picture in the same pixels.
+        pose: Initial pose.
+        depth: Distance along the axis, positive.
+        across: Movement of the cursor to the right, in pixels.
+        upwards: Movement of the cursor upwards, in pixels.
+        size: Size of the image, in the same pixels.
     """
     x0, x1, y0, y1 = pose.fitted(*map(round, size))
     if pose.projection == "orthographic":
@@ -147,9 +147,9 @@ def pan(pose: Pose, depth: float, across: float, upwards: float, size: tuple[flo
 
 
 def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
-    """Moves towards a point: the distance is multiplied by ``factor``, above 0.
+    """Moves towards a point by multiplying the distance by ``factor``, which is positive.
 
-    Nearer is no larger to an orthographic camera: its window is.
+    For an orthographic camera, scales the window instead.
     """
     if pose.projection == "orthographic":
         return replace(_scaled(pose, factor), path=None)
@@ -157,20 +157,20 @@ def dolly(pose: Pose, pivot: Vector, factor: float) -> Pose:
 
 
 def frame(pose: Pose, points: Matrix, aspect: float) -> Pose:
-    """Looks the same way, from where points fill the picture but for a margin.
+    """Moves the camera so that points fill the image except for a margin, keeping its direction.
 
     Args:
-        pose: From.
+        pose: Initial pose.
         points: (n, 3), such as the corners of a box.
-        aspect: Width / height of the picture.
+        aspect: Width / height of the image.
     """
     return _framed(pose, pose.to_world[:3, :3], points, aspect)
 
 
 def view(pose: Pose, name: str, points: Matrix, up_axis: str, aspect: float) -> Pose:
-    """From a side, with points (n, 3) whole in the picture: a name of ``VIEWS``."""
+    """Views all points (n, 3) from a side, which is a name of ``VIEWS``."""
     up = np.array(UPS[up_axis])
-    # As `usd.camera.frame_points`: the front is +Z, or -Y where Z is up.
+    # As in `usd.camera.frame_points`, the front is +Z, or -Y if Z is up.
     front = np.array({"Z": (0.0, -1.0, 0.0)}.get(up_axis, (0.0, 0.0, 1.0)))
     right = np.cross(up, front)
     back, above = {
@@ -185,7 +185,7 @@ def view(pose: Pose, name: str, points: Matrix, up_axis: str, aspect: float) -> 
 
 
 def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
-    """From the other side of a point."""
+    """Views a point from the other side."""
     turn = rotation(np.array(UPS[up_axis]), math.pi)
     return _placed(pose, pose.to_world[:3, :3] @ turn, pivot + (pose.position - pivot) @ turn)
 
@@ -193,7 +193,7 @@ def opposite(pose: Pose, pivot: Vector, up_axis: str) -> Pose:
 def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     low, high = points.min(axis=0), points.max(axis=0)
     centre = 0.5 * (low + high)
-    if pose.projection == "latlong":  # all is in the picture: from the middle
+    if pose.projection == "latlong":  # such a camera sees everything from the centre
         return _placed(pose, axes, centre)
     x0, x1, y0, y1 = pose.fitted(round(1000 * aspect), 1000)
     half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
@@ -207,7 +207,7 @@ def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
     else:
         place = fit(points, axes, half)
         distance = depth = float((place - centre) @ axes[2])
-    # A window that is off the axis looks past the centre.
+    # A camera with an off-axis window looks past the centre, so shift it.
     shift = -0.5 * (x0 + x1) * depth * axes[0] - 0.5 * (y0 + y1) * depth * axes[1]
     framed = _placed(pose, axes, place + shift)
     near = min(framed.value("near_clip"), 1e-3 * distance)
@@ -216,13 +216,13 @@ def _framed(pose: Pose, axes: Matrix, points: Matrix, aspect: float) -> Pose:
 
 
 def _scaled(pose: Pose, factor: float) -> Pose:
-    """With a window ``factor`` times as large about its own (0, 0)."""
+    """Returns the pose with its window scaled about (0, 0)."""
     x0, x1, y0, y1 = (factor * edge for edge in pose.window)
     return replace(pose, window=(x0, x1, y0, y1))
 
 
 def rotation(axis: Vector, angle: float) -> Matrix:
-    """For row vectors, (3, 3), right-handed about a unit vector (Rodrigues)."""
+    """Returns a right-handed rotation about a unit vector for row vectors, (3, 3), by Rodrigues."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     turn = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
@@ -230,7 +230,7 @@ def rotation(axis: Vector, angle: float) -> Matrix:
 
 
 def _placed(pose: Pose, axes: Matrix, position: Vector) -> Pose:
-    """A free camera with these axes (rows) made exactly orthonormal."""
+    """Returns a free camera with these axes (rows), made exactly orthonormal."""
     back = axes[2] / np.linalg.norm(axes[2])
     right = np.cross(axes[1], back)
     right /= np.linalg.norm(right)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Views of OpenColorIO by way of OpenImageIO: those of $OCIO, or OpenColorIO's own ACES ones."""
+"""Views of OpenColorIO through OpenImageIO, from $OCIO or from OpenColorIO's ACES configuration."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LINEAR = (
 
 @functools.cache
 def _config(name: str | None) -> tuple[Any, str, str] | None:
-    """Configuration, display and colour space of linear Rec.709; None where that is missing."""
+    """Returns configuration, display and linear Rec.709 colour space, or None if one is missing."""
     import OpenImageIO as oiio
 
     config = oiio.ColorConfig(name or "ocio://default")
@@ -49,7 +49,7 @@ def _current() -> tuple[Any, str, str] | None:
 
 
 def views() -> list[str]:
-    """Names of the views there are for an sRGB screen; none where $OCIO cannot be used."""
+    """Returns the views for an sRGB screen; none if $OCIO cannot be used."""
     current = _current()
     if current is None:
         return []
@@ -58,7 +58,7 @@ def views() -> list[str]:
 
 
 def problem() -> str | None:
-    """Why $OCIO is not used, or None."""
+    """Returns why $OCIO is not used, or None."""
     if os.environ.get("OCIO") and _current() is None:
         return (
             f"$OCIO {os.environ['OCIO']}: cannot be read, or has no linear Rec.709 colour space; "
@@ -68,7 +68,7 @@ def problem() -> str | None:
 
 
 def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
-    """Linear Rec.709, finite, (h, w, 3) -> 8-bit codes of the display.
+    """Converts linear Rec.709, finite, (h, w, 3) to 8-bit values of the display.
 
     Raises:
         WavecombError: There is no such view.
@@ -82,7 +82,8 @@ def through_view(rgb: NDArray[Any], view: str) -> NDArray[np.uint8]:
         )
     _, display, linear = current
     source = oiio.ImageBuf(np.ascontiguousarray(rgb, dtype=np.float32))
-    # On this thread alone: the cores render, and OpenImageIO's pool was seen to wait for ever.
+    # Use only this thread: the render uses all cores, and OpenImageIO's thread pool was seen to
+    # deadlock.
     shown = oiio.ImageBufAlgo.ociodisplay(
         source, display, view, linear, colorconfig=_name(), nthreads=1
     )

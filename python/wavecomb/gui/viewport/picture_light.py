@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The light that says whether the picture has stayed the same."""
+"""Indicator light for whether the image has stayed bit-identical."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from wavecomb.gui.viewport.session import Frame, Session
 from wavecomb.gui.widgets import set_text_colour
 from wavecomb.gui.worker import Errands
 
-WAITING = "Waits until each pixel has the samples asked for"
+WAITING = "Waits until each pixel has all samples"
 
 
 class PictureLight(QWidget):
-    """Compares the bits of each finished picture with those of the settings before.
+    """Indicator that compares the bits of each finished image with those of earlier settings.
 
-    Pictures are compared where every pixel has the same number of samples, or at the end of an
-    adaptive render. Bits are hashed on another thread.
+    Images are compared if every pixel has the same number of samples, or at the end of an adaptive
+    render. Bits are hashed on another thread.
     """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -55,8 +55,8 @@ class PictureLight(QWidget):
         self.setObjectName("same_picture")
         self.setAccessibleName("Same picture")
         self.setToolTip(
-            "Compares the bits of each finished picture with those of the one before it that had "
-            "the same scene, camera and samples, but another scheduling."
+            "Compares the bits of each finished picture with an earlier one of "
+            "the same scene, camera and samples, but other scheduling settings."
         )
         session.frame.connect(self._take)
         session.edited.connect(self._wait)
@@ -103,7 +103,7 @@ class PictureLight(QWidget):
         self, key: Any, place: Any, settings: dict[str, Any], version: int, mark: str
     ) -> None:
         verdict = self.book.add(key, place, mark, settings)
-        # More samples that nobody had before take back nothing of what fewer have shown.
+        # A first image with more samples does not invalidate a verdict with fewer samples.
         weaker = verdict.kind == "first" and self.verdict.kind in ("same", "different")
         if verdict.kind == "different" or (version == self._session.version and not weaker):
             self._show(verdict)

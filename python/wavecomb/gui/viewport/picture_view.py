@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture in a widget: zoom, shift, device pixels, a grid between large ones."""
+"""Widget that shows an image: zoom, pan, device pixels, a pixel grid at large zoom."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TEXT = QColor(240, 240, 240)
 
 
 def legend_text(legend: Legend) -> str:
-    """The title with the kind of scale."""
+    """Returns the title with the kind of scale."""
     return f"{legend.title}, logarithmic" if legend.logarithmic else legend.title
 
 
@@ -67,14 +67,14 @@ def paint_legend(painter: QPainter, area: QRect, legend: Legend, font: QFont) ->
 
 LEAST_ZOOM, MOST_ZOOM = 1 / 16, 64.0
 GRID_ZOOM = 10.0
-"""Device pixels a pixel from which lines are drawn between pixels."""
+"""Zoom, in device pixels per image pixel, from which a pixel grid is drawn."""
 
 
 class PictureView(QWidget):
-    """Shows an image of a given size in pixels; one with fewer is stretched to that size.
+    """View of an image with a given size in pixels. A smaller image is stretched to that size.
 
     Signals:
-        zoom_changed(float): Device pixels a pixel.
+        zoom_changed(float): Zoom in device pixels per image pixel.
     """
 
     zoom_changed = Signal(float)
@@ -90,12 +90,12 @@ class PictureView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
 
     def set_picture(self, image: QImage | None, size: QSize, legend: Legend | None = None) -> None:
-        """What to show.
+        """Sets the image.
 
         Args:
-            image: None: nothing.
-            size: Of the picture, pixels; the image may be smaller.
-            legend: Of false colours.
+            image: The image; None shows nothing.
+            size: Size in pixels; the image may be smaller.
+            legend: Legend of false colours, or None.
         """
         self._image, self._legend = image, legend
         if size != self._size:
@@ -105,29 +105,30 @@ class PictureView(QWidget):
         self.update()
 
     def image(self) -> QImage | None:
-        """What is shown."""
+        """Returns the shown image, or None."""
         return self._image
 
     def legend(self) -> Legend | None:
-        """The legend of the false colours that are shown."""
+        """Returns the legend of the shown false colours, or None."""
         return self._legend
 
-    # ---- where the picture is ------------------------------------------------------------------
+    # ---- position of the image
+    # -------------------------------------------------------------------------
 
     def zoom(self) -> float:
-        """Device pixels a pixel."""
+        """Returns the zoom in device pixels per image pixel."""
         return self._fitting() if self._zoom is None else self._zoom
 
     def is_fitted(self) -> bool:
-        """Whether the whole picture is shown as large as there is room."""
+        """Returns whether the image is fitted to the widget."""
         return self._zoom is None
 
     def set_zoom(self, zoom: float | None, about: QPointF | None = None) -> None:
-        """Sets device pixels a pixel; None: as large as there is room.
+        """Sets the zoom in device pixels per image pixel; None fits the image to the widget.
 
         Args:
-            zoom: Kept within limits.
-            about: Point of the widget that stays; None: its centre.
+            zoom: The zoom, which is clamped to limits.
+            about: Point of the widget that stays fixed; None means its centre.
         """
         place = about if about is not None else QPointF(self.rect().center())
         before = self.to_picture(place)
@@ -141,7 +142,7 @@ class PictureView(QWidget):
         self.update()
 
     def shift(self, by: QPointF) -> None:
-        """Moves the picture by device-independent pixels."""
+        """Pans the image by device-independent pixels."""
         if self._zoom is None:
             self._zoom = self._fitting()
         self._shift += by
@@ -149,18 +150,18 @@ class PictureView(QWidget):
         self.update()
 
     def picture_rect(self) -> QRectF:
-        """Where the whole picture is in the widget."""
+        """Returns the rectangle of the whole image in the widget."""
         k = self.zoom() / self.devicePixelRatioF()
         wide, high = self._size.width() * k, self._size.height() * k
         middle = QPointF(self.width() / 2, self.height() / 2) + self._shift
         corner = middle - QPointF(wide / 2, high / 2)
         ratio = self.devicePixelRatioF()
-        # On the grid of device pixels, so that 100 % is exactly that.
+        # Align with device pixels, so that 100 % is exact.
         x, y = round(corner.x() * ratio) / ratio, round(corner.y() * ratio) / ratio
         return QRectF(x, y, wide, high)
 
     def to_picture(self, place: QPointF) -> QPointF:
-        """A point of the widget in pixels of the picture."""
+        """Converts a point of the widget to pixels of the image."""
         rect = self.picture_rect()
         return QPointF(
             (place.x() - rect.x()) / rect.width() * self._size.width(),
@@ -168,7 +169,7 @@ class PictureView(QWidget):
         )
 
     def from_picture(self, place: QPointF) -> QPointF:
-        """A point of the picture in the widget."""
+        """Converts a point of the image to the widget."""
         rect = self.picture_rect()
         return QPointF(
             rect.x() + place.x() / self._size.width() * rect.width(),
@@ -184,7 +185,7 @@ class PictureView(QWidget):
         return max(min(room), LEAST_ZOOM)
 
     def _keep_inside(self) -> None:
-        """At least a bit of the picture stays in view."""
+        """Limits panning, so that a part of the image stays visible."""
         k = self.zoom() / self.devicePixelRatioF()
         for get, put, size, own in (
             (self._shift.x, self._shift.setX, self._size.width(), self.width()),
@@ -194,7 +195,7 @@ class PictureView(QWidget):
             put(min(max(get(), -most), most))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """The picture keeps its place."""
+        """Keeps the image inside the widget."""
         super().resizeEvent(event)
         self._keep_inside()
         self.zoom_changed.emit(self.zoom())
@@ -202,7 +203,7 @@ class PictureView(QWidget):
     # ---- painting ------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Surround, picture, grid, what subclasses lay over it, legend."""
+        """Paints background, image, grid, overlay of subclasses and legend."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), theme.surround())
         if self._image is not None:
@@ -219,7 +220,7 @@ class PictureView(QWidget):
         painter.end()
 
     def paint_over(self, painter: QPainter) -> None:
-        """For subclasses: over the picture."""
+        """Paints an overlay; for subclasses."""
 
     def _paint_grid(self, painter: QPainter, dirty: QRect) -> None:
         area = self.picture_rect().intersected(QRectF(dirty))

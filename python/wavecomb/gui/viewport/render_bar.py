@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is rendered: camera, size, samples, depth, denoising, region; pause, stop, restart."""
+"""Tool bar of the render: camera, size, samples, depth, denoising, region; pause, stop, restart."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from wavecomb.run.settings import MAX_EDGE
 
 _MOST: dict[str, dict[str, Any]] = {"width": {"most": MAX_EDGE}, "height": {"most": MAX_EDGE}}
 _NAMES = {"max_depth": "depth"}
-"""Names of controls that are not those of their settings."""
+"""Names of controls that differ from those of their settings."""
 
 
 class RenderBar(QToolBar):
-    """The controls of a render that are used most."""
+    """Tool bar with the most used controls of a render."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__("Render", parent)
@@ -40,7 +40,7 @@ class RenderBar(QToolBar):
         setup = session.setup
         self.camera = named(
             QComboBox(), "render.camera", "Camera",
-            "Look through a camera of the stage; moving the view leaves it",
+            "Camera of the view; moving the view changes to a free camera",
         )  # fmt: skip
         self.camera.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self.camera.setMinimumContentsLength(14)
@@ -53,7 +53,7 @@ class RenderBar(QToolBar):
         )
         self.denoise = named(
             QCheckBox("Denoise"), "render.denoise", "Denoise",
-            "Show the picture without its noise, by Open Image Denoise (Shift+D)",
+            "Denoise the picture with Open Image Denoise (Shift+D)",
         )  # fmt: skip
         self.denoise.toggled.connect(self._denoise_toggled)
         self._fill()

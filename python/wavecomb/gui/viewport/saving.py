@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames as the files that `wavecomb render` writes."""
+"""Writes frames as files like `wavecomb render`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NAMED = ("albedo", "normal", "depth", "samples", "error", "variance")
 
 
 def picture_of_frame(frame: Frame, scene: Scene, loaded: LoadedStage | None) -> Picture:
-    """What `wavecomb.render` would return, of a frame as it is."""
+    """Converts a frame to a result of `wavecomb.render`."""
     if frame.picture is not None:
         return replace(frame.picture, denoised=frame.denoised)
     stats: dict[str, Any] = {
@@ -54,24 +54,25 @@ def save_frame(
     look: Look,
     options: dict[str, Any],
 ) -> None:
-    """Writes a frame, all layers (.exr) or what is shown (.png), whole or not at all.
+    """Writes a frame, all layers (.exr) or the displayed image (.png), never partially.
 
     Args:
-        frame: At full size.
-        path: Ends in .exr or .png.
-        scene: For the camera's matrices.
-        loaded: For the header.
-        look: Of the .png.
-        options: As ``Picture.save`` has them.
+        frame: Frame at full size.
+        path: File name that ends in .exr or .png.
+        scene: Scene, for the camera's matrices.
+        loaded: Loaded stage, for the header.
+        look: Display settings of the .png.
+        options: Arguments of ``Picture.save``.
 
     Raises:
-        OSError, ValueError: The file or an option is no good; one line.
-        WavecombError: There is only a preview yet.
+        OSError, ValueError: The file cannot be written, or an option is invalid. The message is one
+            line.
+        WavecombError: There is only a preview so far.
     """
     if frame.scale != 1:
-        raise WavecombError("there is only a preview yet: save again when the picture is there")
+        raise WavecombError("there is only a preview so far: save again a little later")
     if frame.setup.denoise:
-        # What is shown may be of an earlier pass.
+        # The shown denoised image may be of an earlier pass.
         frame = replace(frame, denoised=denoised_frame(frame)[1])
     picture = picture_of_frame(frame, scene, loaded)
     as_rendered = look.layer in ("beauty", "denoised") and look.view in (LINEAR, NEUTRAL)

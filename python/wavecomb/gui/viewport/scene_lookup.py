@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a session looks up on the stage and in the scene. No Qt."""
+"""Lookups of a session on the stage and in the scene. Independent of Qt."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 def camera_pose(
     usd: Usd.Stage, path: str, time: float | None, origin: Origin = WORLD
 ) -> Pose | None:
-    """Where a camera prim looks from; None where there is none that can be looked through.
+    """Returns the pose of a camera prim, or None if the prim is not a supported camera.
 
     Args:
         usd: The stage.
-        path: Of the prim.
-        time: Time code; None: the stage's start.
-        origin: World position that the scene is built around.
+        path: Path of the prim.
+        time: Time code; None means the start of the stage.
+        origin: World position of the scene's origin.
     """
     from pxr import Sdf, UsdGeom
 
@@ -53,12 +53,12 @@ def edits_again(
     materials: Mapping[str, Mapping[str, Any]],
     lights: Mapping[tuple[str, int], Mapping[str, Any]],
 ) -> Edit:
-    """Edits made before, for the numbers of a scene that was read again.
+    """Converts earlier edits to the indices of a scene that was loaded again.
 
     Args:
-        scene: The new one.
-        materials: By name.
-        lights: By ``light_key``.
+        scene: The new scene.
+        materials: Edited values by name of the material.
+        lights: Edited values by ``light_key``.
     """
     numbers = {name: i for i, (name, _) in enumerate(scene.materials)}
     edit = Edit()
@@ -73,12 +73,12 @@ def edits_again(
 
 
 def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.float64] | None:
-    """World bounds of what is drawn of a prim, and of lights in it, (2, 3); None: it has none.
+    """Returns the world bounds of a prim's geometry and lights, (2, 3), or None if it has none.
 
     Args:
         usd: The stage.
-        loaded: Its scene.
-        path: As ``Renderer.pick`` names objects: "/World/Forest[12]/Leaves" is in the prim
+        loaded: The loaded stage.
+        path: Path in the form of ``Renderer.pick``: "/World/Forest[12]/Leaves" is in the prim
             "/World/Forest".
     """
     from pxr import Gf, Sdf, UsdGeom
@@ -106,13 +106,13 @@ def prim_bounds(usd: Usd.Stage, loaded: LoadedStage, path: str) -> NDArray[np.fl
 
 
 def light_key(scene: Scene, index: int) -> tuple[str, int]:
-    """A light by its name and its number among those of that name."""
+    """Returns the name of a light, and its number among lights with that name."""
     names = [name for name, _ in scene.lights[: index + 1]]
     return names[-1], names.count(names[-1]) - 1
 
 
 def make_renderer(scene: Scene, threads: int) -> Renderer:
-    """The core's renderer."""
+    """Creates the core's renderer."""
     from wavecomb import _core
 
     return _core.Renderer(scene, threads)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stage that is open and its live render: what all panels of the window share.
+"""The open stage and its live render, shared by all panels of the window.
 
-Contract: lives on the window's thread; no method waits. Reading, rendering, denoising and saving
-happen on other threads, and what they have to say arrives as signals.
+A session lives on the window's thread, and no method blocks. Loading, rendering, denoising and
+saving run on other threads, whose results arrive as signals.
 """
 
 from __future__ import annotations
@@ -49,24 +49,25 @@ class Session(Live):
     """A stage, its live render, and further live renders of it with other settings (twins).
 
     Signals:
-        opened(LoadedStage): A stage was read, or read again after a change of what is in it.
-        closing(): The USD stage is about to be read again from the disk: let go of its prims.
-        busy(str): What goes on beside rendering; "": nothing.
+        opened(LoadedStage): A stage was loaded, or loaded again after a change of its contents.
+        closing(): The USD stage is about to be reloaded from disk; receivers must release its
+            prims.
+        busy(str): Description of background work, or "".
         camera_changed(Pose): The camera moved, or another was chosen.
-        selected(str | None): Path of the prim that was chosen, in the picture or elsewhere.
+        selected(str | None): Path of the prim that was selected, in the image or elsewhere.
         saved(str): A file was written.
-        noted(LoadedStage): Its report says more than before.
+        noted(LoadedStage): Its report has new findings.
 
     Attributes:
-        stage: What was read, or None.
-        usd: The stage as USD has it, or None; edits go to its session layer, then ``rebuild``.
+        stage: The loaded stage, or None.
+        usd: The USD stage, or None. Edits change its session layer and then call ``rebuild``.
         up_axis: "X", "Y" or "Z".
         pose: The camera, or None.
-        selection: What ``selected`` gave last.
-        material_edits: What ``edit_material`` changed, by the material's name.
-        light_edits: What ``edit_light`` changed, by the light's name and its number among those of
-            that name.
-        twins: Live renders of the same scene and camera with settings of their own.
+        selection: Path of the selected prim, or None.
+        material_edits: Values changed by ``edit_material``, by the material's name.
+        light_edits: Values changed by ``edit_light``, by the light's name and its number among
+            lights with that name.
+        twins: Live renders of the same scene and camera with separate settings.
     """
 
     opened = Signal(object)
@@ -103,14 +104,17 @@ class Session(Live):
 
     @property
     def scene(self) -> Scene | None:
-        """The core's scene as edited, or None; ``Scene.material(i)`` and ``light(i)`` read it."""
+        """The core's scene with all edits, or None.
+
+        ``Scene.material(i)`` and ``light(i)`` read values.
+        """
         if self.renderer is not None:
             return self.renderer.scene
         return self.stage.scene if self.stage is not None else None
 
     @property
     def path(self) -> Path | None:
-        """The stage's file."""
+        """File of the stage, or None."""
         return self.stage.stage_path if self.stage is not None else None
 
     # ---- stages --------------------------------------------------------------------------------
@@ -123,18 +127,21 @@ class Session(Live):
         variants: Mapping[str, str] | None = None,
         purposes: tuple[str, ...] | None = None,
     ) -> None:
-        """Reads a stage; ``opened`` or ``failed`` follows. What is open stays until then."""
+        """Loads a stage; ``opened`` or ``failed`` follows.
+
+        The current stage stays open until then.
+        """
         source = Source(Path(path), camera, time, variants, purposes)
         self._read(Request(source, threads=self.setup.threads), f"reading {source.path.name}")
 
     def reload(self) -> None:
-        """Reads the stage from the disk again; edits made here are dropped, the camera stays."""
+        """Reloads the stage from disk, dropping edits but keeping the camera."""
         if self._request is None or self.stage is None:
-            self.failed.emit("there is no stage to read again: open one first")
+            self.failed.emit("there is no stage to reload: open one first")
             return
         usd = self.usd
         if usd is None:
-            return  # it is being read
+            return  # the stage is already being loaded
         usd.GetSessionLayer().Clear()
         self.usd = None
         self.closing.emit()
@@ -144,10 +151,10 @@ class Session(Live):
         self._read(request, f"reading {name} again")
 
     def rebuild(self, reason: str) -> None:
-        """Reads the stage again after edits of the session layer of ``usd``; keeps the camera.
+        """Loads the stage again after edits of the session layer of ``usd``, keeping the camera.
 
         Args:
-            reason: What was changed, for people: "variant of /World/Car".
+            reason: Description of the change for people, such as "variant of /World/Car".
         """
         if self._request is None or self.usd is None:
             return
@@ -166,7 +173,7 @@ class Session(Live):
     def _take_stage(self, number: int, found: Read) -> None:
         request, usd, loaded = self._request_wanted, found.usd, found.stage
         if self._closed or request is None or number != self._reading:
-            return  # a newer one is under way
+            return  # a newer request is being loaded
         again = request.usd is not None
         if not again or request.fresh:
             self.material_edits.clear()
@@ -204,7 +211,7 @@ class Session(Live):
         self.failed.emit(message)
 
     def note_words(self, report: LoadReport | None) -> None:
-        """Adds what USD said meanwhile to the report of the stage that is open."""
+        """Adds later messages of USD to the report of the open stage."""
         if report is not None and self.stage is not None:
             self.stage.report.absorb(report)
             self.noted.emit(self.stage)
@@ -212,11 +219,11 @@ class Session(Live):
     # ---- settings, camera, materials, lights ----------------------------------------------------
 
     def set_camera(self, pose: Pose, *, moving: bool = False) -> None:
-        """Looks from elsewhere.
+        """Moves the camera.
 
         Args:
-            pose: From where; its ``path`` is None unless it is a camera prim as authored.
-            moving: More follows at once: pictures are reduced until ``settle``.
+            pose: New pose. Its ``path`` is None unless it is the authored pose of a camera prim.
+            moving: Whether more movements follow immediately. Images are reduced until ``settle``.
         """
         self.pose = pose
         self._edit_all(Edit(camera=pose.options()), moving=moving)
@@ -237,11 +244,11 @@ class Session(Live):
 
     @property
     def source(self) -> Source | None:
-        """What is read, and how; None: nothing is open."""
+        """The open stage and its loading options, or None."""
         return None if self._request is None else self._request.source
 
     def use_camera(self, path: str | None) -> None:
-        """Looks through a camera prim; None: a free camera where the view is now."""
+        """Changes to a camera prim; None changes to a free camera at the current pose."""
         if self.pose is None:
             return
         if path is None:
@@ -250,7 +257,7 @@ class Session(Live):
             return
         pose = self._pose_of(path)
         if pose is None:
-            self.failed.emit(f"camera {path}: cannot be looked through; choose another")
+            self.failed.emit(f"camera {path}: is not a supported camera; choose another")
             return
         self.set_camera(pose)
 
@@ -261,7 +268,7 @@ class Session(Live):
         return camera_pose(self.usd, path, self._request.source.time, origin)
 
     def edit_material(self, material: int, *, moving: bool = False, **values: Any) -> None:
-        """Changes parameters of a material by number: keyword arguments of ``add_material``."""
+        """Changes parameters of a material by index, with keyword arguments of ``add_material``."""
         if self.scene is None:
             return
         name = self.scene.materials[material][0]
@@ -269,7 +276,7 @@ class Session(Live):
         self._edit_all(Edit(materials={material: values}), moving=moving)
 
     def edit_light(self, light: int, *, moving: bool = False, **values: Any) -> None:
-        """Changes parameters of a light by number: keyword arguments of ``add_light``."""
+        """Changes parameters of a light by index, with keyword arguments of ``add_light``."""
         if self.scene is None:
             return
         self.light_edits.setdefault(light_key(self.scene, light), {}).update(values)
@@ -278,25 +285,25 @@ class Session(Live):
     # ---- the render ------------------------------------------------------------------------------
 
     def pick(self, x: float, y: float) -> dict[str, Any] | None:
-        """What is seen at (x, y) in pixels of the full-size picture; None: nothing, or no scene."""
+        """Returns the visible object at pixel (x, y) of the full-size image, or None."""
         if self.renderer is None:
             return None
         return self.renderer.pick(float(x), float(y), self.setup.width, self.setup.height)
 
     def learned(self, x: float, y: float) -> dict[str, Any] | None:
-        """What the render has learned of the surface there, as ``Renderer.learned`` gives it."""
+        """Returns ``Renderer.learned`` for the surface at pixel (x, y), or None."""
         if self.renderer is None:
             return None
         return self.renderer.learned(float(x), float(y), self.setup.width, self.setup.height)
 
     def select(self, path: str | None) -> None:
-        """Chooses a prim by its path; None: nothing."""
+        """Selects a prim by its path; None clears the selection."""
         if path != self.selection:
             self.selection = path
             self.selected.emit(path)
 
     def selected_bounds(self) -> NDArray[np.float64] | None:
-        """Least and greatest corner of the selected prim in the scene, (2, 3), or None."""
+        """Returns the bounds of the selected prim in the scene, (2, 3), or None."""
         if self.selection is None or self.stage is None or self.usd is None:
             return None
         return prim_bounds(self.usd, self.stage, self.selection)
@@ -314,17 +321,17 @@ class Session(Live):
             live.resume()
 
     def restart(self) -> None:
-        """Begins again from the first sample."""
+        """Restarts from the first sample."""
         if self.stage is not None:
             super().restart()
 
     def save(self, path: str | os.PathLike[str], look: Look | None = None, **options: Any) -> None:
-        """Writes all layers (.exr) or what is shown (.png); ``saved`` or ``failed`` follows.
+        """Writes all layers (.exr) or the displayed image (.png); ``saved`` or ``failed`` follows.
 
         Args:
-            path: Ends in .exr or .png.
-            look: How it is shown; None: the beauty as it is.
-            **options: As ``Picture.save`` has them.
+            path: File name that ends in .exr or .png.
+            look: Display settings; None means the beauty with default settings.
+            **options: Arguments of ``Picture.save``.
         """
         frame = self.last_frame
         if frame is None or self.scene is None:
@@ -335,7 +342,7 @@ class Session(Live):
         self.run(f"writing {Path(name).name}", work, lambda: self.saved.emit(name))
 
     def twin(self, setup: Setup) -> Live:
-        """Starts a second live render of the same scene and camera, with settings of its own.
+        """Starts another live render of the same scene and camera, with separate settings.
 
         It follows all edits. ``drop_twin`` ends it.
         """
@@ -356,7 +363,10 @@ class Session(Live):
     def run(
         self, what: str, work: Callable[[], object], then: Callable[[], None] | None = None
     ) -> None:
-        """Does something plain on another thread, then something here: ``Tasks.run``."""
+        """Runs ``work`` on another thread, and then ``then`` on this one.
+
+        See ``Tasks.run``.
+        """
         self._tasks.run(what, work, then)
 
     @property

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the camera was: back and forth, apart from what is edited.
+"""Undo history of camera movements, separate from the history of edits.
 
-Moving the view changes nothing of the stage, so it is no step among the edits: undoing a light
-would else mean to take back all looking about since, and a stage would look unsaved for having been
-seen.
+Moving the camera does not change the stage, so it is not part of the undo history of edits.
+Otherwise undoing an edit would first revert all later camera movements, and a stage that was only
+viewed would count as unsaved.
 """
 
 from __future__ import annotations
@@ -18,12 +18,15 @@ from wavecomb.gui.viewport.navigate import Pose
 from wavecomb.gui.viewport.session import Session
 
 MERGE_S = 0.7
-"""Movements that follow each other faster are one."""
+"""Movements at shorter intervals, in seconds, merge into one step."""
 _MOVE = 2
 
 
 class MoveCommand(QUndoCommand):
-    """From one pose to another, which the camera has already."""
+    """Movement from one pose to another.
+
+    The camera has already moved when the command is created.
+    """
 
     def __init__(self, before: Pose, after: Pose, history: ViewHistory, moment: float) -> None:
         super().__init__("view" if after.path is None else f"camera {after.path}")
@@ -32,23 +35,26 @@ class MoveCommand(QUndoCommand):
         self._there = True
 
     def redo(self) -> None:
-        """Goes there again."""
+        """Moves the camera to the later pose."""
         history = self._history()
         if history is not None and not self._there:
             history.go(self.after)
         self._there = False
 
     def undo(self) -> None:
-        """Goes back."""
+        """Moves the camera to the earlier pose."""
         if (history := self._history()) is not None:
             history.go(self.before)
 
     def id(self) -> int:
-        """Qt asks those with the same to join; a camera that was chosen is a step of its own."""
+        """Returns the id by which Qt finds commands that may merge.
+
+        Choosing a camera is always a separate step.
+        """
         return _MOVE if self.after.path is None else -1
 
     def mergeWith(self, other: QUndoCommand) -> bool:
-        """Takes in a later movement of the same drag."""
+        """Merges a later movement of the same drag."""
         if not isinstance(other, MoveCommand) or other.moment - self.moment >= MERGE_S:
             return False
         self.after, self.moment = other.after, other.moment
@@ -56,11 +62,11 @@ class MoveCommand(QUndoCommand):
 
 
 class ViewHistory(QObject):
-    """Poses of a session's camera.
+    """History of the poses of a session's camera.
 
     Attributes:
-        stack: Its steps; undo moves the camera back.
-        now: The clock, for telling drags from single movements.
+        stack: Undo stack of movements.
+        now: Clock in seconds, which distinguishes drags from single movements.
     """
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
@@ -74,7 +80,7 @@ class ViewHistory(QObject):
         session.camera_changed.connect(self._on_moved)
 
     def go(self, pose: Pose) -> None:
-        """Moves the camera without a step of its own."""
+        """Moves the camera without adding a step."""
         self._pose = pose
         self._session.set_camera(pose)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live picture, and the hand that moves its camera."""
+"""The live image, with mouse and keyboard control of its camera."""
 
 from __future__ import annotations
 
@@ -30,31 +30,31 @@ from wavecomb.gui.worker import Worker
 from wavecomb.usd.cameras.framing import corners
 
 ORBIT_RADIANS = 0.008
-"""Angle for each device-independent pixel: half a turn is some 400 pixels."""
+"""Rotation per device-independent pixel; 400 pixels are about half a turn."""
 DOLLY_STEP = 0.88
-"""Factor of the distance for a notch of the wheel."""
+"""Factor of the distance for one notch of the wheel."""
 ZOOM_STEP = 1.25
 KEY_RADIANS = np.radians(15.0)
 CLICK_PIXELS = 4
 
 EMPTY = (
     "Open a stage: Ctrl+O, or drop a USD file here\n\n"
-    "wavecomb scene cornell -o cornell.usda   writes one to begin with"
+    "wavecomb scene cornell -o cornell.usda   writes an example"
 )
 
 
 class Viewport(PictureView):
-    """Shows the frames of a session and moves its camera.
+    """View of a session's frames that moves its camera.
 
     Attributes:
-        look: How frames are shown.
-        frame_shown: What is on the screen, or None.
+        look: Display settings.
+        frame_shown: The frame on the screen, or None.
 
     Signals:
         hovered(object): (x, y) of the pixel under the cursor, or None.
         picked(object): (x, y) of a pixel that was clicked.
-        shown(Frame, Look): What is on the screen now.
-        failed(str): One line.
+        shown(Frame, Look): The frame and settings that are now on the screen.
+        failed(str): Error in one line.
         region_mode_changed(bool): Whether the next drag chooses a region.
     """
 
@@ -90,17 +90,17 @@ class Viewport(PictureView):
         theme.on_change(self.update)
 
     def close_threads(self) -> None:
-        """Before the window goes."""
+        """Ends the threads before the window is destroyed."""
         self._developer.close()
 
     def set_look(self, look: Look) -> None:
-        """Chooses layer, exposure, view."""
+        """Sets layer, exposure and view."""
         self.look = look
         if self._frame is not None:
             self._take(self._frame)
 
     def set_message(self, message: str = EMPTY) -> None:
-        """Shown where there is no picture."""
+        """Sets the text that is shown while there is no image."""
         self._message = message
         self.update()
 
@@ -126,14 +126,17 @@ class Viewport(PictureView):
         self._pivot = None
 
     def pivot(self) -> Vector:
-        """What the camera turns about: what was under the cursor, or the middle of the scene."""
+        """Returns the point that the camera orbits.
+
+        It is the last point under the cursor, or the centre of the scene.
+        """
         if self._pivot is None:
             bounds = self.bounds()
             self._pivot = 0.5 * (bounds[0] + bounds[1])
         return self._pivot
 
     def bounds(self) -> np.ndarray:
-        """Bounds of the scene, (2, 3)."""
+        """Returns the bounds of the scene, (2, 3)."""
         scene = self.session.scene
         bounds = np.array(scene.bounds if scene is not None else [[-1.0] * 3, [1.0] * 3], float)
         if not np.isfinite(bounds).all() or (bounds[1] < bounds[0]).any():
@@ -141,18 +144,21 @@ class Viewport(PictureView):
         return bounds
 
     def outline(self) -> np.ndarray:
-        """Points (n, 3) that are to be seen where all is: what is drawn, or a box about it."""
+        """Returns points (n, 3) that enclose the scene.
+
+        These are its outline or, without one, the corners of its bounds.
+        """
         stage = self.session.stage
         if stage is not None and stage.outline is not None:
             return stage.outline
         return corners(self.bounds())
 
     def aspect(self) -> float:
-        """Width / height of the picture."""
+        """Returns width / height of the image."""
         return self.session.setup.width / self.session.setup.height
 
     def _aim(self, place: QPointF) -> None:
-        """What is under the cursor becomes the pivot."""
+        """Makes the point under the cursor the pivot."""
         at = self.to_picture(place)
         hit = self.session.pick(at.x(), at.y())
         if hit is not None and hit.get("position") is not None:
@@ -162,14 +168,14 @@ class Viewport(PictureView):
         return self.session.pose
 
     def orbit(self, yaw: float, pitch: float, *, moving: bool = False) -> None:
-        """Turns about the pivot."""
+        """Orbits about the pivot by angles in radians."""
         if (pose := self._pose()) is not None:
             up = self.session.up_axis
             moved = navigate.orbit(pose, self.pivot(), yaw, pitch, up)
             self.session.set_camera(moved, moving=moving)
 
     def pan(self, across: float, upwards: float, *, moving: bool = False) -> None:
-        """Shifts by device-independent pixels."""
+        """Pans by device-independent pixels."""
         if (pose := self._pose()) is not None:
             depth = pose.depth_of(self.pivot())
             if depth <= 0.0:
@@ -180,16 +186,16 @@ class Viewport(PictureView):
             self.session.set_camera(moved, moving=moving)
 
     def dolly(self, factor: float, *, moving: bool = False) -> None:
-        """Multiplies the distance to the pivot."""
+        """Multiplies the distance to the pivot by a factor."""
         if (pose := self._pose()) is not None:
             self.session.set_camera(navigate.dolly(pose, self.pivot(), factor), moving=moving)
 
     def frame_all(self) -> None:
-        """The whole scene in the picture."""
+        """Frames the whole scene."""
         self._frame_points(self.outline())
 
     def frame_selected(self) -> None:
-        """What is selected, or all."""
+        """Frames the selected prim, or the whole scene."""
         bounds = self.session.selected_bounds()
         self._frame_points(self.outline() if bounds is None else corners(bounds))
 
@@ -199,7 +205,7 @@ class Viewport(PictureView):
             self.session.set_camera(navigate.frame(pose, points, self.aspect()))
 
     def view_from(self, name: str) -> None:
-        """From a side: front, back, right, left, top, bottom."""
+        """Views the scene from a side: front, back, right, left, top, bottom."""
         if (pose := self._pose()) is not None:
             points = self.outline()
             self._pivot = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -207,7 +213,7 @@ class Viewport(PictureView):
             self.session.set_camera(navigate.view(pose, name, points, up, self.aspect()))
 
     def view_opposite(self) -> None:
-        """From the other side."""
+        """Views the pivot from the other side."""
         if (pose := self._pose()) is not None:
             up = self.session.up_axis
             self.session.set_camera(navigate.opposite(pose, self.pivot(), up))
@@ -215,7 +221,7 @@ class Viewport(PictureView):
     # ---- the region ----------------------------------------------------------------------------
 
     def set_region_mode(self, on: bool) -> None:
-        """Whether the next drag with the left button chooses what is rendered."""
+        """Sets whether the next drag with the left button chooses the render region."""
         if on == self._region_mode:
             return
         self._region_mode = on
@@ -237,7 +243,7 @@ class Viewport(PictureView):
         return left, top, right, bottom
 
     def clear_region(self) -> None:
-        """The whole picture again."""
+        """Removes the render region."""
         self.set_region_mode(False)
         if self.session.setup.region is not None:
             self.session.change(region=None)
@@ -245,7 +251,7 @@ class Viewport(PictureView):
     # ---- events --------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Begins a drag."""
+        """Starts a drag."""
         if self._drag is not Drag.NONE:
             return
         place = event.position()
@@ -258,7 +264,7 @@ class Viewport(PictureView):
         event.accept()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Goes on with a drag, or tells what is under the cursor."""
+        """Continues a drag, or reports the pixel under the cursor."""
         place = event.position()
         by = place - self._last
         self._last = place
@@ -297,7 +303,7 @@ class Viewport(PictureView):
             self.picked.emit(pixel)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Dollies towards what is under the cursor; with Ctrl zooms the picture."""
+        """Dollies towards the point under the cursor; with Ctrl zooms the image."""
         notches = event.angleDelta().y() / 120.0
         if notches:
             if event.modifiers() & Control:
@@ -308,11 +314,11 @@ class Viewport(PictureView):
         event.accept()
 
     def leaveEvent(self, event: object) -> None:
-        """No pixel is under the cursor."""
+        """Reports that no pixel is under the cursor."""
         self.hovered.emit(None)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Arrows orbit or pan, page keys dolly, Escape leaves the region mode."""
+        """Orbits or pans by arrow keys, dollies by page keys, leaves region mode by Escape."""
         key, shift = event.key(), bool(event.modifiers() & Shift)
         step = float(KEY_RADIANS)
         ways = {
@@ -349,7 +355,7 @@ class Viewport(PictureView):
     # ---- painting ------------------------------------------------------------------------------
 
     def paint_over(self, painter: QPainter) -> None:
-        """The region, and what to do where there is no picture."""
+        """Paints the region, or the message while there is no image."""
         if self.image() is None:
             painter.setPen(QColor("#d8d8d8"))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._message)
@@ -374,5 +380,5 @@ class Viewport(PictureView):
             painter.drawRect(box)
 
     def sizeHint(self) -> QSize:
-        """Roomy."""
+        """Returns the preferred size."""
         return QSize(theme.em(50), theme.em(34))

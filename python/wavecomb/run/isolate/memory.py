@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A limit to the memory of a process that is expendable.
+"""Memory limit of an expendable process.
 
-It is on memory that a process writes to (RLIMIT_DATA): arrays, heaps, stacks. Address space that is
-only reserved, files that are only read, and the tiles of a texture store do not count, so that a
-limit of the size of the machine never hits a sound scene: docs/decisions/sandbox.md has figures.
+The limit applies to writable private memory (RLIMIT_DATA): arrays, heaps and stacks. Reserved
+address space, mapped read-only files and tiles of a texture store do not count, so that a limit of
+the machine's size never affects a valid scene. docs/decisions/sandbox.md has figures.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 
 def machine_limit() -> int | None:
-    """Bytes that this process may take at most: of the machine, or of the group that it is in."""
+    """Returns the bytes that this process may use, from the machine and its control groups."""
     found = [bytes_ for bytes_ in (memory_bytes(), _of_group()) if bytes_]
     return min(found) if found else None
 
 
 def _of_group() -> int | None:
-    """The least limit of the control groups that hold this process; None: there is none."""
+    """Returns the lowest limit of the control groups of this process; None without a limit."""
     limits: list[int] = []
     for place, name in _groups():
-        # Within a container the path is that of outside: its own group is at the root.
+        # Inside a container the path is that of the host, and the container's group is the root.
         for group in (place, *place.parents):
             if not group.is_relative_to(_CGROUP):
                 break
@@ -49,7 +49,7 @@ def _of_group() -> int | None:
 
 
 def _groups() -> list[tuple[Path, str]]:
-    """Folders of the control groups of this process, and the name of the file with the limit."""
+    """Returns the control group folders of this process with the names of their limit files."""
     found = []
     try:
         lines = Path("/proc/self/cgroup").read_text().splitlines()
@@ -65,14 +65,14 @@ def _groups() -> list[tuple[Path, str]]:
 
 
 asked_mb: float | None = None
-"""``--memory-limit`` in megabytes (10^6 bytes); None: what the machine has."""
+"""Value of ``--memory-limit`` in units of 10^6 bytes; None uses the machine's memory."""
 
 
 def ask(megabytes: float | None) -> None:
-    """Notes the limit that ``limit`` sets later.
+    """Stores the limit that ``limit`` applies later.
 
     Raises:
-        WavecombError: Nothing could be done with so little.
+        WavecombError: The limit is too small.
     """
     global asked_mb
     if megabytes is not None and megabytes < LEAST_MB:
@@ -81,15 +81,15 @@ def ask(megabytes: float | None) -> None:
 
 
 def wanted() -> int | None:
-    """The limit in bytes; None: there is none."""
+    """Returns the limit in bytes; None without a limit."""
     return machine_limit() if asked_mb is None else int(asked_mb * MEGABYTE)
 
 
 def limit() -> None:
-    """Limits the memory of this process, a supervised child, and notes the limit for its parent.
+    """Limits the memory of this supervised child process and records the limit for its parent.
 
     Raises:
-        WavecombError: A limit was asked for, and there is no child process.
+        WavecombError: A limit is set but there is no child process.
     """
     if not trail.is_expendable():
         if asked_mb is None:
@@ -109,18 +109,18 @@ def limit() -> None:
 
 
 class Group:
-    """Control group that limits all memory of a process, shared mappings too."""
+    """A control group that limits all memory of a process, including shared mappings."""
 
     def __init__(self, path: Path) -> None:
-        """Takes the folder of the group."""
+        """Stores the folder of the group."""
         self._path = path
 
     @classmethod
     def make(cls, bytes_: int | None) -> Group | None:
-        """Makes a group within that of this process; None where that is not permitted.
+        """Creates a group inside that of this process; returns None if that is not permitted.
 
         Args:
-            bytes_: Its limit; None: none, and no group.
+            bytes_: Limit in bytes; None creates no group.
         """
         if bytes_ is None:
             return None
@@ -144,31 +144,33 @@ class Group:
             (self._path / "cgroup.procs").write_text(str(pid))
 
     def close(self) -> None:
-        """Removes the group, whose processes have ended."""
+        """Removes the group after its processes have ended."""
         with contextlib.suppress(OSError):
             self._path.rmdir()
 
 
 def limit_of(page: mmap.mmap) -> str:
-    """How an obituary names the limit of a page's process; "" where it had none."""
+    """Returns the limit of a process for its crash message; "" without a limit."""
     megabytes = trail.slot(page, "limit")
     return f"{megabytes} MB (--memory-limit)" if megabytes else ""
 
 
 UNPACKED = 8160
-"""Times that a value in a .usdc may be larger than what it is packed in: 2 bits for each of 8
-bytes, and those by LZ4, which makes at most 255 bytes of one."""
+"""Largest ratio of a value's size to its size in a .usdc.
+
+Integer coding stores 8 bytes in 2 bits, and LZ4 compresses up to 255 bytes to one.
+"""
 
 
 def ran_out(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
-    """Whether an error means that this process, which is expendable, has met its limit.
+    """Returns whether an error means that this expendable process reached its memory limit.
 
-    USD says of a value that it has no memory for what it says of one that is damaged; so it is
-    taken for damaged only where the files are too small to hold one that large.
+    USD reports the same error for lack of memory and for damaged values. The value counts as
+    damaged only if the files are too small to contain a value that exceeds the limit.
 
     Args:
-        error: A MemoryError, or one of USD's.
-        layer_bytes: Gives the size of the files that it reads.
+        error: A MemoryError or a USD error.
+        layer_bytes: Returns the size of the files that USD reads.
     """
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if not trail.is_expendable() or bytes_ == resource.RLIM_INFINITY:
@@ -181,7 +183,7 @@ def ran_out(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
 
 
 def data_bytes() -> int:
-    """Memory of this process as the limit counts it."""
+    """Returns the memory of this process that counts towards the limit, in bytes."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmData:"):
             return int(line.split()[1]) * 1024
@@ -189,7 +191,7 @@ def data_bytes() -> int:
 
 
 def room() -> int:
-    """Bytes that this process may still take."""
+    """Returns the bytes that this process may still allocate."""
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if bytes_ == resource.RLIM_INFINITY:
         bytes_ = machine_limit() or 1 << 62
@@ -197,7 +199,7 @@ def room() -> int:
 
 
 def describe_limit() -> str:
-    """For a line about this process's memory: "; the limit is 24000 MB (--memory-limit)"."""
+    """Returns text such as "; the limit is 24000 MB (--memory-limit)" for messages, or ""."""
     bytes_ = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if not trail.is_expendable() or bytes_ == resource.RLIM_INFINITY:
         return ""

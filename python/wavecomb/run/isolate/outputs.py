@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output files of a process in the sandbox, which cannot write to the folders they belong in.
+"""Output files of a sandboxed process, which cannot write to their destination folders.
 
 The process writes into its private folder and then asks its parent to move the file. The parent
-knows the outputs from its own reading of the command line and moves nothing else.
+derives the permitted outputs from its own parsing of the command line and moves no other files.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Outputs:
 
     Attributes:
         names: File names.
-        parts: (folder, prefix, suffix) of files whose number is not known beforehand.
+        parts: (folder, prefix, suffix) of numbered files.
         trees: (folder, suffix) of files anywhere below a folder.
     """
 
@@ -40,7 +40,7 @@ class Outputs:
     trees: tuple[tuple[str, str], ...] = ()
 
     def resolved(self) -> Outputs:
-        """The same with symbolic links followed."""
+        """Returns the outputs with symbolic links resolved."""
         real = os.path.realpath
         return Outputs(
             tuple(dict.fromkeys(map(real, self.names))),
@@ -49,13 +49,13 @@ class Outputs:
         )
 
     def folders(self) -> list[str]:
-        """Folders of the files."""
+        """Returns the folders of the files."""
         named = [os.path.dirname(name) for name in self.names]
         named += [part[0] for part in self.parts] + [tree[0] for tree in self.trees]
         return list(dict.fromkeys(named))
 
     def allow(self, target: str) -> bool:
-        """Whether a path, symbolic links followed, is one of these files."""
+        """Returns whether a path with resolved links is one of these files."""
         folder, name = os.path.split(target)
         return (
             target in self.names
@@ -76,7 +76,7 @@ def _send(channel: socket.socket, message: Any) -> None:
 
 
 def _receive(channel: socket.socket) -> Any:
-    """The next message; None when the other side has ended or sent too much."""
+    """Returns the next message; None if the peer has ended or the message is too large."""
     size = _exactly(channel, _HEAD.size)
     if size is None:
         return None
@@ -96,15 +96,15 @@ def _exactly(channel: socket.socket, count: int) -> bytes | None:
 
 
 class Mover:
-    """The parent's side: moves finished files from the private folder to their names."""
+    """Parent side: moves finished files from the private folder to their names."""
 
     def __init__(self, outputs: Outputs, private: Path) -> None:
-        """Takes the outputs and the private folder of the child."""
+        """Stores the outputs and the private folder of the child."""
         self._outputs = outputs.resolved()
         self._private = private
 
     def serve(self, channel: socket.socket) -> None:
-        """Answers the child's requests until it ends. Runs on a thread of its own."""
+        """Answers the child's requests until it ends; runs on a separate thread."""
         with contextlib.suppress(OSError, ValueError):
             while (message := _receive(channel)) is not None:
                 _send(channel, self._answer(message))
@@ -152,10 +152,10 @@ class Mover:
 
 
 class Client:
-    """The child's side, which ``wavecomb.picture.files`` calls. Any thread may use it."""
+    """Child side, which ``wavecomb.picture.files`` uses; thread-safe."""
 
     def __init__(self, channel: socket.socket, private: Path) -> None:
-        """Takes the socket to the parent and the private folder."""
+        """Stores the socket to the parent and the private folder."""
         self._channel = channel
         self._private = private
         self._lock = threading.Lock()
@@ -171,17 +171,17 @@ class Client:
             raise OSError(answer["number"], answer["why"])
 
     def is_own(self, target: Path) -> bool:
-        """Whether a file is in the private folder."""
+        """Returns whether a file is in the private folder."""
         return target.is_relative_to(self._private)
 
     def part_of(self, target: Path) -> Path:
-        """Where to write a file before it gets its name."""
+        """Returns a temporary name in the private folder for an output file."""
         with self._lock:
             self._count += 1
             return self._private / f"{self._count}{target.suffix}"
 
     def check(self, target: Path) -> None:
-        """Raises OSError unless the file could be written now."""
+        """Raises OSError unless the file can be written now."""
         self._ask("check", str(target))
 
     def publish(self, part: Path, target: Path, *, durable: bool) -> None:

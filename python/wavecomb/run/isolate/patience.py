@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A limit to the time that USD takes to compose a stage.
+"""Time limit for USD's composition of a stage.
 
-References that double at each level, or that run through each other in circles which are no plain
-cycle, make composition take years; USD cannot be stopped. So a thread looks on, where the process
-is expendable, and ends it.
+References that double at each level, or that are indirectly cyclic, can make composition take
+years, and USD offers no way to interrupt it. Therefore a thread watches an expendable process and
+ends it.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from pathlib import Path
 from wavecomb.run.isolate import trail
 
 BASE_S = 6.0
-"""What any stage may take: some hundred thousand prims, whatever multiplies them."""
+"""Seconds that any stage may take, which suffices for some hundred thousand prims."""
 
 BYTES_PER_S = 1_000_000
-"""Each of them is a second more: sound layers are read many times faster."""
+"""Layer bytes that allow one further second; valid layers are read many times faster."""
 
 limit_s: float | None = None
-"""Seconds that the user allows, 0: no limit; None: by the size of the layers."""
+"""Limit in seconds that the user sets (0 disables it); None derives it from the layer size."""
 
 _TICK_S = 0.25
 
 
 def allowed_s(layer_bytes: int) -> float:
-    """Seconds for layers of this size."""
+    """Returns the time limit in seconds for layers of this size."""
     return BASE_S + layer_bytes / BYTES_PER_S if limit_s is None else limit_s
 
 
@@ -43,17 +43,17 @@ def _say_and_end(message: str) -> None:
 
 
 on_end: Callable[[str], None] = _say_and_end
-"""Ends this process, which is expendable, with a line."""
+"""Ends this expendable process with a message."""
 
 
 @contextmanager
 def watched(file: Path) -> Iterator[None]:
-    """Ends the process where the block, which composes a stage, takes too long.
+    """Ends the process if the block, which composes a stage, takes too long.
 
-    Only time in which this process computes counts, not that of a slow disk or a busy machine.
+    Counts only CPU time of this process, not waiting for a slow disk or a busy machine.
 
     Args:
-        file: The stage's.
+        file: File of the stage.
     """
     if not trail.is_expendable() or limit_s == 0:
         yield
@@ -74,22 +74,23 @@ def _watch(file: Path, done: threading.Event) -> None:
         now, so_far = time.monotonic(), time.process_time()
         busy += min(now - clock, so_far - computed)
         clock, computed = now, so_far
-        # Sizes are looked up only where it matters.
+        # Sizes are queried only once the minimum time has passed.
         if busy < (BASE_S if limit_s is None else limit_s):
             continue
         layers, size = loaded_layers()
         allowed = allowed_s(size)
         if busy >= allowed and not done.is_set():
+            more = 10 * max(1, round(allowed))
             on_end(
-                f"{file}: USD has composed for {busy:.0f} s, and its layers ({layers}, "
-                f"{size / 1e6:.3g} MB) give no reason: prims refer to each other without end, or "
-                f"multiply; mend that, or allow more by --load-limit {10 * max(1, round(allowed))}"
+                f"{file}: USD has composed for {busy:.0f} s, and the size of its layers ({layers}, "
+                f"{size / 1e6:.3g} MB) does not explain it: prims refer to each other without end, "
+                f"or multiply; fix that, or allow more by --load-limit {more}"
             )
             return
 
 
 def loaded_layers() -> tuple[int, int]:
-    """Number and bytes of the layers that USD holds by now."""
+    """Returns the number and total size of the layers that USD has loaded so far."""
     from pxr import Sdf
 
     number = size = 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sandbox of a process that reads files of others: bubblewrap (docs/decisions/sandbox.md)."""
+"""Sandbox for processes that read untrusted files, by bubblewrap (docs/decisions/sandbox.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MODES = ("auto", "on", "off")
 _PROGRAM = "bwrap"
 
 _HIDDEN = ("/tmp", "/var/tmp", "/run", "/dev/shm")
-"""Folders that are replaced by empty ones: they hold sockets and files of other programs."""
+"""Folders that are replaced by empty ones, since they hold sockets and files of other programs."""
 
 _SYSTEM = (
     "/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/opt", "/nix/store", "/gnu/store",
@@ -25,14 +25,14 @@ _SYSTEM = (
     "/etc/ld.so.conf.d", "/etc/ld.so.preload", "/etc/localtime", "/etc/machine-id",
     "/etc/nsswitch.conf", "/etc/OpenCL", "/etc/passwd",
 )  # fmt: skip
-"""What libraries read, for ``--sandbox-read``."""
+"""Files and folders that libraries read, for use with ``--sandbox-read``."""
 
 _SEARCHED = (
     "PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PXR_MTLX_PLUGIN_SEARCH_PATHS",
     "PXR_MTLX_STDLIB_SEARCH_PATHS", "MATERIALX_SEARCH_PATH", "OIIO_LIBRARY_PATH", "OCIO",
     "LD_LIBRARY_PATH",
 )  # fmt: skip
-"""Variables that name files and folders that libraries read."""
+"""Environment variables with files and folders that libraries read."""
 
 _GPU = ("/dev/dri", "/dev/nvidiactl", "/dev/nvidia-uvm", "/dev/nvidia-uvm-tools", "/dev/kfd")
 
@@ -52,11 +52,11 @@ def command(
 
     Args:
         words: Command to run, with absolute paths.
-        private: The one folder that can be written, also the folder for temporary files.
-        inputs: Paths that the command line names. They stay readable where a hidden folder (/tmp,
-            /run) or ``reads`` would hide them.
-        reads: Folders of ``--sandbox-read``: if there are any, only these, the inputs, and
-            libraries can be read. Otherwise everything that the user may read can be.
+        private: The only writable folder, which also holds temporary files.
+        inputs: Paths that the command line names. They remain readable even if a hidden folder
+            (/tmp, /run) or ``reads`` would hide them.
+        reads: Folders of ``--sandbox-read``. If any are given, only these, the inputs and libraries
+            can be read; otherwise everything that the user may read.
         gpu: Whether GPU devices can be used.
     """
     line = [_PROGRAM, "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"]
@@ -84,7 +84,7 @@ def command(
 
 
 def _existing(paths: Iterable[str]) -> list[str]:
-    """Absolute paths of those that exist, and what their symbolic links lead to."""
+    """Returns absolute paths of existing files, and the targets of symbolic links."""
     found: dict[str, None] = {}
     for path in paths:
         if path and os.path.exists(path):
@@ -101,7 +101,7 @@ def _devices() -> list[str]:
 
 
 def library_places() -> list[str]:
-    """Folders of Python, its packages, and the files that environment variables name."""
+    """Returns folders of Python, its packages, and files that environment variables name."""
     import wavecomb
 
     places = [sys.prefix, sys.base_prefix, sys.exec_prefix, sys.base_exec_prefix]
@@ -112,10 +112,10 @@ def library_places() -> list[str]:
 
 
 def inputs_of(words: Iterable[str]) -> list[str]:
-    """Paths to keep readable for a command line, below the folders that are hidden.
+    """Returns paths in hidden folders that must stay readable for a command line.
 
-    For a file in /tmp/shot/usd that is /tmp/shot, with all assets that may be beside the stage. For
-    a file directly in /tmp it is all regular files there.
+    For a file in /tmp/shot/usd this is /tmp/shot, with all assets next to the stage. For a file
+    directly in /tmp it is all regular files there.
     """
     found: dict[str, None] = {}
     for word in words:
@@ -139,7 +139,7 @@ def _visible(path: str) -> list[str]:
 
 @functools.cache
 def obstacle() -> str | None:
-    """Why there is no sandbox on this system, in words; None if there is one.
+    """Returns the reason why this system has no sandbox; None if it has one.
 
     Runs bubblewrap once.
     """
@@ -160,6 +160,6 @@ def obstacle() -> str | None:
 
 
 def describe() -> dict[str, Any]:
-    """Sandbox of this system, for ``wavecomb info --machine`` and ``doctor``."""
+    """Returns the sandbox state of this system for ``wavecomb info --machine`` and ``doctor``."""
     why_not = obstacle()
     return {"available": why_not is None, "obstacle": why_not}

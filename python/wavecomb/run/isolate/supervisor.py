@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A command in a child process: whatever ends the child, the shell gets one line and exit code 2.
+"""Runs a command in a child process, so that a crash gives one message and exit code 2.
 
-The parent only waits: it passes signals on and the exit code back. The child runs in the sandbox
-where there is one: then it is a new Python that reads the same command line again. Otherwise it is
-a fork, made before anything large is loaded. Either child has a process group of its own, so that a
-signal of the terminal, which goes to a whole group, reaches it once.
+The parent only waits; it forwards signals to the child and returns its exit code. With a sandbox
+the child is a new Python process that parses the same command line. Otherwise it is a fork that is
+made before large modules are loaded. In both cases the child has a separate process group, so that
+a signal from the terminal, which goes to a whole group, reaches it once.
 """
 
 from __future__ import annotations
@@ -45,14 +45,13 @@ CHATTER = (
     "failed call to posix_madvise",
     "UnicodeDecodeError: 'utf-8'",
 )
-"""What libraries print of files that they refuse, and USD of names that are no text; a warning
-says it better."""
+"""Starts of library output that is dropped, since a warning reports the problem in more detail."""
 _NO_VALUE = "No to_python (by-value) converter"
-"""What Boost.Python prints of a value that USD could not read."""
+"""Boost.Python's message about a value that USD cannot read."""
 
 
 COMMAND = "from wavecomb.cli import main; main(prog_name='wavecomb')"
-"""What the child in the sandbox runs."""
+"""Python code that the sandboxed child runs."""
 
 _CHILD = """import sys
 from wavecomb.run.isolate.supervisor import become_child
@@ -62,11 +61,11 @@ become_child(sys.argv.pop(1))
 
 @dataclass
 class Choices:
-    """Options about the child process.
+    """Options of the child process.
 
     Attributes:
         isolate: ``--isolate``: "auto", "on" or "off".
-        sandbox: ``--sandbox``, of ``sandbox.MODES``.
+        sandbox: ``--sandbox``, one of ``sandbox.MODES``.
         reads: Folders of ``--sandbox-read``.
         words: Arguments of the command line.
     """
@@ -82,10 +81,10 @@ _is_child = False
 
 
 def is_wise() -> bool:
-    """Whether a child is safe and invisible to others: Linux, one thread, standard streams.
+    """Returns whether a fork is safe: on Linux, with one thread and the standard streams.
 
-    A program that calls the command line within itself is left as it is, and so is a developer
-    (``WAVECOMB_DEBUG``), who wants to see a crash where it happens.
+    Returns False for programs that call the command line in-process, and with ``WAVECOMB_DEBUG``,
+    so that developers see crashes where they happen.
     """
     return (
         sys.platform == "linux"
@@ -98,17 +97,17 @@ def is_wise() -> bool:
 
 
 def enter(outputs: Outputs, *, gpu: bool = False) -> None:
-    """Continues the command in a child process, before any file of others is read.
+    """Continues the command in a child process, before it reads any untrusted file.
 
-    In the parent this function ends the process when the child has ended. In the child, or where
-    there is to be none, it returns.
+    In the parent this function ends the process when the child has ended. In the child, or without
+    a child, it returns.
 
     Args:
         outputs: Files that the command may write.
         gpu: Whether the command uses GPU devices.
 
     Raises:
-        WavecombError: ``--sandbox on`` or ``--memory-limit`` cannot be obeyed.
+        WavecombError: ``--sandbox on`` or ``--memory-limit`` cannot be applied.
     """
     if not _is_child:
         with_child = choices.isolate == "on" or (choices.isolate == "auto" and is_wise())
@@ -126,9 +125,9 @@ def enter(outputs: Outputs, *, gpu: bool = False) -> None:
 
 
 def supervise() -> None:
-    """Continues in a fork; the parent waits for it and ends as it did.
+    """Continues in a fork; the parent waits for it and exits with its status.
 
-    Contract: one thread. Returns in the child only.
+    Contract: the process has one thread. Returns in the child only.
     """
     global _is_child
     terminal.flush_streams()
@@ -153,11 +152,11 @@ def supervise() -> None:
 
 
 def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAND) -> None:
-    """Runs the command line in the sandbox and ends this process as the child ended.
+    """Runs the command line in the sandbox and exits with the child's status.
 
     Args:
         outputs: Files that the child may have moved to their names.
-        gpu: Whether it uses GPU devices.
+        gpu: Whether the child uses GPU devices.
         program: Python code that the child runs.
     """
     terminal.flush_streams()
@@ -197,14 +196,14 @@ def run_in_sandbox(outputs: Outputs, *, gpu: bool = False, program: str = COMMAN
         if group is not None:
             group.close()
     code = os.waitstatus_to_exitcode(status)
-    # bubblewrap reports a signal as 128 and its number; our own exit codes above that are 130, 143.
+    # bubblewrap reports a signal as 128 plus its number; Wavecomb itself exits with 130 or 143.
     if code > 128 and code not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
         code = 128 - code
     _end(code, sent, page, words)
 
 
 def _variables() -> dict[str, str]:
-    """Environment of the child; what selects Python modules is left out."""
+    """Returns the child's environment, without variables that affect Python's module search."""
     return {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
 
 
@@ -213,7 +212,7 @@ def _memory_file(name: str) -> int:
 
 
 def _private_folder(outputs: Outputs) -> PrivateFolder:
-    """The folder that the child writes to: beside the first output, if that can be."""
+    """Creates the private folder of the child, next to the first output if possible."""
     from wavecomb.machine import temporary_folder
 
     for folder in outputs.resolved().folders():
@@ -224,7 +223,7 @@ def _private_folder(outputs: Outputs) -> PrivateFolder:
 
 
 class _Child:
-    """What the parent knows of the process in the sandbox."""
+    """State of the sandboxed process in the parent."""
 
     def __init__(self, channel: socket.socket, mover: Mover, group: memory.Group | None) -> None:
         self._channel, self._mover, self._group = channel, mover, group
@@ -232,7 +231,7 @@ class _Child:
         self._is_there = threading.Event()
 
     def listen(self) -> None:
-        """Answers the child's requests, on a thread of its own."""
+        """Answers the child's requests on a separate thread."""
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
@@ -249,23 +248,25 @@ class _Child:
             self._mover.serve(self._channel)
 
     def pid(self) -> int:
-        """The id of the Python process, for signals; 0 if it never said so."""
+        """Returns the child's process id for signals; 0 if it did not report in time."""
         self._is_there.wait(5.0)
         return self._pid
 
 
 def become_child(given: str) -> None:
-    """Makes this process, in the sandbox, the child of its parent.
+    """Turns this sandboxed process into the child of its parent.
 
     Args:
-        given: What ``run_in_sandbox`` passes on, as JSON.
+        given: Values from ``run_in_sandbox`` as JSON.
     """
     global _is_child
     _is_child = True
     found = json.loads(given)
     channel = socket.socket(fileno=found["channel"])
-    channel.sendall(b"h")  # the kernel adds the process id as the parent sees it
-    channel.recv(1)  # the parent has put this process into its control group
+    # The kernel attaches this process's id in the parent's namespace.
+    channel.sendall(b"h")
+    # Wait until the parent has added this process to its control group.
+    channel.recv(1)
     private = Path(found["private"])
     files.publisher = Client(channel, private)
     choices.words = tuple(found["words"])
@@ -278,7 +279,7 @@ def become_child(given: str) -> None:
 
 def _become_expendable(parent: int, page: int, words: int) -> None:
     os.setpgid(0, 0)
-    # Of a group that is not the terminal's: writing there must not stop it.
+    # Outside of the terminal's foreground group, writing must not stop the process.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     end_with_parent(parent)
     trail.follow(page)
@@ -289,7 +290,10 @@ def _become_expendable(parent: int, page: int, words: int) -> None:
 
 
 def _say_on(descriptor: int) -> None:
-    """Sends what Python prints to stderr there; what libraries write to descriptor 2 is kept."""
+    """Redirects Python's stderr to the descriptor.
+
+    Output of libraries to descriptor 2 is captured.
+    """
     stderr = sys.stderr
     sys.stderr = terminal.Stream(descriptor, stderr.encoding, is_prompt=True, owns=True)
 
@@ -300,14 +304,14 @@ def _print_exception(kind: type[BaseException], error: BaseException, trace: Any
 
 
 def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
-    """Waits for a process and passes signals on.
+    """Waits for a process and forwards signals.
 
     Args:
-        process: The process to wait for.
-        child: Gives the process that signals go to; 0 if there is none.
+        process: Process to wait for.
+        child: Returns the process that receives signals; 0 if there is none.
 
     Returns:
-        Exit status, and the signals that were passed on.
+        Exit status and the forwarded signals.
     """
     sent: set[int] = set()
     while True:
@@ -319,7 +323,8 @@ def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
             continue
         target = child() or process
         with contextlib.suppress(ProcessLookupError):
-            if number == signal.SIGTSTP:  # Ctrl-Z stops both; SIGCONT continues both
+            # Ctrl-Z stops both processes; SIGCONT continues both.
+            if number == signal.SIGTSTP:
                 os.kill(target, signal.SIGSTOP)
                 os.kill(os.getpid(), signal.SIGSTOP)
             else:
@@ -329,13 +334,13 @@ def _wait(process: int, child: Callable[[], int]) -> tuple[int, set[int]]:
 
 
 def _end(code: int, sent: set[int], page: int, words: int) -> None:
-    """Ends this process as the child ended, or with a line and code 2 where it crashed.
+    """Exits with the child's status, or with a message and code 2 if the child crashed.
 
     Args:
-        code: Exit code of the child, negative for a signal.
-        sent: Signals that were passed on.
-        page: Descriptor of the page with notes.
-        words: Descriptor of what libraries wrote to stderr.
+        code: Exit code of the child; negative for a signal.
+        sent: Forwarded signals.
+        page: Descriptor of the page with progress notes.
+        words: Descriptor of the libraries' stderr output.
     """
     text = os.pread(words, 1 << 20, 0).decode(errors="replace")
     if code < 0 and -code in sent:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an expendable process is at, in memory that outlives it: a page shared with its parent."""
+"""Progress notes of an expendable process, in a page of memory shared with its parent."""
 
 from __future__ import annotations
 
@@ -13,35 +13,36 @@ _page: mmap.mmap | None = None
 
 
 def new_page() -> int:
-    """A descriptor of a page for both processes; it has no name, so nothing is left of it."""
+    """Creates an anonymous page for both processes and returns its descriptor."""
     descriptor = os.memfd_create("wavecomb-trail", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, _SLOT * len(_SLOTS))
     return descriptor
 
 
 def open_page(descriptor: int) -> mmap.mmap:
-    """The page of a descriptor."""
+    """Maps the page of a descriptor."""
     return mmap.mmap(descriptor, _SLOT * len(_SLOTS))
 
 
 def follow(descriptor: int) -> None:
-    """Makes this process note what it is at; from here on it is expendable."""
+    """Starts writing progress notes to a page; from here on this process is expendable."""
     global _page
     _page = open_page(descriptor)
 
 
 def is_expendable() -> bool:
-    """Whether this process has a parent that lives on when it dies, and says why it did."""
+    """Returns whether a parent process outlives this one and reports its crash."""
     return _page is not None
 
 
 def note(what: str, place: object = "", slot: str = "at") -> None:
-    """Notes what begins now. Costs nothing where nobody would read it.
+    """Writes a progress note; does nothing without a parent that reads it.
 
     Args:
-        what: As in "it crashed while ...".
+        what: Activity, as in "it crashed while ...".
         place: Prim or file.
-        slot: "at", "image" for what a thread beside does, or "limit" of memory in MB.
+        slot: "at" for the main activity, "image" for that of a decoding thread, or "limit" for the
+            memory limit in MB.
     """
     if _page is None:
         return
@@ -51,13 +52,13 @@ def note(what: str, place: object = "", slot: str = "at") -> None:
 
 
 def slot(page: mmap.mmap, name: str) -> str:
-    """What the other process noted last in a slot, "" where it noted nothing."""
+    """Returns the last note in a slot, or ""."""
     start = _SLOT * _SLOTS.index(name)
     return page[start : start + _SLOT].split(b"\0")[0].decode(errors="replace").strip()
 
 
 def read(page: mmap.mmap) -> str:
-    """What the other process was at last, "" where it noted nothing."""
+    """Returns the last activity of the other process, or ""."""
     return ", ".join(filter(None, (slot(page, name) for name in ("at", "image"))))
 
 
@@ -68,17 +69,17 @@ _NO_MEMORY = (
     "Resource temporarily unavailable",
     "ut of memory",
 )
-"""How libraries say that there was no memory, for threads too."""
+"""Texts in library messages that mean lack of memory or threads."""
 
 
 def obituary(number: int, where: str, words: str, limit: str = "") -> str:
-    """One line on a process that died of a signal.
+    """Returns the message about a process that a signal terminated.
 
     Args:
-        number: Of the signal.
-        where: As ``read`` gave it.
-        words: What its libraries wrote to stderr.
-        limit: Of its memory, in words.
+        number: Number of the signal.
+        where: Result of ``read``.
+        words: Output of its libraries to stderr.
+        limit: Text of its memory limit.
     """
     try:
         name = signal.Signals(number).name

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras."""
+"""Reads USD cameras: projection, framing, lens and motion."""

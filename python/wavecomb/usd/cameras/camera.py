@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The camera: one of the stage's, or one that frames what there is."""
+"""Reads a USD camera, or makes a default camera that frames the whole stage."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from wavecomb.usd.stage.report import LoadReport
 Matrix = NDArray[np.float64]
 
 _TENTH = 0.1
-"""Focal length and aperture are in tenths of a scene unit."""
+"""USD gives focal length and apertures in tenths of a scene unit."""
 
 _MAX_WINDOW = 1e30
-"""Largest coordinate of a camera's window."""
+"""Largest coordinate of a camera's window on the plane z = -1."""
 
 _LEAST_OF_WINDOW = 2.0**-16
-"""Least size of a camera's window, of its largest coordinate: 128 steps of 32-bit numbers."""
+"""Smallest size of a camera's window relative to its largest coordinate: 128 float32 steps."""
 
 ALL_ROUND = (-math.pi, math.pi, -0.5 * math.pi, 0.5 * math.pi)
-"""Window of a latlong camera: all directions."""
+"""Window of a latlong camera in radians of longitude and latitude: all directions."""
 
 MAX_STOPS = 60.0
 MAX_EXPOSURE = 1e12
-"""Beyond these an exposure is taken for a mistake."""
+"""Exposures beyond these limits are treated as mistakes and ignored."""
 
 MAX_CLIP_PLANES = 16
 
 _FRAME_TAN = 0.4
-"""Half the opening of the default camera, on the plane z = -1."""
+"""Half the width of the default camera's view on the plane z = -1."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,16 @@ class View:
 
 @dataclass(frozen=True)
 class Lens:
-    """What is chosen beside a camera, by options and render settings.
+    """Lens options that come from the command line and render settings, not from the camera prim.
 
     Attributes:
-        projection: One of ``PROJECTIONS``; None: the camera's.
-        exposure: Whether the camera's exposure multiplies light.
-        depth_of_field: Whether its lens blurs what is out of focus.
-        conform: What gives way where the shapes of aperture and picture differ.
-        pixel_aspect: Width of a pixel / its height.
-        settings: Of ``lens.ATTRIBUTES``, as texts; they go before what the prim says.
-        st_map: A file that says how the lens distorts; it goes before coefficients.
+        projection: One of ``PROJECTIONS``; None uses the camera's projection.
+        exposure: Whether the camera's exposure scales the radiance.
+        depth_of_field: Whether the lens blurs objects that are out of focus.
+        conform: How the window is fitted if the aspect ratios of aperture and image differ.
+        pixel_aspect: Width of a pixel divided by its height.
+        settings: Values of ``lens.ATTRIBUTES`` as text; they override the prim's attributes.
+        st_map: Path of an ST map that describes the lens distortion; it overrides coefficients.
     """
 
     projection: str | None = None
@@ -84,10 +84,10 @@ class Lens:
         time: Usd.TimeCode | None = None,
         report: LoadReport | None = None,
     ) -> dict[str, Any]:
-        """Options of a ``View``, those that are not the default.
+        """Returns the keyword arguments of a ``View`` that differ from their defaults.
 
         Raises:
-            WavecombError: A setting, or the map, is no good.
+            WavecombError: A setting or the ST map is invalid.
         """
         out = lens_values(prim, time, self.settings, report or LoadReport())
         if self.st_map is not None:
@@ -100,10 +100,10 @@ class Lens:
 
 
 def find_camera(stage: Usd.Stage, wanted: str | None) -> Usd.Prim | None:
-    """The camera asked for, else the render settings', else the stage's first.
+    """Returns the camera ``wanted``, else that of the render settings, else the first of the stage.
 
     Raises:
-        WavecombError: The camera asked for is none.
+        WavecombError: ``wanted`` names no camera.
     """
     if wanted is not None:
         return _named(stage, wanted)
@@ -128,16 +128,16 @@ def _is_camera(prim: Usd.Prim) -> bool:
 
 
 MAX_CAMERAS = 1000
-"""Cameras that are listed; instances may multiply them."""
+"""Most cameras that are listed, since instancing can multiply them."""
 
 
 def all_cameras(stage: Usd.Stage) -> list[Usd.Prim]:
-    """The cameras of the stage, those inside instances too, in the stage's order."""
+    """Returns the cameras of the stage in stage order, including those inside instances."""
     return list(islice(every(stage, _is_camera), MAX_CAMERAS))
 
 
 def _named(stage: Usd.Stage, wanted: str) -> Usd.Prim:
-    """A camera by path, or by name where that is unique."""
+    """Returns a camera by its path, or by its name if only one camera has that name."""
     if Sdf.Path.IsValidPathString(wanted) and wanted.startswith("/"):
         prim = stage.GetPrimAtPath(wanted)
         if prim and prim.IsA(UsdGeom.Camera):
@@ -157,14 +157,14 @@ def read_camera(
     report: LoadReport,
     lens: Lens = Lens(),
 ) -> View | None:
-    """The view of a camera prim; None, and a warning, where it cannot be used.
+    """Reads the view of a camera prim; warns and returns None if the camera is invalid.
 
     Args:
         prim: A UsdGeomCamera.
-        to_world: (4, 4), row vectors.
-        time: Of evaluation.
-        report: For what is odd.
-        lens: What is chosen beside it.
+        to_world: (4, 4) camera-to-world matrix for row vectors.
+        time: Time code at which attributes are evaluated.
+        report: Collects warnings.
+        lens: Options that override or extend the prim's lens.
     """
     camera = UsdGeom.Camera(prim)
     path = prim.GetPath()
@@ -173,7 +173,7 @@ def read_camera(
     wide = number(camera.GetHorizontalApertureAttr().Get(time), 20.955)
     high = number(camera.GetVerticalApertureAttr().Get(time), 15.2908)
     if frame is None or focal <= 0 or wide <= 0 or high <= 0:
-        report.warn("camera left out: its transform, focal length or aperture is no good", path)
+        report.warn("camera left out: its transform, focal length or aperture is invalid", path)
         return None
     x = number(camera.GetHorizontalApertureOffsetAttr().Get(time), 0.0)
     y = number(camera.GetVerticalApertureOffsetAttr().Get(time), 0.0)
@@ -213,14 +213,14 @@ def read_camera(
 
 
 def _is_window(window: tuple[float, ...]) -> bool:
-    """Whether 32-bit numbers hold what a camera sees of a plane, at a pixel or so."""
+    """Returns whether float32 can represent the window to about one pixel."""
     x0, x1, y0, y1 = window
     largest, smallest = max(map(abs, window)), min(x1 - x0, y1 - y0)
     return largest <= _MAX_WINDOW and smallest >= max(_LEAST_OF_WINDOW * largest, 1.0 / _MAX_WINDOW)
 
 
 def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport) -> float:
-    """What a camera multiplies light by: ``UsdGeomCamera::ComputeLinearExposureScale``."""
+    """Returns the exposure factor, as ``UsdGeomCamera::ComputeLinearExposureScale`` defines it."""
     prim = camera.GetPrim()
 
     def value(name: str, default: float) -> float:
@@ -230,7 +230,7 @@ def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadRepo
     iso, seconds = value("exposure:iso", 100.0), value("exposure:time", 1.0)
     stop, response = value("exposure:fStop", 1.0), value("exposure:responsivity", 1.0)
     if min(iso, seconds, response) < 0 or stop <= 0 or abs(stops) > MAX_STOPS:
-        report.warn("camera exposure left out: a value of it is no good", prim.GetPath())
+        report.warn("camera exposure left out: one of its values is invalid", prim.GetPath())
         return 1.0
     scale = 2.0**stops * seconds * iso / 100.0 * response / (stop * stop)
     if not scale <= MAX_EXPOSURE:
@@ -242,14 +242,14 @@ def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadRepo
 def _clip_planes(
     camera: UsdGeom.Camera, time: Usd.TimeCode, report: LoadReport
 ) -> list[tuple[float, ...]]:
-    """Clipping planes (a, b, c, d) in the camera's space; those that are no good are left out."""
+    """Reads the clipping planes (a, b, c, d) in camera space; warns about invalid ones."""
     found = []
     for plane in camera.GetClippingPlanesAttr().Get(time) or ():
         numbers = tuple(map(float, plane))
         if np.isfinite(numbers).all() and any(numbers[:3]):
             found.append(numbers)
         else:
-            report.warn("clipping plane of a camera left out: it is none", camera.GetPath())
+            report.warn("clipping plane of a camera left out: it is invalid", camera.GetPath())
     if len(found) > MAX_CLIP_PLANES:
         report.warn(f"camera has more than {MAX_CLIP_PLANES} clipping planes", camera.GetPath())
     return found[:MAX_CLIP_PLANES]
@@ -258,9 +258,9 @@ def _clip_planes(
 def camera_motion(
     prim: Usd.Prim, motion: Motion | None, origin: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> Matrix | None:
-    """Transforms (s, 4, 4) of a camera at equal steps over the shutter; None: it stands still.
+    """Returns (s, 4, 4) transforms at equal steps over the shutter; None if the camera is static.
 
-    ``origin``: world position that the scene is built around.
+    ``origin`` is the world-space position that becomes the origin of the scene.
     """
     if motion is None:
         return None
@@ -277,7 +277,7 @@ def camera_motion(
 
 
 def _rigid(to_world: Matrix) -> Matrix | None:
-    """A camera's transform without scale; None where it has no inverse."""
+    """Returns a camera's transform without scale; None if it has no inverse."""
     out = np.array(to_world, np.float64)
     lengths = np.linalg.norm(out[:3, :3], axis=1)
     if not np.isfinite(out).all() or lengths.min() <= 0:
@@ -287,9 +287,10 @@ def _rigid(to_world: Matrix) -> Matrix | None:
 
 
 def _frame_axes(up_axis: str) -> Matrix:
-    """Right, up and back of the default camera.
+    """Returns the right, up and back axes of the default camera.
 
-    It is half right of the front, a little above; the front is +Z, or -Y where Z is up.
+    The camera looks at the front from slightly to the right and above. The front is +Z, or -Y if Z
+    is up.
     """
     up = np.array({"X": (1.0, 0, 0), "Z": (0, 0, 1.0)}.get(up_axis, (0, 1.0, 0)))
     front = {"X": (0, 0, 1.0), "Z": (0, -1.0, 0)}.get(up_axis, (0, 0, 1.0))
@@ -302,14 +303,14 @@ def _frame_axes(up_axis: str) -> Matrix:
 
 
 def _frame_half(lens: Lens, size: tuple[int, int]) -> tuple[float, float]:
-    """Half of what the default camera's picture shows of the plane z = -1."""
+    """Returns half the width and height that the default camera sees of the plane z = -1."""
     t = _FRAME_TAN
     x0, x1, y0, y1 = fitted_window((-t, t, -t, t), *size, lens.conform, lens.pixel_aspect)
     return 0.5 * (x1 - x0), 0.5 * (y1 - y0)
 
 
 def frame_planes(up_axis: str, lens: Lens, size: tuple[int, int]) -> Matrix:
-    """Directions (4, 3) in which ``frame_points`` asks how far points reach; likewise."""
+    """Returns the directions (4, 3) whose extents ``frame_points`` needs for the same arguments."""
     flat = lens.projection == "orthographic"
     return planes(_frame_axes(up_axis), None if flat else _frame_half(lens, size))
 
@@ -320,13 +321,13 @@ def frame_points(
     lens: Lens = Lens(),
     size: tuple[int, int] = (1, 1),
 ) -> View:
-    """A three-quarter view that points (n, 3) fill; None: of the origin.
+    """Returns a three-quarter view that frames points (n, 3); None frames a cube at the origin.
 
     Args:
-        points: Of what is drawn, as ``framing.outline`` gives them.
+        points: Outline points of the visible geometry, from ``framing.outline``.
         up_axis: "X", "Y" or "Z".
-        lens: What is chosen of the camera.
-        size: Width and height of the picture, for its shape.
+        lens: Lens options.
+        size: Width and height of the image; only their ratio matters.
     """
     if points is None or len(points) == 0:
         points = corners(np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]))

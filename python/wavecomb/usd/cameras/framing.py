@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames what is drawn: the points that its silhouettes hang on, and the view that they fill."""
+"""Outlines of geometry (its extreme points), and camera positions that frame them."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ Points = NDArray[np.float64]
 Matrices = NDArray[np.float64]
 
 FILLED = 0.9
-"""What is seen spans this much of the picture, in the dimension that it fills first."""
+"""Fraction of the image that the geometry spans in the dimension that it fills first."""
 
 _DIRECTIONS = 162
-"""A sphere's silhouette is found to 1.5 %."""
+"""Number of directions; they find the silhouette of a sphere to within 1.5 %."""
 
 _BLOCK = 1 << 15
-"""Points that are looked at together."""
+"""Points that are processed together, which bounds the memory used."""
 
 _RUN = 256
 _SAMPLE = 4096
 
 _FEW_POINTS = 200
-"""These are taken as they are."""
+"""Point sets up to this size are their own outline."""
 
 MANY_POINTS = 1 << 16
-"""More are made fewer before others are added."""
+"""Larger collections of points are reduced to their outline before more points are added."""
 
 _FEW_PLACES = 512
-"""Placements of a group that are all looked at; of more those that reach farthest."""
+"""Instance counts up to this are processed completely; of more, only the extreme instances."""
 
 
 def _spread(count: int) -> Points:
-    """Unit vectors spread evenly over all directions (Fibonacci's lattice), (count, 3)."""
+    """Returns (count, 3) unit vectors, evenly distributed over the sphere (Fibonacci lattice)."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(count)
     r = np.sqrt(1.0 - z * z)
@@ -44,16 +44,16 @@ def _spread(count: int) -> Points:
 
 
 DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3), _spread(_DIRECTIONS - 6)])
-"""Along the axes first, so that boxes are framed exactly."""
+"""Directions of outlines; the six axes come first, so that boxes are framed exactly."""
 
 
 def with_directions(more: Points | None) -> Points:
-    """``DIRECTIONS`` and those in which it is to be exact (k, 3)."""
+    """Returns ``DIRECTIONS`` followed by ``more`` (k, 3), in which the outline is exact."""
     return DIRECTIONS if more is None else np.concatenate([DIRECTIONS, more])
 
 
 def outline(points: NDArray[Any], more: Points | None = None) -> Points:
-    """Those of some points (n, 3) that reach farthest in one of some directions."""
+    """Returns those of the points (n, 3) that are extreme in at least one direction."""
     if len(points) <= _FEW_POINTS:
         return np.asarray(points, np.float64)
     directions = with_directions(more).astype(np.float32)
@@ -64,7 +64,7 @@ def outline(points: NDArray[Any], more: Points | None = None) -> Points:
 def outline_of_balls(
     points: NDArray[Any], radii: NDArray[Any], more: Points | None = None
 ) -> Points:
-    """Where balls about points (n, 3) reach farthest."""
+    """Returns the extreme points of balls with centres (n, 3) and radii (n,) in all directions."""
     directions = with_directions(more)
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
     some, size = np.asarray(points, np.float32), np.asarray(radii, np.float32)
@@ -75,7 +75,7 @@ def outline_of_balls(
 def _farthest(
     points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
 ) -> NDArray[np.intp]:
-    """Which of some points, or balls, reaches farthest in each of some directions (k, 3)."""
+    """Returns the index of the point or ball that is extreme in each direction (k, 3)."""
     chosen = np.arange(len(points))
     if len(points) > _BLOCK:
         chosen = _near_the_outside(points, radii, directions)
@@ -96,16 +96,16 @@ def _farthest(
 def _near_the_outside(
     points: NDArray[np.float32], radii: NDArray[np.float32] | None, directions: NDArray[np.float32]
 ) -> NDArray[np.intp]:
-    """Leaves out runs of points whose boxes lie inside of what a sample of all reaches.
+    """Returns indices of points without those runs whose bounds lie inside the outline of a sample.
 
-    Points that follow each other in a mesh are mostly near each other.
+    Consecutive points of a mesh are mostly close to each other, so runs have small bounds.
     """
     step = max(1, len(points) // _SAMPLE)
     reached = directions @ points[::step].T
     if radii is not None:
         reached += radii[::step]
     whole = len(points) // _RUN * _RUN
-    # One axis after the other: reductions over the last one are quick.
+    # NumPy reduces over the last axis quickly, so the coordinate axis comes first.
     runs = np.ascontiguousarray(points[:whole].T).reshape(3, -1, _RUN)
     low, high = runs.min(axis=2), runs.max(axis=2)
     most = 0.5 * (directions @ (low + high) + np.abs(directions) @ (high - low))
@@ -117,12 +117,12 @@ def _near_the_outside(
 
 
 def corners(bounds: NDArray[Any]) -> Points:
-    """The eight corners of a box (2, 3)."""
+    """Returns the eight corners (8, 3) of a box (2, 3)."""
     return np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i, j, k in np.ndindex(2, 2, 2)])
 
 
 def placed(points: Points, transforms: Matrices, more: Points | None = None) -> Points:
-    """The outline of points (n, 3) that are placed k times, by transforms (k, 4, 4)."""
+    """Returns the outline of points (n, 3) that are instanced by transforms (k, 4, 4)."""
     if len(transforms) > _FEW_PLACES:
         centre = points.mean(axis=0)
         radius = float(np.linalg.norm(points - centre, axis=1).max())
@@ -140,9 +140,11 @@ def placed(points: Points, transforms: Matrices, more: Points | None = None) -> 
 def _farthest_places(
     middles: Points, sizes: NDArray[np.float64], directions: Points
 ) -> NDArray[np.intp]:
-    """Which ball (k, 3) of some sizes (k,), or (1,) for all, reaches farthest in each direction.
+    """Returns the index of the ball that is extreme in each direction.
 
-    Some of them at a time: distances of millions in all directions would be gigabytes.
+    ``middles`` are (k, 3) centres; ``sizes`` are (k,) radii, or (1,) for a common radius. Processes
+    blocks of balls, since the distances of millions of balls in all directions would take
+    gigabytes.
     """
     columns = np.arange(len(directions))
     best, found = np.full(len(directions), -np.inf), np.zeros(len(directions), np.intp)
@@ -157,13 +159,13 @@ def _farthest_places(
 
 
 def joined(parts: Iterable[Points], more: Points | None = None) -> Points | None:
-    """The outline of several together; None of none."""
+    """Returns the outline of several point sets together; None if there are none."""
     known = list(parts)
     return outline(np.concatenate(known), more) if known else None
 
 
 def planes(axes: Matrices, half: tuple[float, float] | None) -> Points:
-    """Normals of the planes that ``fit`` works with, (4, 3); ``half`` None: of ``fit_flat``."""
+    """Returns the plane normals (4, 3) that ``fit`` uses, or ``fit_flat`` if ``half`` is None."""
     return np.array(
         [
             sign * axes[axis] + (0.0 if half is None else FILLED * half[axis]) * axes[2]
@@ -176,20 +178,20 @@ def planes(axes: Matrices, half: tuple[float, float] | None) -> Points:
 def fit(
     points: Points, axes: Matrices, half: tuple[float, float], margin: float = FILLED
 ) -> Points:
-    """Where a pinhole camera stands from which points fill its picture.
+    """Computes the position from which a pinhole camera frames the points.
 
-    A point (x, y, z) in the camera's axes is within the picture where |x - cx| <= half (cz - z):
-    four planes, of which two opposite ones touch the points in the end. The points are in the
-    middle of the picture as these planes see them.
+    A point (x, y, z) in camera axes is inside the image where |x - cx| <= half (cz - z), and the
+    same for y. This gives four planes; the tighter pair of opposite planes touches the points, and
+    the points are centred between both pairs.
 
     Args:
         points: (n, 3).
-        axes: (3, 3), rows are right, up and back.
-        half: Half the picture's width and height on the plane z = -1.
-        margin: How much of the picture the points span.
+        axes: (3, 3); the rows are right, up and back.
+        half: Half the image's width and height on the plane z = -1.
+        margin: Fraction of the image that the points span.
 
     Returns:
-        (3,) in the space of the points.
+        (3,) camera position in the space of the points.
     """
     local = points @ axes.T
     place = np.zeros(3)
@@ -208,7 +210,7 @@ def fit(
 def fit_flat(
     points: Points, axes: Matrices, half: tuple[float, float], margin: float = FILLED
 ) -> tuple[Points, float]:
-    """The same for an orthographic camera: the middle, and what its window is multiplied by."""
+    """Returns the centre (3,) and the window scale that frame points orthographically."""
     local = points @ axes.T
     low, high = local.min(axis=0), local.max(axis=0)
     place = 0.5 * (low + high)

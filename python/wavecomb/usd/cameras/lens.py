@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a lens does beside blurring: distortion, aperture, rolling shutter (docs/cameras.md)."""
+"""Lens properties besides focus: distortion, aperture, rolling shutter (docs/cameras.md)."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ ATTRIBUTES = {
     "rolling_shutter": ("wavecomb:lens:rollingShutter", f"{_ARNOLD}rolling_shutter"),
     "rolling_duration": ("wavecomb:lens:rollingDuration", f"{_ARNOLD}rolling_shutter_duration"),
 }
-"""Parameters of the core's camera, and the attributes that say them; the first that is there."""
+"""Camera parameter of the core -> USD attributes; the first one that is authored is used."""
 
 MAP_NODES = 256
-"""Nodes of a map along each edge of the picture."""
+"""Nodes of an ST map along each edge of the image."""
 
 
 def lens_values(
     prim: Usd.Prim | None, time: Usd.TimeCode | None, chosen: Mapping[str, str], report: LoadReport
 ) -> dict[str, Any]:
-    """Values of ``ATTRIBUTES`` for ``set_camera``: of options, else as the prim says.
+    """Returns values of ``ATTRIBUTES`` for ``set_camera``; ``chosen`` overrides the prim.
 
     Args:
-        prim: The camera; None: there is none.
-        time: Of evaluation.
-        chosen: Values by name, as texts.
-        report: For attributes that are no good.
+        prim: The camera prim, or None.
+        time: Time code at which attributes are evaluated.
+        chosen: Values by parameter name, as text.
+        report: Collects warnings about invalid attributes.
 
     Raises:
-        WavecombError: A value that is chosen is no good.
+        WavecombError: A value of ``chosen`` is invalid.
     """
     out: dict[str, Any] = {}
     for name in ATTRIBUTES:
@@ -62,7 +62,7 @@ def lens_values(
 
 
 def _authored(prim: Usd.Prim, name: str, time: Usd.TimeCode | None, report: LoadReport) -> Any:
-    """What a prim says; None where it says nothing, or nothing good."""
+    """Returns the authored value of a parameter; None if it is missing or invalid."""
     for attribute in ATTRIBUTES[name]:
         there = prim.GetAttribute(attribute)
         given = there.Get(time or Usd.TimeCode.Default()) if there else None
@@ -70,13 +70,13 @@ def _authored(prim: Usd.Prim, name: str, time: Usd.TimeCode | None, report: Load
             continue
         value = _value(name, given)
         if value is None:
-            report.warn(f"{attribute} of a camera left out: it is none", prim.GetPath())
+            report.warn(f"{attribute} of a camera left out: it is invalid", prim.GetPath())
         return value
     return None
 
 
 def check_names(chosen: Mapping[str, str]) -> None:
-    """Raises WavecombError for a name that is no setting of lenses."""
+    """Raises WavecombError for a name that is not a lens setting."""
     for name in chosen:
         if name not in ATTRIBUTES:
             raise WavecombError(
@@ -90,7 +90,7 @@ def _kind(name: str) -> str:
 
 
 def _value(name: str, given: Any) -> Any:
-    """A value of a parameter; None where it is none."""
+    """Converts a value of a parameter; returns None if it is invalid."""
     row = camera_parameters()[name]
     if row.choices:
         return str(given) if str(given) in row.choices else None
@@ -103,14 +103,15 @@ def _value(name: str, given: Any) -> Any:
 
 
 def read_map(path: str) -> list[list[float]]:
-    """An ST map as ``lens_map`` of ``set_camera``.
+    """Reads an ST map as the ``lens_map`` argument of ``set_camera``.
 
-    Red is s, to the right, and green t, upwards: where in the undistorted picture the distorted
-    one has its pixel, from its lower left corner (0, 0) to its upper right one (1, 1).
+    The red channel is s (rightwards) and the green channel is t (upwards). They give the position
+    in the undistorted image that each pixel of the distorted image shows, from (0, 0) at the lower
+    left corner to (1, 1) at the upper right corner.
 
     Raises:
-        WavecombError: The file has no such channels, or values that are not finite.
-        OSError: It cannot be read.
+        WavecombError: The file lacks these channels, or values are not finite.
+        OSError: The file cannot be read.
     """
     layers = read_layers(path)
     plane = layers.get("beauty")
@@ -126,7 +127,7 @@ def read_map(path: str) -> list[list[float]]:
 
 
 def _resampled(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """Pixels along an axis as nodes from edge to edge; straight on beyond the outer pixels."""
+    """Resamples pixels along an axis to nodes from edge to edge; extrapolates linearly at edges."""
     values = np.moveaxis(values, axis, 0)
     size = len(values)
     at = np.linspace(0.0, size, MAP_NODES) - 0.5

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes, shapes, curves and points as arrays for the core."""
+"""Reads meshes, implicit shapes, curves, points and splats as arrays for the core."""

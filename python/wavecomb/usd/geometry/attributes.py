@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Primvars that materials read, as attributes of meshes in the scene."""
+"""Converts primvars that materials read to mesh attributes of the core."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from wavecomb.usd.geometry.mesh_arrays import MeshArrays
 from wavecomb.usd.geometry.primvar import Primvar, PrimvarError, fitting, spread
 
 MAX_WIDTH = 4
-"""Components of an attribute."""
+"""Most components of an attribute."""
 
 Attributes = dict[str, tuple[str, NDArray[np.float32]]]
-"""Name -> (rate, values (k, c)), as ``SceneBuilder.add_mesh`` takes them."""
+"""Name -> (rate, values (k, c)), in the form that ``SceneBuilder.add_mesh`` takes."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A primvar that a material of a mesh reads and that fits the mesh.
+    """A primvar that a bound material reads and that fits the mesh.
 
     Attributes:
-        primvar: As authored, finite.
-        width: Components that are read.
+        primvar: The primvar; its values are finite.
+        width: Number of components that are read.
     """
 
     primvar: Primvar
@@ -35,31 +35,31 @@ class Wanted:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is the same everywhere."""
+        """Whether all values are equal."""
         values = self.primvar.values[:, : self.width]
         return len(values) == 1 or bool((values == values[0]).all())
 
     @property
     def first(self) -> NDArray[np.float32]:
-        """(width,) The first value, which is all of them where it is constant."""
+        """(width,) first value, which is every value if the primvar is constant."""
         return self.primvar.values[0, : self.width]
 
     @property
     def mean(self) -> NDArray[np.float64]:
-        """(width,) Of all values."""
+        """(width,) mean of all values."""
         return np.asarray(self.primvar.values[:, : self.width].mean(axis=0, dtype=np.float64))
 
     @property
     def highest(self) -> float:
-        """The largest of all components."""
+        """Largest component of all values."""
         return float(self.primvar.values[:, : self.width].max())
 
 
 def check_fit(primvar: Primvar, mesh: MeshArrays | CurveArrays, width: int) -> None:
-    """Sees whether a primvar fits a gprim.
+    """Checks whether a primvar fits a gprim.
 
     Raises:
-        PrimvarError: It does not.
+        PrimvarError: The number of values or components does not fit.
     """
     if isinstance(mesh, CurveArrays):
         mesh.topology.fit(primvar, width)
@@ -72,9 +72,9 @@ def check_fit(primvar: Primvar, mesh: MeshArrays | CurveArrays, width: int) -> N
 def on_shape(
     wanted: Mapping[str, Wanted], mesh: MeshArrays | CurveArrays, mirrored: bool
 ) -> Attributes:
-    """Primvars on the triangles of a mesh, on segments of curves or on points.
+    """Converts primvars to attributes of triangles, curve segments or points.
 
-    ``mirrored``: the triangles of the mesh are those of its topology the other way round.
+    ``mirrored`` says that the mesh's triangles have the reverse winding of its topology.
     """
     return {name: _on_shape(one, mesh, mirrored) for name, one in wanted.items()}
 
@@ -101,7 +101,7 @@ def _on_shape(
 
 
 class RefinedAttributes:
-    """Primvars of a cage on the triangles that are made of it."""
+    """Primvars of a cage, refined to the triangles of the subdivided mesh."""
 
     def __init__(self, wanted: Mapping[str, Wanted]) -> None:
         self._wanted = wanted
@@ -112,7 +112,7 @@ class RefinedAttributes:
         ]
 
     def described(self, cage: Any, level: int) -> list[dict[str, Any]]:
-        """Those that have to be refined, as ``SceneBuilder.make_surfaces`` takes primvars."""
+        """Returns the primvars to refine, in the form that ``SceneBuilder.make_surfaces`` takes."""
         chosen = [self._wanted[name] for name in self._refined]
         if level > 0:
             return [cage.primvar(one.primvar, one.width) for one in chosen]
@@ -125,7 +125,7 @@ class RefinedAttributes:
         return out
 
     def of(self, refined: Mapping[str, Any]) -> Attributes:
-        """All of them, for what ``SceneBuilder.make_surfaces`` made."""
+        """Returns all attributes for a result of ``SceneBuilder.make_surfaces``."""
         out: Attributes = dict(zip(self._refined, refined["primvars"], strict=True))
         for name, one in self._wanted.items():
             if name in out:
@@ -139,6 +139,6 @@ class RefinedAttributes:
 
 
 def _packed(values: NDArray[Any], width: int) -> NDArray[np.float32]:
-    """Values as (k, width) float32 in rows."""
+    """Returns values as contiguous (k, width) float32."""
     cut = np.asarray(values)[..., :width]
     return np.ascontiguousarray(cut.reshape(-1, width), np.float32)

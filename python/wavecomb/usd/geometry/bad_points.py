@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points that are not finite or absurdly far away: what uses them is left out, no more."""
+"""Leaves out only those faces or curves that use points that are not finite or too far away."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from wavecomb.usd.geometry.triangulate import MeshError
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
-WHY = "points of theirs are not finite or absurdly far away"
+WHY = "they have points that are not finite or absurdly far away"
 
 
 def bad_points(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
-    """(n,) Which points (n, 3), under a transform, cannot be drawn."""
+    """Returns a mask (n,) of the points (n, 3) that are invalid under a transform."""
     there = points if matrix == IDENTITY else bake(points, matrix)
     return np.asarray(~(np.abs(there) < LIMIT).all(axis=1))
 
@@ -27,21 +27,21 @@ def bad_points(points: Array, matrix: Gf.Matrix4d = IDENTITY) -> Mask:
 def without_bad(
     points: Array, matrix: Gf.Matrix4d, counts: Ints, indices: Ints, holes: Ints | None
 ) -> tuple[Array, Ints, str]:
-    """A mesh without the faces that use bad points.
+    """Removes the faces of a mesh that use invalid points.
 
     Args:
-        points: (n, 3), some of which are bad under ``matrix``.
-        matrix: From the mesh to its group.
-        counts: (faces,) corners of each face.
-        indices: (corners,) points.
-        holes: Faces that are not drawn.
+        points: (n, 3); some are invalid under ``matrix``.
+        matrix: Transform from the mesh to its group.
+        counts: (faces,) number of corners of each face.
+        indices: (corners,) point indices.
+        holes: Indices of faces that are not drawn.
 
     Returns:
-        Points without bad ones, faces that are not drawn, and words for what is left out; "" where
-        no face uses a bad point.
+        Points with invalid ones replaced, faces that are not drawn, and a message about the faces
+        left out, which is "" if no face uses an invalid point.
 
     Raises:
-        MeshError: No face is left, or counts and indices do not fit together.
+        MeshError: No face remains, or counts and indices are inconsistent.
     """
     bad = bad_points(points, matrix)
     faces = faces_with(bad, counts, indices)
@@ -51,10 +51,10 @@ def without_bad(
 
 
 def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
-    """The faces of at least 3 corners that use a bad point.
+    """Returns the faces with at least 3 corners that use an invalid point.
 
     Raises:
-        MeshError: These are all faces, or counts and indices do not fit together.
+        MeshError: All faces use one, or counts and indices are inconsistent.
     """
     if len(counts) and counts.min() < 0:
         raise MeshError("a face has a negative number of corners")
@@ -74,9 +74,9 @@ def faces_with(bad: Mask, counts: Ints, indices: Ints) -> Ints:
 
 
 def filled(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
-    """Points with each bad one in the middle of the good ones of its faces.
+    """Replaces each invalid point by the mean of the valid points of its faces.
 
-    There it pulls least at the faces beside, where these are subdivided.
+    There it distorts adjacent faces least when they are subdivided.
     """
     out = points.copy()
     good = np.flatnonzero(~bad)
@@ -100,9 +100,9 @@ def filled(points: Array, bad: Mask, counts: Ints, indices: Ints) -> Array:
 
 
 def steadied(shapes: Sequence[Array]) -> list[Array]:
-    """Points at steps of the shutter, bad ones where they are at the nearest step that is good.
+    """Replaces invalid points at shutter steps by their value at the nearest valid step.
 
-    Those that are good at no step are at the first good point. Equal shapes stay the same objects.
+    Points that are never valid become the first valid point. Equal arrays remain the same objects.
     """
     masks = [bad_points(shape) for shape in shapes]
     if not any(mask.any() for mask in masks):

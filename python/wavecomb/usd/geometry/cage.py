@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The polygons that a subdivision surface is made from, and its rules."""
+"""Control cage of a subdivision surface, with its boundary, crease and corner rules."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ Floats = NDArray[np.float32]
 
 @dataclass
 class Cage:
-    """A mesh as authored, in its own space.
+    """A mesh as authored, in object space.
 
     Attributes:
         points: (n, 3).
-        counts: (faces,) corners of each face.
-        indices: (corners,) points.
-        matrix: From its space to its group's.
-        left_handed: Its faces are clockwise from outside.
-        scheme: One of ``SCHEMES``, or "none": polygons, to be displaced only.
-        rules: What ``SceneBuilder.make_surfaces`` takes of boundary, creases, corners and holes.
-        uvs: Texture coordinates.
-        topology: Its triangles as polygons.
-        smooth: Whether polygons have normals at all.
-        steps: Points and matrices at equal steps over the shutter; none: it keeps its shape.
+        counts: (faces,) number of corners of each face.
+        indices: (corners,) point indices.
+        matrix: Transform from the mesh to its group.
+        left_handed: Whether faces are clockwise when seen from outside.
+        scheme: One of ``SCHEMES``, or "none" for polygons that are only displaced.
+        rules: Boundary, crease, corner and hole arguments of ``SceneBuilder.make_surfaces``.
+        uvs: Primvar of the texture coordinates.
+        topology: The cage as triangles.
+        smooth: Whether the polygons have normals.
+        steps: Points and matrices at equal steps over the shutter; empty if the mesh is static.
     """
 
     points: Floats
@@ -58,7 +58,7 @@ class Cage:
     steps: Sequence[tuple[Floats, Gf.Matrix4d]] = ()
 
     def triangles_at(self, level: int) -> int:
-        """Triangles that ``level`` steps of subdivision make."""
+        """Returns the number of triangles after ``level`` subdivision steps."""
         if level == 0:
             return self.topology.count
         if self.scheme == "loop":
@@ -66,13 +66,13 @@ class Cage:
         return 2 * len(self.indices) * int(4 ** (level - 1))
 
     def over_shutter(self, description: dict[str, Any]) -> list[dict[str, Any]]:
-        """A description for ``SceneBuilder.make_surfaces`` as one for each step."""
+        """Returns a ``SceneBuilder.make_surfaces`` description for each shutter step."""
         if not self.steps:
             return [description]
         return [description | {"points": p, "matrix": np.array(m)} for p, m in self.steps]
 
     def primvar(self, primvar: Primvar, width: int) -> dict[str, Any]:
-        """A primvar as ``SceneBuilder.make_surfaces`` takes it; one that fits (``spread`` says)."""
+        """Converts a valid primvar to the form that ``SceneBuilder.make_surfaces`` takes."""
         from wavecomb import _core
 
         values = np.nan_to_num(
@@ -85,7 +85,8 @@ class Cage:
             kind = "faceVarying"
             corners = np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
         elif kind == "faceVarying" and index is not None:
-            # As authored: corners with different indices are apart even if their values agree.
+            # Keep authored indices: corners with different indices are separate even if values are
+            # equal.
             corners, table = index, np.zeros((int(index.max()) + 1, values.shape[1]), np.float32)
             table[index] = values
             values = table
@@ -97,7 +98,7 @@ class Cage:
 
 
 def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[str, Any]:
-    """Boundary rules, creases, corners and holes of a UsdGeomMesh."""
+    """Reads boundary rules, creases, corners and holes of a UsdGeomMesh."""
     get, path = prim.GetAttribute, prim.GetPath()
 
     def token(name: str, known: Sequence[str], default: str) -> str:
@@ -145,13 +146,13 @@ def read_rules(prim: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[s
 
 
 SHARP = 1.0
-"""Crease sharpness from which an edge of polygons is drawn as an edge."""
+"""Crease sharpness from which an unsubdivided mesh shows a hard edge."""
 
 
 def sharp_edges(
     prim: Usd.Prim, point_count: int, time: Usd.TimeCode, report: LoadReport
 ) -> NDArray[np.int64] | None:
-    """Edges (k, 2) of a mesh drawn as polygons whose creases are sharp; None: it has no creases."""
+    """Returns hard edges (k, 2) of a mesh that is drawn as polygons; None if it has no creases."""
     get = prim.GetAttribute
     indices = as_integers(get("creaseIndices").Get(time))
     lengths = as_integers(get("creaseLengths").Get(time))
@@ -166,12 +167,12 @@ def sharp_edges(
 def crease_pairs(
     indices: Ints, lengths: Ints, sharpness: Floats
 ) -> tuple[NDArray[np.int32], Floats] | None:
-    """Edges (k, 2) of creases and the sharpness of each, (k,); None where the lengths do not fit.
+    """Returns edges (k, 2) and sharpness (k,) of creases; None if the lengths do not fit.
 
     Args:
-        indices: Points of all creases, one after the other.
-        lengths: How many points each has.
-        sharpness: One for each crease or for each edge.
+        indices: Point indices of all creases, one crease after the other.
+        lengths: Number of points of each crease.
+        sharpness: One value per crease or per edge.
     """
     if len(lengths) == 0 or lengths.min() < 2 or lengths.sum(dtype=np.int64) != len(indices):
         return None

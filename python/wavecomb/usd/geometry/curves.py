@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeomBasisCurves, NURBS and Hermite curves as arrays for the core."""
+"""Reads UsdGeomBasisCurves, NURBS curves and Hermite curves as arrays for the core."""
 
 from __future__ import annotations
 
@@ -49,17 +49,17 @@ _OTHERS: dict[str, Callable[..., Strands]] = {
 
 @dataclass
 class CurveArrays:
-    """Curves or points in their group's space.
+    """Curves or points in the space of their group.
 
     Attributes:
         kind: linear-tube, cubic-tube, linear-ribbon or cubic-ribbon; sphere for points.
         positions: (n, 3) control points or points, or (s, n, 3) at s steps over the shutter.
-        segments: (m,) as ``SceneBuilder.add_curves`` takes them; None for points.
+        segments: (m,) segment words of ``SceneBuilder.add_curves``; None for points.
         radii: (n,).
-        normals: (n, 3) of ribbons, or (s, n, 3).
-        uvs: (m, 2, 2) at both ends of segments; (n, 2) for points; None: none wanted.
-        bounds: (2, 3).
-        topology: What primvars of the prim are spread over.
+        normals: (n, 3) or (s, n, 3) normals of ribbons; None for tubes and points.
+        uvs: (m, 2, 2) at both ends of segments, or (n, 2) for points; None if not needed.
+        bounds: (2, 3) lowest and highest coordinates.
+        topology: Layout that maps primvars of the prim to segments.
     """
 
     kind: str
@@ -73,7 +73,7 @@ class CurveArrays:
 
 
 def uniform_scale(matrix: Gf.Matrix4d) -> float | None:
-    """The factor of a transform that scales all directions alike; None for others."""
+    """Returns the scale factor of a uniformly scaling transform; None for other transforms."""
     if matrix == IDENTITY:
         return 1.0
     linear = np.array(matrix)[:3, :3]
@@ -85,7 +85,7 @@ def uniform_scale(matrix: Gf.Matrix4d) -> float | None:
 
 
 class CurveReader:
-    """Reads curves of one stage."""
+    """Reader of the curves of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time
@@ -99,17 +99,19 @@ class CurveReader:
         inherited: Sequence[Any] = (),
         detail: StrandDetail | None = None,
     ) -> CurveArrays | None:
-        """Curves in their group's space; None where there are none.
+        """Reads curves in the space of their group; returns None if there are none.
 
         Args:
             prim: A UsdGeomCurves.
-            matrix: From the prim to its group, with a ``uniform_scale``.
-            uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
-            inherited: Primvars of its ancestors.
-            detail: Leaves some out, and widens the others; the group is the world then.
+            matrix: Transform from the prim to its group; it has a ``uniform_scale``.
+            uv_names: Primvars for texture coordinates, of which the first existing one is used;
+                empty if no texture coordinates are needed.
+            inherited: Constant primvars of its ancestors.
+            detail: Simplification that removes thin strands and widens others; the group is the
+                world then.
 
         Raises:
-            MeshError: They cannot be drawn.
+            MeshError: The curves are invalid.
         """
         check_matrix(matrix)
         points = read_points(prim, self.time)
@@ -147,7 +149,7 @@ class CurveReader:
         )
 
     def _without(self, bad: NDArray[np.bool_], strands: Strands, prim: Usd.Prim) -> Strands:
-        """The curves that use no bad point."""
+        """Returns the layout without curves that use an invalid point."""
         kept = strands.over_each(np.maximum, bad) == 0
         if not kept.any():
             raise MeshError("their points are not finite or absurdly far away")
@@ -176,7 +178,7 @@ class CurveReader:
     def _other(
         self, prim: Usd.Prim, layout: Callable[..., Strands], counts: NDArray[np.intp]
     ) -> Strands | None:
-        """The layout of curves that have no basis by name."""
+        """Returns the layout of NURBS or Hermite curves."""
         if (counts < 2).any():
             raise MeshError("a curve has less than two points")
         return layout(prim, counts, self.time, self.report)
@@ -188,7 +190,7 @@ class CurveReader:
         return value
 
     def normals(self, prim: Usd.Prim, strands: Strands) -> Array | None:
-        """At control points, for ribbons; None for tubes."""
+        """Returns normals at control points for ribbons; None for tubes."""
         primvar = authored(prim, "normals", self.time)
         if primvar is None:
             return None
@@ -199,7 +201,7 @@ class CurveReader:
             return None
         normals = strands.controls(values, kind)
         length = np.einsum("ij,ij->i", normals, normals)
-        # Written so that NaN fails too.
+        # The comparisons are false for NaN, so NaN fails as well.
         if not (float(length.min(initial=1.0)) > 0 and float(length.max(initial=0.0)) < 1e30):
             what = "normals of length zero or not finite: curves drawn as tubes"
             self.report.warn(what, prim.GetPath())
@@ -209,7 +211,7 @@ class CurveReader:
     def _uvs(
         self, prim: Usd.Prim, strands: Strands, names: Sequence[str], inherited: Sequence[Any]
     ) -> Array:
-        """At both ends of segments: authored, else u along the curve and v 0."""
+        """Returns UVs at both ends of segments: authored, else u along the curve and v = 0."""
         found = read_uvs(prim, strands, names, inherited, self.time, self.report)
         if found is None:
             values = np.zeros((strands.sizes["varying"], 2))
@@ -228,16 +230,16 @@ class CurveReader:
 def over_shutter(
     prim: Usd.Prim, shape: CurveArrays, matrix: Gf.Matrix4d, motion: Motion, report: LoadReport
 ) -> CurveArrays:
-    """Curves or points that were read at the frame, where they are at the steps of the shutter.
+    """Returns curves or points with positions and normals at the shutter steps.
 
-    Widths and texture coordinates are those of the frame.
+    Widths and texture coordinates remain those of the frame.
 
     Args:
-        prim: Whose points change.
+        prim: Prim whose points are animated.
         shape: Its arrays at the frame.
-        matrix: From the prim to its group.
-        motion: While the shutter is open.
-        report: For what is odd.
+        matrix: Transform from the prim to its group.
+        motion: The shutter.
+        report: Collects warnings.
     """
     times = step_times(prim, None, motion)
     found = points_at(prim, None, times, motion.frame, report)
@@ -261,16 +263,16 @@ def over_shutter(
 
 
 def thick_extent(positions: Array, radii: Array) -> Array:
-    """Bounds (2, 3) of curves or points with the largest of the radii around them."""
+    """Returns the bounds (2, 3) of the positions, padded by the largest radius."""
     reach = float(radii.max(initial=0.0))
     return extent(positions) + np.array([[-reach], [reach]], np.float32)
 
 
 def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
-    """Points (n, 3) of a prim; None where there are none.
+    """Returns the points (n, 3) of a prim; None if there are none.
 
     Raises:
-        MeshError: They are no points.
+        MeshError: The values are not triples.
     """
     points = as_array(points_now(prim, time))
     if points is None or len(points) == 0:
@@ -281,7 +283,7 @@ def read_points(prim: Usd.Prim, time: Usd.TimeCode) -> Array | None:
 
 
 def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """``primvars:name``, else the attribute ``name``; None where neither has values."""
+    """Returns ``primvars:name``, else the attribute ``name``; None if neither has values."""
     primvar = None
     with contextlib.suppress(PrimvarError):
         primvar = read_primvar(prim, name, time)
@@ -293,7 +295,7 @@ def authored(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
 def read_widths(
     prim: Usd.Prim, strands: Strands, time: Usd.TimeCode, report: LoadReport
 ) -> tuple[NDArray[Any], str]:
-    """Widths (n, 1) and their interpolation; 1 where none fit."""
+    """Returns widths (n, 1) and their interpolation; a width of 1 if none are valid."""
     one = np.ones((1, 1))
     primvar = authored(prim, "widths", time)
     if primvar is None:
@@ -320,12 +322,12 @@ def read_uvs(
     time: Usd.TimeCode,
     report: LoadReport,
 ) -> tuple[NDArray[Any], str] | None:
-    """Texture coordinates (n, 2) and their interpolation; None where there are none that fit."""
+    """Returns texture coordinates (n, 2) and their interpolation; None if none are valid."""
     try:
         primvar = first_primvar(prim, names, inherited, time)
         if primvar is None:
             if names is not UV_NAMES:
-                what = f"no primvar {names[0]!r} for the textures of curves: made up"
+                what = f"no primvar {names[0]!r} for the textures of curves: generated"
                 report.warn(what, prim.GetPath())
             return None
         values, kind = strands.fit(primvar, 2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads gprims of every kind into arrays, and hands those to the scene."""
+"""Reads gprims of every kind into arrays and adds them to the scene."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ WORDS = {
     "mesh": "mesh", "patch": "NURBS patch", "shape": "mesh", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""What messages call gprims, by ``Draw.kind``."""
+"""Names of gprims in messages, by ``Draw.kind``."""
 COUNTS = {
     "mesh": "meshes", "patch": "patches", "shape": "shapes", "curves": "curves", "points": "points",
     "splats": "splats",
 }  # fmt: skip
-"""Counts of ``LoadReport`` for gprims, by ``Draw.kind``."""
+"""Names of gprim counts in ``LoadReport``, by ``Draw.kind``."""
 
 
 class GprimReader:
-    """Reads the gprims of one stage at one time."""
+    """Reader of the gprims of one stage at one time."""
 
     def __init__(
         self,
@@ -49,9 +49,9 @@ class GprimReader:
         skeletons: Skeletons,
         cache: MeshCache | None = None,
     ) -> None:
-        """``surfaces`` say what is subdivided or displaced; ``skeletons`` deform what they hold.
+        """``surfaces`` handles subdivision and displacement, ``skeletons`` handles skinning.
 
-        ``cache``: arrays to take from and leave there.
+        ``cache`` stores arrays between frames.
         """
         self.time, self.report, self.motion = context.time, context.report, context.motion
         self.surfaces = surfaces
@@ -63,28 +63,29 @@ class GprimReader:
         return MeshReader(self.time, report, self.surfaces.subdivide, self.skeletons, self.motion)
 
     def deforms(self, kind: str, prim: Usd.Prim) -> bool:
-        """Whether the shape of a gprim may change while the shutter is open."""
+        """Returns whether the shape of a gprim may change while the shutter is open."""
         return self.motion is not None and self._changes(kind, prim)
 
     def _changes(self, kind: str, prim: Usd.Prim) -> bool:
-        """Whether the shape of a gprim may change over time."""
+        """Returns whether the shape of a gprim may change over time."""
         return kind not in ("shape", "splats") and deforms(prim, self.skeletons.of(prim))
 
     def read(
         self, draw: Draw, names: Sequence[str], in_world: bool, detail: StrandDetail | None = None
     ) -> MeshArrays | CurveArrays | None:
-        """The arrays of a gprim in its group's space; None, and reported, where nothing is drawn.
+        """Reads a gprim in the space of its group; reports and returns None if nothing is drawn.
 
-        Those of the frame before where they are the same.
+        Returns cached arrays of the previous frame if they are still valid.
 
         Args:
             draw: The gprim.
-            names: Primvars to take texture coordinates from, the first there is.
-            in_world: Its group is the world.
-            detail: Of curves; what it makes of them is of one view, and not kept.
+            names: Primvars for texture coordinates; the first existing one is used.
+            in_world: Whether the group is the world.
+            detail: Simplification of curves; it depends on the view, so its result is not cached.
 
         Raises:
-            MemoryError: Nothing else could be read either.
+            MemoryError: The process is out of memory, so that reading further prims would fail as
+                well.
         """
         kind, path = draw.kind, str(draw.prim.GetPath())
         trail.note("reading", path)
@@ -157,12 +158,12 @@ _OPTIONS: dict[str, Any] = {
 def add_shape(
     builder: _core.SceneBuilder, shape: MeshArrays | CurveArrays, options: dict[str, Any]
 ) -> int:
-    """Adds arrays to the scene; gives their number there.
+    """Adds arrays to the scene and returns their id.
 
-    ``options``: Keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` all take; of
-    splats those of ``add_splats``.
+    ``options`` are keyword arguments common to ``add_mesh``, ``add_curves`` and ``add_points``, or
+    for splats those of ``add_splats``.
     """
-    # What is not there is not said: a stage may have a hundred thousand of them.
+    # Absent arrays are not passed, which saves time on stages with a hundred thousand gprims.
     if isinstance(shape, MeshArrays):
         if shape.normals is not None:
             options["normals"] = shape.normals

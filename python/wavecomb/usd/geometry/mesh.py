@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeomMesh and implicit shapes as arrays for the core."""
+"""Reads UsdGeomMesh, UsdGeomTetMesh and implicit shapes as arrays for the core."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 def _scheme(prim: Usd.Prim, names: frozenset[str], time: Usd.TimeCode) -> str | None:
-    """Its subdivisionScheme; ``names``: of what is authored."""
+    """Returns the subdivisionScheme of a mesh whose authored properties are ``names``."""
     if "subdivisionScheme" not in names:
         return "none" if prim.GetTypeName() == TETRAHEDRA else "catmullClark"
     return word(prim.GetAttribute("subdivisionScheme").Get(time), "none")
@@ -74,7 +74,7 @@ _NORMALS = ("primvars:normals", "normals")
 
 
 class MeshReader:
-    """Reads meshes and shapes of one stage."""
+    """Reader of the meshes and implicit shapes of one stage."""
 
     def __init__(
         self,
@@ -84,14 +84,15 @@ class MeshReader:
         skeletons: Skeletons | None = None,
         motion: Motion | None = None,
     ) -> None:
-        """Reads at ``time``.
+        """Creates a reader for one frame.
 
         Args:
-            time: The frame.
-            report: For what is odd.
-            subdivide: Subdivision meshes get a cage, and their authored normals do not count.
-            skeletons: Deform what is bound to them.
-            motion: Shapes are taken over its shutter; None: at ``time`` only.
+            time: Time code of the frame.
+            report: Collects warnings.
+            subdivide: Whether subdivision meshes get a cage; their authored normals are then
+                ignored.
+            skeletons: Skeletons that deform bound meshes.
+            motion: The shutter over which shapes are read; None reads them at ``time`` only.
         """
         self.time = time
         self.report = report
@@ -100,7 +101,10 @@ class MeshReader:
         self.motion = motion
 
     def shape(self, prim: Usd.Prim, matrix: Gf.Matrix4d, names: frozenset[str]) -> MeshArrays:
-        """An implicit shape, in its group's space; ``names``: of what is authored."""
+        """Reads an implicit shape in the space of its group.
+
+        ``names`` are its authored properties.
+        """
         mirrored = check_matrix(matrix)
         shape = read_shape(prim, self.time, names)
         if shape is None or len(shape.triangles) == 0:
@@ -118,18 +122,19 @@ class MeshReader:
         inherited: Sequence[Any] = (),
         displaced: bool = False,
     ) -> MeshArrays | None:
-        """A mesh in its group's space, as polygons; None where it is empty.
+        """Reads a mesh as polygons in the space of its group; returns None if it is empty.
 
         Args:
             prim: A UsdGeomMesh or UsdGeomTetMesh.
-            matrix: From the mesh to its group.
-            uv_names: Primvars to take texture coordinates from, the first there is; none: no need.
-            names: Properties that it has opinions of (``authored_names``).
-            inherited: Primvars of its ancestors.
-            displaced: Its points will be moved.
+            matrix: Transform from the mesh to its group.
+            uv_names: Primvars for texture coordinates, of which the first existing one is used;
+                empty if no texture coordinates are needed.
+            names: Names of properties with authored opinions (``authored_names``).
+            inherited: Constant primvars of its ancestors.
+            displaced: Whether its points will be displaced.
 
         Raises:
-            MeshError: It cannot be drawn.
+            MeshError: The mesh is invalid.
         """
         get, time = prim.GetAttribute, self.time
         mirrored = check_matrix(matrix)
@@ -191,10 +196,10 @@ class MeshReader:
         flip: bool,
         matrix: Gf.Matrix4d,
     ) -> tuple[Array, Array, Topology]:
-        """Points in the group, their bounds, and the triangles of any faces.
+        """Returns points in the group's space, their bounds, and the triangulated faces.
 
         Raises:
-            MeshError: It cannot be drawn.
+            MeshError: The mesh is invalid.
         """
         positions = points if matrix == IDENTITY else bake(points, matrix)
         bounds = extent(positions)
@@ -207,16 +212,16 @@ class MeshReader:
     def over_shutter(
         self, prim: Usd.Prim, mesh: MeshArrays, matrix: Gf.Matrix4d, track: Track | None
     ) -> MeshArrays:
-        """A mesh that was read by ``mesh``, with its shape at the steps of the shutter.
+        """Returns the arrays of ``mesh`` with the shape at the shutter steps.
 
         Args:
-            prim: A UsdGeomMesh that ``deforms``.
+            prim: A UsdGeomMesh for which ``deforms`` holds.
             mesh: Its arrays at the frame.
-            matrix: From the mesh to its group.
-            track: In place of ``matrix`` where that changes.
+            matrix: Transform from the mesh to its group.
+            track: Animated transform; replaces ``matrix`` if there is one.
 
         Raises:
-            MeshError: It cannot be drawn.
+            MeshError: The mesh is invalid.
         """
         motion, topology, skin = self.motion, mesh.topology, self._skin(prim)
         if motion is None or topology is None:
@@ -263,9 +268,10 @@ class MeshReader:
         scheme: str | None,
         names: frozenset[str],
     ) -> Array | None:
-        """(n, 3), (m, 3, 3), or None for flat: authored, else smooth for subdivision surfaces.
+        """Returns normals (n, 3) or (m, 3, 3); None for flat shading.
 
-        Authored ones do not count for meshes that are subdivided, as UsdGeomMesh says.
+        Uses authored normals, else smooth ones for subdivision surfaces. Ignores authored normals
+        of meshes that are subdivided, as UsdGeomMesh requires.
         """
         if scheme not in SCHEMES:
             if scheme not in (None, "none"):
@@ -277,7 +283,7 @@ class MeshReader:
             return authored
         edges = None
         if "creaseIndices" in names:
-            # Where the mesh is subdivided, reading the surface reports creases that are wrong.
+            # If the mesh is subdivided, reading its cage reports invalid creases.
             report = LoadReport() if self.subdivide else self.report
             edges = sharp_edges(prim, topology.point_count, self.time, report)
         return smooth_normals(points, topology, edges)
@@ -285,7 +291,7 @@ class MeshReader:
     def _authored_normals(
         self, prim: Usd.Prim, points: Array, topology: Topology, names: frozenset[str]
     ) -> Array | None:
-        """primvars:normals, else normals; None where there are none that fit."""
+        """Returns primvars:normals, else normals; None if there are no valid ones."""
         if names.isdisjoint(_NORMALS):
             return None
         try:
@@ -301,7 +307,7 @@ class MeshReader:
             return None
         flat = normals.reshape(-1, 3)
         lengths = np.einsum("ij,ij->i", flat, flat)
-        # Written so that NaN fails too.
+        # The comparison is false for NaN, so NaN fails as well.
         if not float(np.maximum.reduce(lengths, axis=None, initial=0.0)) < 1e30:
             self.report.warn("normals that are not finite: ignored", prim.GetPath())
             return None
@@ -316,7 +322,7 @@ class MeshReader:
         return np.ascontiguousarray(normals, np.float32)
 
     def _skinned_normals(self, prim: Usd.Prim, primvar: Primvar, topology: Topology) -> Primvar:
-        """Authored normals under the mesh's skin; of points and of corners only."""
+        """Applies the mesh's skin to authored normals of points or corners."""
         skin = self._skin(prim)
         corners = topology.indices if primvar.interpolation == "faceVarying" else None
         wanted = topology.point_count if corners is None else len(corners)
@@ -337,7 +343,10 @@ class MeshReader:
         names: Sequence[str],
         inherited: Sequence[Any],
     ) -> Primvar | None:
-        """The primvar to take texture coordinates from; all at (0, 0) where it is not there."""
+        """Returns the primvar for texture coordinates.
+
+        If the materials name primvars and the mesh has no coordinates at all, they are (0, 0).
+        """
         try:
             primvar = first_primvar(prim, names, inherited, self.time)
             if primvar is None:
@@ -358,7 +367,7 @@ class MeshReader:
     def _uvs(
         self, prim: Usd.Prim, topology: Topology, primvar: Primvar | None
     ) -> tuple[Array | None, Primvar | None]:
-        """(n, 2), (m, 3, 2) or None, and the primvar where it is of use."""
+        """Returns UVs (n, 2), (m, 3, 2) or None, and the primvar if it is valid."""
         if primvar is None:
             return None, None
         try:
@@ -372,7 +381,7 @@ class MeshReader:
         return uvs, primvar
 
     def _any_coordinates(self, prim: Usd.Prim) -> Primvar | None:
-        """The first primvar whose type says texture coordinates."""
+        """Returns the first authored primvar whose type is a texture coordinate."""
         for attribute in prim.GetAuthoredAttributes():
             name = attribute.GetName()
             coordinates = attribute.GetTypeName() == Sdf.ValueTypeNames.TexCoord2fArray
@@ -384,7 +393,7 @@ class MeshReader:
 
 
 def _reverse(values: Any) -> Any:
-    """Values (m, 3, c) with the corners of each triangle reversed; others as they are."""
+    """Reverses the corners of each triangle in (m, 3, c) values; returns other values unchanged."""
     if values is None or values.ndim != 3:
         return values
     return np.ascontiguousarray(values[:, ::-1])

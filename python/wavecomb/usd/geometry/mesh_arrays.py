@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of a mesh in its group's space: what they are, and how a transform goes into them."""
+"""Mesh arrays in the space of their group, and functions that transform them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Array = NDArray[np.float32]
 IDENTITY = Gf.Matrix4d(1.0)
 
 LIMIT = 1e18
-"""Coordinates beyond this are taken for a mistake (Embree's own limit is 1.8e18)."""
+"""Largest valid coordinate; Embree's own limit is 1.8e18."""
 
 UV_NAMES = ("st", "UVMap", "st0", "st1", "uv", "map1")
-"""Texture coordinates that are looked for where no material says which."""
+"""Names of texture coordinates that are tried if no material names a primvar."""
 
 _CHUNK = 1 << 18
 _NO_TURN = Gf.Matrix3d(1.0)
@@ -32,16 +32,17 @@ _NOWHERE = "a point is not finite or absurdly far away"
 
 @dataclass
 class MeshArrays:
-    """A mesh in its group's space.
+    """A mesh in the space of its group.
 
     Attributes:
         positions: (n, 3), or (s, n, 3) at s steps over the shutter.
-        triangles: (m, 3), counter-clockwise from outside.
-        normals: (n, 3), (m, 3, 3) or None; at each step where there are some.
+        triangles: (m, 3) point indices, counter-clockwise when seen from outside.
+        normals: (n, 3), (m, 3, 3) or None, with a leading axis of steps if positions have one.
         uvs: (n, 2), (m, 3, 2) or None.
         bounds: (2, 3) lowest and highest coordinates.
-        topology: Where the triangles come from; None for implicit shapes.
-        cage: What can be subdivided or displaced once the view is known; None: this is all.
+        topology: Origin of the triangles; None for implicit shapes.
+        cage: Cage that may be subdivided or displaced once the view is known; None if there is
+            none.
     """
 
     positions: Array
@@ -54,15 +55,15 @@ class MeshArrays:
 
 
 def is_translation(matrix: Gf.Matrix4d) -> bool:
-    """Whether a transform only moves."""
+    """Returns whether a transform is a pure translation."""
     return bool(matrix.ExtractRotationMatrix() == _NO_TURN)
 
 
 def check_matrix(matrix: Gf.Matrix4d) -> bool:
-    """Whether a transform mirrors.
+    """Returns whether a transform mirrors.
 
     Raises:
-        MeshError: It has no inverse or is not finite.
+        MeshError: The transform is singular or not finite.
     """
     det = matrix.GetDeterminant3()
     if not abs(det) > 1e-6:
@@ -75,7 +76,7 @@ def check_matrix(matrix: Gf.Matrix4d) -> bool:
 
 
 def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
-    """Points (n, 3) under a transform, in double precision: a float32 copy."""
+    """Transforms points (n, 3) in double precision; returns a float32 copy."""
     m = np.array(matrix)
     linear, offset = m[:3, :3], m[3, :3]
     if len(points) <= _CHUNK:
@@ -90,10 +91,11 @@ def bake(points: Array, matrix: Gf.Matrix4d) -> Array:
 def plain(
     points: Array, counts: NDArray[np.int32], indices: NDArray[np.int32], matrix: Gf.Matrix4d
 ) -> tuple[Array, Array, Topology] | None:
-    """A mesh of triangles alone or quads alone: its points under a transform, bounds, triangles.
+    """Transforms and triangulates a mesh that consists only of triangles or only of quads.
 
-    In one step, since a stage may have a hundred thousand. None of any other mesh, and of one with
-    a mistake: that is for ``triangulate`` and ``extent``, which say what it is.
+    Returns points, bounds and topology in one call, which is faster for stages with a hundred
+    thousand meshes. Returns None for any other or invalid mesh; ``triangulate`` and ``extent`` then
+    report errors.
     """
     is_identity = matrix == IDENTITY
     found = _core.plain_mesh(points, counts, indices, None if is_identity else matrix, limit=LIMIT)
@@ -108,12 +110,12 @@ def plain(
 
 
 def place(points: Array, normals: Array, matrix: Gf.Matrix4d) -> tuple[Array, Array, Array]:
-    """Points and normals (n, 3) of a shape under a transform, as float32, and their bounds (2, 3).
+    """Transforms points and normals (n, 3) of a shape and returns them with their bounds (2, 3).
 
-    In one step, as ``plain``; the same as ``bake``, ``bake_normals`` and ``extent``.
+    Equivalent to ``bake``, ``bake_normals`` and ``extent``, but in one call.
 
     Raises:
-        MeshError: A point is not finite or absurdly far away.
+        MeshError: A point is not finite or too far away.
     """
     placed = _core.place_shape(points, normals, matrix, matrix.GetInverse(), limit=LIMIT)
     if placed is None:
@@ -122,7 +124,7 @@ def place(points: Array, normals: Array, matrix: Gf.Matrix4d) -> tuple[Array, Ar
 
 
 def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
-    """Normals (..., 3) under the inverse transpose of a transform, unit length."""
+    """Transforms normals (..., 3) by the inverse transpose and normalises them."""
     linear = np.array(matrix.GetInverse())[:3, :3].T
     flat = normals.reshape(-1, 3)
     out = np.empty(flat.shape, np.float32)
@@ -135,16 +137,16 @@ def bake_normals(normals: Array, matrix: Gf.Matrix4d) -> Array:
 
 
 def extent(positions: Array) -> Array:
-    """Bounds (2, 3) of points.
+    """Returns the bounds (2, 3) of points.
 
     Raises:
-        MeshError: A point is not finite or absurdly far away.
+        MeshError: A point is not finite or too far away.
     """
     bounds = np.empty((2, 3), np.float32)
     np.minimum.reduce(positions, axis=0, out=bounds[0])
     np.maximum.reduce(positions, axis=0, out=bounds[1])
     (a, b, c), (x, y, z) = bounds.tolist()
-    # Written so that NaN fails too.
+    # The comparisons are false for NaN, so NaN fails as well.
     if not (a > -LIMIT and b > -LIMIT and c > -LIMIT and x < LIMIT and y < LIMIT and z < LIMIT):
         raise MeshError(_NOWHERE)
     return bounds
@@ -153,14 +155,16 @@ def extent(positions: Array) -> Array:
 Ints = NDArray[np.int32]
 
 TETRAHEDRA = "TetMesh"
-"""Type name of the prims that have tetrahedra in place of faces."""
+"""Type name of prims that consist of tetrahedra."""
 
 
 def read_faces(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Ints, Ints]:
-    """Corners of each face, and the points at all corners, of a Mesh or a TetMesh.
+    """Returns the corner count of each face and the point index of each corner.
+
+    ``prim`` is a Mesh or a TetMesh.
 
     Raises:
-        MeshError: Tetrahedra name points that are not there.
+        MeshError: Tetrahedra refer to points that do not exist.
     """
     get = prim.GetAttribute
     if prim.GetTypeName() == TETRAHEDRA:
@@ -171,7 +175,7 @@ def read_faces(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Ints, Ints]:
 
 
 def _surface(prim: Usd.Prim, time: Usd.TimeCode) -> Ints:
-    """Triangles of the outside of tetrahedra: as authored, else those that only one of them has."""
+    """Returns authored surface triangles, else the faces that belong to only one tetrahedron."""
     values = as_array(prim.GetAttribute("surfaceFaceVertexIndices").Get(time))
     if values is None or len(values) == 0:
         tetrahedra = as_array(prim.GetAttribute("tetVertexIndices").Get(time))

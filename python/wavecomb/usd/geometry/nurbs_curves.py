@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""B-splines, and UsdGeomNurbsCurves and UsdGeomHermiteCurves as Bezier segments.
+"""Converts UsdGeomNurbsCurves and UsdGeomHermiteCurves to Bezier segments.
 
-A polynomial piece of order up to 4 is one cubic, so that it is drawn exactly; rational pieces and
-those of higher order are ``PARTS`` cubics each, with the true points and tangents at their ends.
-Basis functions are formulas 2.5 and 2.7 of L. Piegl, W. Tiller, The NURBS Book (1997), for all
-samples at once.
+A polynomial span of order up to 4 becomes one cubic and is exact. Rational spans and spans of
+higher order become ``PARTS`` cubics each, with exact points and tangents at their ends. Basis
+functions follow formulas 2.5 and 2.7 of L. Piegl and W. Tiller, The NURBS Book (1997), vectorised
+over all samples.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
-"""Cubics for each piece between knots that is no cubic itself."""
+"""Cubics per knot span that is not a cubic itself."""
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """One curve.
+    """Conversion of one curve to Bezier segments.
 
     Attributes:
-        shares: (segments, 4, order) of control points in the Bezier points.
-        columns: (segments, order) which control points these are.
+        shares: (segments, 4, order) weights of control points in each Bezier point.
+        columns: (segments, order) indices of these control points.
     """
 
     shares: Floats
@@ -40,16 +40,16 @@ class _Piece:
 
 @dataclass(frozen=True)
 class NurbsStrands(Strands):
-    """Curves whose Bezier points are sums of their control points.
+    """Curves whose Bezier points are linear combinations of their control points.
 
     Attributes:
-        pieces: Of each curve.
+        pieces: Conversion of each curve.
     """
 
     pieces: tuple[_Piece, ...] = ()
 
     def only(self, kept: NDArray[np.bool_] | slice) -> NurbsStrands:
-        """Some of the curves, with their pieces."""
+        """Returns a subset of the curves."""
         numbers = np.arange(len(self.pieces))[kept].tolist()
         fields = {name: getattr(self, name)[kept] for name in PER_CURVE}
         return replace(self, pieces=tuple(self.pieces[i] for i in numbers), **fields)
@@ -67,16 +67,16 @@ class NurbsStrands(Strands):
 
 @dataclass(frozen=True)
 class HermiteStrands(Strands):
-    """Curves of points and tangents; all else is linear between points.
+    """Cubic Hermite curves; other primvars are interpolated linearly between points.
 
     Attributes:
-        tangents: (n, 3) where a curve goes to from each of the prim's points.
+        tangents: (n, 3) tangent at each point of the prim.
     """
 
     tangents: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
-        """As of all strands; there is one value for each point, whatever it is called."""
+        """Returns values that fit these curves; vertex primvars are treated as varying."""
         values, kind = super().fit(primvar, width)
         return values, "varying" if kind == "vertex" else kind
 
@@ -95,12 +95,12 @@ class HermiteStrands(Strands):
 def hermite_strands(
     prim: Usd.Prim, counts: Index, time: Usd.TimeCode, report: LoadReport
 ) -> HermiteStrands:
-    """The layout of a UsdGeomHermiteCurves prim of ``counts`` points each.
+    """Reads the layout of a UsdGeomHermiteCurves prim with ``counts`` points per curve.
 
-    Curves with tangents that are not finite are left out, with a warning.
+    Leaves out curves with tangents that are not finite, with a warning.
 
     Raises:
-        MeshError: It has another number of tangents, or no curve is left.
+        MeshError: The number of tangents differs from the number of points, or no curve remains.
     """
     tangents = as_array(prim.GetAttribute("tangents").Get(time))
     total = int(counts.sum())
@@ -130,12 +130,12 @@ def _say_left_out(prim: Usd.Prim, report: LoadReport, good: NDArray[np.bool_], w
 def nurbs_strands(
     prim: Usd.Prim, counts: Index, time: Usd.TimeCode, report: LoadReport
 ) -> NurbsStrands:
-    """The layout of a UsdGeomNurbsCurves prim of ``counts`` control points each.
+    """Reads the layout of a UsdGeomNurbsCurves prim with ``counts`` control points per curve.
 
-    Curves whose knots, order or weights make no curve are left out, with a warning.
+    Leaves out curves with invalid knots, order or weights, with a warning.
 
     Raises:
-        MeshError: The numbers of knots, orders or weights do not fit, or no curve is left.
+        MeshError: The number of knots, orders or weights does not fit, or no curve remains.
     """
 
     def numbers(name: str, columns: int) -> Floats:
@@ -143,12 +143,13 @@ def nurbs_strands(
         if values is None:
             return np.empty((0, columns))
         if values.shape[1] != columns:
-            raise MeshError(f"its {name} are no numbers")
+            raise MeshError(f"its {name} are not numbers")
         return values.astype(np.float64)
 
     orders = numbers("order", 1)[:, 0].astype(np.intp)
     if len(orders) == 1:
-        orders = np.repeat(orders, len(counts))  # one for all, as many exporters write it
+        # Many exporters write one order for all curves.
+        orders = np.repeat(orders, len(counts))
     if len(orders) != len(counts):
         raise MeshError(f"{len(counts)} curves have {len(orders)} orders")
     knots, weights = numbers("knots", 1)[:, 0], numbers("pointWeights", 1)[:, 0]
@@ -177,7 +178,7 @@ def nurbs_strands(
     if not good.all():
         whys = list(dict.fromkeys(one for one in found if isinstance(one, str)))
         _say_left_out(prim, report, good, "; ".join(whys[:3]))
-    # Curves that are left out count here, so that arrays of values for all curves still fit.
+    # Curves that are left out are counted, so that primvar arrays for all curves still fit.
     segments = np.array(
         [max(counts[i] - orders[i] + 1, 0) if isinstance(one, str) else len(one.shares)
          for i, one in enumerate(found)], np.intp,
@@ -196,7 +197,7 @@ def nurbs_strands(
 
 
 def _piece(spline: Spline, weights: Floats | None) -> _Piece:
-    """Bezier points of a curve as sums of its control points."""
+    """Computes the conversion of a curve to Bezier segments."""
     parts = 1 if spline.order <= 4 and weights is None else PARTS
     size = spline.ends[:, 1:] - spline.ends[:, :1]
     at = spline.ends[:, :1] + size * np.linspace(0.0, 1.0, parts + 1)
@@ -214,19 +215,19 @@ def _piece(spline: Spline, weights: Floats | None) -> _Piece:
 Floats = NDArray[np.float64]
 
 MAX_ORDER = 32
-"""Orders beyond this are taken for a mistake."""
+"""Orders above this limit are treated as mistakes."""
 
 
 @dataclass(frozen=True)
 class Spline:
-    """Basis functions over a knot vector.
+    """B-spline basis functions over a knot vector.
 
     Attributes:
-        knots: (count + order,) not falling.
+        knots: (count + order,) non-decreasing.
         order: Degree + 1.
-        count: Control points.
-        spans: (k,) numbers of the first knot of each piece that is not empty.
-        ends: (k, 2) parameters where each piece begins and ends, within the range.
+        count: Number of control points.
+        spans: (k,) index of the first knot of each non-empty span.
+        ends: (k, 2) parameters at which each span begins and ends, clipped to the range.
     """
 
     knots: Floats
@@ -237,22 +238,22 @@ class Spline:
 
     @classmethod
     def of(cls, knots: Floats, order: int, count: int, limits: Floats | None = None) -> Spline:
-        """A checked one.
+        """Validates the parameters and returns the basis.
 
         Args:
             knots: (count + order,).
-            order: Of the curve.
-            count: Control points.
-            limits: Where it begins and ends; None: where all basis functions are there.
+            order: Order of the curve.
+            count: Number of control points.
+            limits: Parameter range; None means the full domain of the basis.
 
         Raises:
-            MeshError: It is none.
+            MeshError: The parameters do not define a curve.
         """
         if not 2 <= order <= min(count, MAX_ORDER):
             raise MeshError(f"order {order} with {count} control points")
         if len(knots) != count + order:
             raise MeshError(f"{len(knots)} knots where {count + order} are needed")
-        # Written so that NaN fails too.
+        # The comparison is false for NaN, so NaN fails as well.
         if not (np.isfinite(knots).all() and bool((np.diff(knots) >= 0).all())):
             raise MeshError("its knots are not in order")
         low, high = float(knots[order - 1]), float(knots[count])
@@ -266,9 +267,10 @@ class Spline:
         return cls(knots, order, count, spans[filled], ends[filled])
 
     def weights(self, span: NDArray[np.intp], at: Floats) -> tuple[Floats, Floats]:
-        """Basis functions and their derivatives at parameters on given spans.
+        """Evaluates basis functions and their derivatives at parameters on given spans.
 
-        (m, order) each, of the control points that ``columns`` says; all others are 0 there.
+        Returns two (m, order) arrays for the control points of ``columns``; all other basis
+        functions are 0.
         """
         knots, degree = self.knots, self.order - 1
         values = lower = np.ones((len(at), 1))
@@ -289,22 +291,22 @@ class Spline:
         return values, slopes
 
     def columns(self, span: NDArray[np.intp]) -> NDArray[np.intp]:
-        """(m, order) control points that ``weights`` are of."""
+        """Returns the (m, order) control point indices that ``weights`` refers to."""
         return span[:, None] - (self.order - 1) + np.arange(self.order)
 
 
 def rational(values: Floats, slopes: Floats, weights: Floats | None) -> tuple[Floats, Floats]:
-    """Basis functions and derivatives, (m, order), with weights of their control points, likewise.
+    """Converts basis functions and derivatives (m, order) to rational ones for given weights.
 
     Raises:
-        MeshError: The weights add up to nothing somewhere.
+        MeshError: The weighted sum vanishes somewhere.
     """
     if weights is None:
         return values, slopes
     values, slopes = values * weights, slopes * weights
     total = values.sum(axis=1, keepdims=True)
-    # Written so that NaN fails too.
+    # The comparison is false for NaN, so NaN fails as well.
     if not bool((np.abs(total) > 1e-30).all()):
-        raise MeshError("its pointWeights add up to nothing")
+        raise MeshError("its pointWeights add up to 0")
     values = values / total
     return values, slopes / total - values * (slopes.sum(axis=1, keepdims=True) / total)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeomNurbsPatch as triangles whose corners and normals are those of the true surface."""
+"""Converts UsdGeomNurbsPatch to triangles with exact points and normals at their corners."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from wavecomb.usd.looks.network import number, word
 from wavecomb.usd.stage.report import LoadReport
 
 PARTS = 8
-"""Quads along each piece between knots."""
+"""Quads along each knot span."""
 
 MAX_QUADS = 1 << 24
-"""Quads of a patch; pieces of one that would have more get fewer each."""
+"""Most quads of a patch; spans of larger patches get fewer quads."""
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """One parameter of a patch.
+    """One parametric direction of a patch, sampled at rows of points.
 
     Attributes:
         spline: Its basis.
-        closed: Both ends are the same place.
-        span: (m,) piece of each row of points.
+        closed: Whether both ends coincide.
+        span: (m,) knot span of each row.
         at: (m,) parameter of each row.
-        joined: (m,) whether quads lie between a row and the next.
+        joined: (m,) whether quads connect a row to the next one.
     """
 
     spline: Spline
@@ -55,13 +55,16 @@ class _Axis:
 
     @property
     def place(self) -> Floats:
-        """(m,) parameters from 0 to 1."""
+        """(m,) parameters normalised to the range 0 to 1."""
         low, high = self.spline.ends[0, 0], self.spline.ends[-1, 1]
         return (self.at - low) / (high - low)
 
 
 def _axis(spline: Spline, closed: bool, parts: int) -> _Axis:
-    """Rows of points: shared by neighbouring pieces but where the surface may have an edge."""
+    """Samples a direction.
+
+    Adjacent spans share a row unless the surface may have a hard edge there.
+    """
     span, at, joined = [], [], []
     step = np.arange(parts) / parts
     for i, (number_, (low, high)) in enumerate(zip(spline.spans, spline.ends, strict=True)):
@@ -77,7 +80,7 @@ def _axis(spline: Spline, closed: bool, parts: int) -> _Axis:
 
 
 class PatchReader:
-    """Reads NURBS patches of one stage."""
+    """Reader of the NURBS patches of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time
@@ -91,17 +94,17 @@ class PatchReader:
         inherited: Sequence[Any] = (),
         motion: Motion | None = None,
     ) -> MeshArrays | None:
-        """A patch in its group's space; None where it has no points.
+        """Reads a patch in the space of its group; returns None if it has no points.
 
         Args:
             prim: A UsdGeomNurbsPatch.
-            matrix: From it to its group.
-            uv_names: Primvars to take texture coordinates from; else u and v from 0 to 1.
-            inherited: Primvars of its ancestors.
-            motion: Its points are taken over this shutter; None: at the frame.
+            matrix: Transform from the patch to its group.
+            uv_names: Primvars for texture coordinates; without one, u and v run from 0 to 1.
+            inherited: Constant primvars of its ancestors.
+            motion: The shutter over which points are read; None reads them at the frame.
 
         Raises:
-            MeshError: It cannot be drawn.
+            MeshError: The patch is invalid.
         """
         mirrored = check_matrix(matrix)
         points = as_array(points_now(prim, self.time))
@@ -137,7 +140,7 @@ class PatchReader:
         return arrays
 
     def _axes(self, prim: Usd.Prim, points: int) -> tuple[_Axis, _Axis]:
-        """Both parameters, u and v."""
+        """Returns both directions, u and v."""
         time, get = self.time, prim.GetAttribute
         splines = []
         counts = [int(number(get(f"{c}VertexCount").Get(time), 0)) for c in "uv"]
@@ -182,7 +185,7 @@ class PatchReader:
         names: Sequence[str],
         inherited: Sequence[Any],
     ) -> Array:
-        """(n, 2): of a primvar of the control points, else the parameters."""
+        """Returns UVs (n, 2) from a primvar of the control points, else the parameters."""
         u, v = axes
         try:
             primvar = first_primvar(prim, names, inherited, self.time)
@@ -203,7 +206,7 @@ class PatchReader:
 
 
 def _triangles(u: _Axis, v: _Axis, flip: bool) -> Topology:
-    """Two triangles for each quad, du x dv outwards."""
+    """Returns two triangles per quad whose outside is in the direction du x dv."""
     width = len(u.at)
     rows, columns = np.flatnonzero(v.joined), np.flatnonzero(u.joined)
     a = (rows[:, None] * width + columns).ravel()
@@ -216,7 +219,7 @@ def _triangles(u: _Axis, v: _Axis, flip: bool) -> Topology:
 
 
 def _blend(axes: tuple[_Axis, _Axis], values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Values (n, c) of control points over the surface, and their derivatives by u and by v."""
+    """Evaluates control point values (n, c) on the surface, with derivatives by u and by v."""
     u, v = axes
     grid = values.reshape(v.spline.count, u.spline.count, -1)
     along = [spline_sum(v, part, grid) for part in (0, 1)]
@@ -230,7 +233,7 @@ def _blend(axes: tuple[_Axis, _Axis], values: Floats) -> tuple[Floats, Floats, F
 
 
 def spline_sum(axis: _Axis, part: int, grid: Floats) -> Floats:
-    """Sums over the first index of a grid, by basis functions (0) or their derivatives (1)."""
+    """Sums a grid over its first index, weighted by basis functions (0) or derivatives (1)."""
     shares, columns = axis.spline.weights(axis.span, axis.at)[part], axis.spline.columns(axis.span)
     out = np.zeros((len(axis.at), *grid.shape[1:]))
     for k in range(axis.spline.order):
@@ -241,16 +244,16 @@ def spline_sum(axis: _Axis, part: int, grid: Floats) -> Floats:
 def _surface(
     axes: tuple[_Axis, _Axis], heavy: Floats, points: Floats, flip: bool, topology: Topology
 ) -> tuple[Floats, Array]:
-    """Points and unit normals (n, 3) of the surface.
+    """Evaluates points and unit normals (n, 3) of the surface.
 
     Raises:
-        MeshError: The weights add up to nothing somewhere.
+        MeshError: The weighted sum vanishes somewhere.
     """
     at, by_u, by_v = _blend(axes, np.concatenate([points * heavy, heavy], axis=1))
     total = at[:, 3:]
-    # Written so that NaN fails too.
+    # The comparison is false for NaN, so NaN fails as well.
     if not bool((np.abs(total) > 1e-30).all()):
-        raise MeshError("its pointWeights add up to nothing")
+        raise MeshError("its pointWeights add up to 0")
     place = at[:, :3] / total
     normals = np.cross(
         by_u[:, :3] - place * by_u[:, 3:], by_v[:, :3] - place * by_v[:, 3:]
@@ -259,14 +262,15 @@ def _surface(
     length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
     flat = ~(length > 1e-6 * length.max(initial=0.0))
     normals = normals / np.where(flat, 1.0, length)[:, None] * (-1.0 if flip else 1.0)
-    if flat.any():  # poles, where one of the derivatives is 0
+    # At poles one of the derivatives is 0.
+    if flat.any():
         around = smooth_normals(place.astype(np.float32), topology)[flat]
         normals[flat] = _together(place[flat], around, 1e-6 * float(np.abs(place).max()))
     return place, np.ascontiguousarray(normals, np.float32)
 
 
 def _together(points: Floats, normals: Array, near: float) -> Floats:
-    """Mean normals, of length 1, of points that are one place."""
+    """Averages the normals of coincident points and normalises them."""
     cells = np.round(points / (near or 1.0))
     _, cell = np.unique(cells, axis=0, return_inverse=True)
     total = np.zeros((len(points), 3))
@@ -277,7 +281,7 @@ def _together(points: Floats, normals: Array, near: float) -> Floats:
 
 
 def _joined(axes: tuple[_Axis, _Axis], place: Floats) -> Floats:
-    """Points that are one place get the same bits: both sides of an edge, ends of a closed form."""
+    """Makes points bit-identical along both sides of hard edges and at the ends of closed forms."""
     u, v = axes
     grid = place.reshape(len(v.at), len(u.at), 3)
     for axis, view in ((v, grid), (u, np.swapaxes(grid, 0, 1))):

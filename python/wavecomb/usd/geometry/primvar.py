@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Primvars as arrays, in every interpolation."""
+"""Reads primvars of every interpolation as arrays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 class PrimvarError(ValueError):
-    """A primvar that does not fit its mesh; says why in a few words."""
+    """A primvar does not fit its mesh; the message gives the reason in a few words."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Primvar:
     Attributes:
         values: (k, c), with indices already applied.
         interpolation: constant, uniform, varying, vertex or faceVarying.
-        name: As authored.
-        index: (k,) Which authored value each came from; None where no indices are authored.
-        space: The colour space of its values where these are colours; "" means linear Rec.709.
+        name: Authored name.
+        index: (k,) authored index of each value; None if no indices are authored.
+        space: Colour space of colour values; "" means linear Rec.709.
     """
 
     values: NDArray[Any]
@@ -41,10 +41,11 @@ class Primvar:
 
 
 def as_array(value: Any) -> NDArray[Any] | None:
-    """A VtArray, vector or number as (k, c) without a copy where there is none to make."""
+    """Returns a VtArray, vector or number as (k, c), without a copy if possible."""
     if value is None:
         return None
-    if type(value) is Vt.Vec3fArray:  # points of nearly all meshes
+    # Points of nearly all meshes have this type.
+    if type(value) is Vt.Vec3fArray:
         return np.asarray(value)
     try:
         array = np.asarray(value)
@@ -61,7 +62,7 @@ def as_array(value: Any) -> NDArray[Any] | None:
 
 
 def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
-    """The whole numbers of a value (k,); none where it holds anything else."""
+    """Returns integers (k,); an empty array if the value holds anything else."""
     if type(value) is Vt.IntArray and dtype is np.int32:
         return np.asarray(value)
     array = as_array(value)
@@ -71,15 +72,15 @@ def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
 
 
 def authored_names(prim: Usd.Prim) -> frozenset[str]:
-    """Properties that a prim has opinions of: to ask each attribute takes USD as long as this."""
+    """Returns names of authored properties; one call costs as much as querying one attribute."""
     return frozenset(prim.GetAuthoredPropertyNames())
 
 
 def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """A primvar with its indices applied, or None where it has no value.
+    """Reads a primvar and applies its indices; returns None if it has no value.
 
     Raises:
-        PrimvarError: Its indices are out of range.
+        PrimvarError: Indices are out of range.
     """
     values = as_array(attribute.Get(time))
     if values is None:
@@ -98,7 +99,7 @@ def from_attribute(attribute: Usd.Attribute, name: str, time: Usd.TimeCode) -> P
 
 
 def in_linear(primvar: Primvar, report: LoadReport, place: object) -> Primvar:
-    """A primvar whose colours are in linear Rec.709; lists a space that is not known."""
+    """Converts colours of a primvar to linear Rec.709; reports an unknown colour space."""
     if not primvar.space or primvar.values.shape[1] < 3:
         return primvar
     try:
@@ -110,7 +111,7 @@ def in_linear(primvar: Primvar, report: LoadReport, place: object) -> Primvar:
 
 
 def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """The primvar ``name`` authored on a prim itself, or None."""
+    """Returns the primvar ``name`` that is authored on the prim itself, or None."""
     attribute = prim.GetAttribute("primvars:" + name)
     return from_attribute(attribute, name, time) if attribute.HasAuthoredValue() else None
 
@@ -118,7 +119,7 @@ def read_primvar(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | Non
 def find_primvar(
     prim: Usd.Prim, name: str, inherited: Sequence[Any], time: Usd.TimeCode
 ) -> Primvar | None:
-    """A primvar of a prim, else the constant one that it inherits."""
+    """Returns a primvar of a prim, else the constant primvar that it inherits."""
     own = read_primvar(prim, name, time)
     if own is not None or not inherited:
         return own
@@ -131,13 +132,13 @@ def find_primvar(
 def first_primvar(
     prim: Usd.Prim, names: Sequence[str], inherited: Sequence[Any], time: Usd.TimeCode
 ) -> Primvar | None:
-    """The first of some primvars that a prim has or inherits."""
+    """Returns the first of the named primvars that a prim has or inherits."""
     found = (find_primvar(prim, name, inherited, time) for name in names)
     return next((primvar for primvar in found if primvar is not None), None)
 
 
 def plain_attribute(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | None:
-    """An attribute that is no primvar, as one of points; None where it has no values."""
+    """Reads an attribute that is not a primvar as a vertex primvar; None if it has no values."""
     attribute = prim.GetAttribute(name)
     values = as_array(attribute.Get(time)) if attribute.HasAuthoredValue() else None
     if values is None or len(values) == 0:
@@ -146,7 +147,7 @@ def plain_attribute(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Primvar | 
 
 
 def finite_uvs(uvs: NDArray[Any], report: LoadReport, place: object) -> NDArray[Any]:
-    """Texture coordinates, and a warning where some have to be set to 0."""
+    """Returns texture coordinates, with values that are not finite set to 0 and reported."""
     if np.isfinite(uvs).all():
         return uvs
     report.warn("texture coordinates that are not finite: set to 0", place)
@@ -154,7 +155,7 @@ def finite_uvs(uvs: NDArray[Any], report: LoadReport, place: object) -> NDArray[
 
 
 def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.float32]:
-    """Values (k, width) of a primvar that fits a mesh; more components are cut.
+    """Returns values (k, width) of a primvar that fits a mesh; cuts additional components.
 
     Raises:
         PrimvarError: The number of values or components does not fit.
@@ -181,12 +182,14 @@ def fitting(primvar: Primvar, topology: Topology, width: int) -> NDArray[np.floa
 
 
 def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np.float32], str]:
-    """A primvar on triangles: ((n, c), "vertex"), ((m, 3, c), "corner") or ((1, c), "constant").
+    """Maps a primvar to triangles.
+
+    Returns ((n, c), "vertex"), ((m, 3, c), "corner") or ((1, c), "constant").
 
     Args:
-        primvar: As read.
-        topology: Of its mesh.
-        width: Components wanted, c; more are cut.
+        primvar: The primvar.
+        topology: Topology of its mesh.
+        width: Number of components c; additional ones are cut.
 
     Raises:
         PrimvarError: The number of values or components does not fit.
@@ -208,7 +211,10 @@ def spread(primvar: Primvar, topology: Topology, width: int) -> tuple[NDArray[np
 
 
 def _weld(values: NDArray[np.float32], topology: Topology) -> NDArray[np.float32] | None:
-    """Face-varying values (corners, c) as values per point, where all corners of each agree."""
+    """Converts face-varying to per-point values.
+
+    Returns None if corners of a point have different values.
+    """
     indices = topology.indices
     probe = slice(0, 64)
     per_point = np.zeros((topology.point_count, values.shape[1]), np.float32)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeom's implicit shapes as triangles with exact normals.
+"""Converts UsdGeom's implicit shapes to triangles with exact normals.
 
-Sizes that are negative count as positive. Both sides of all surfaces are drawn, so ``doubleSided``
-is not asked for; ``orientation`` says which of them is the outside.
+Uses the absolute value of negative sizes. All surfaces are rendered on both sides, so
+``doubleSided`` is not read; ``orientation`` determines the outside.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from wavecomb.usd.looks.network import word
 Array = NDArray[np.float32]
 
 AROUND = 64
-"""Segments round an axis."""
+"""Segments around the axis."""
 
 RINGS = 32
 """Segments from pole to pole of a sphere."""
@@ -31,9 +31,9 @@ RINGS = 32
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape: positions, normals (n, 3), uvs (n, 2), triangles (m, 3).
+    """A shape: positions, normals (n, 3), uvs (n, 2) and triangles (m, 3).
 
-    Contract: prims of equal sizes share the arrays; nobody writes to them.
+    Contract: prims of equal sizes share the arrays, which must not be modified.
     """
 
     positions: Array
@@ -43,9 +43,10 @@ class Shape:
 
 
 def read_shape(prim: Usd.Prim, time: Usd.TimeCode, names: frozenset[str]) -> Shape | None:
-    """The shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane prim; None for others.
+    """Returns the shape of a Sphere, Cube, Cylinder, Cone, Capsule or Plane; None for others.
 
-    ``names``: of what is authored; sizes are asked for all the same, as value clips may have them.
+    ``names`` are the authored properties. Sizes are always read, since value clips may provide
+    them.
     """
     kind = str(prim.GetTypeName())
     if kind not in _READERS:
@@ -97,7 +98,7 @@ def _cube(number: Number, token: Token) -> Shape:
 
 @lru_cache(maxsize=256)
 def _box(half: float) -> Shape:
-    """A cube from -half to half."""
+    """Returns a cube from -half to half."""
     positions, normals, uvs = [], [], []
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], np.float32)
     for axis in range(3):
@@ -126,7 +127,7 @@ def _plane(number: Number, token: Token) -> Shape:
 
 @lru_cache(maxsize=256)
 def _rectangle(w: float, h: float, axis: str) -> Shape:
-    """A plane from (-w, -h) to (w, h), whose normal is an axis."""
+    """Returns a plane from (-w, -h) to (w, h) with its normal along an axis."""
     corners = np.array([[-w, -h, 0], [w, -h, 0], [w, h, 0], [-w, h, 0]])
     normals = np.tile([0.0, 0.0, 1.0], (4, 1))
     uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
@@ -139,21 +140,21 @@ def _rectangle(w: float, h: float, axis: str) -> Shape:
 
 
 def _turn_plane(values: NDArray[Any], axis: str) -> Array:
-    """Width is along x and length along y for Z; x and z for Y; z and y for X."""
+    """Rotates a plane from +Z to another axis: Y maps (width, length) to (x, z), X to (z, y)."""
     x, y, z = values.T
     turned = {"X": (z, y, -x), "Y": (x, z, -y), "Z": (x, y, z)}[axis]
     return np.ascontiguousarray(np.stack(turned, axis=1), np.float32)
 
 
 def _to_axis(values: NDArray[Any], axis: str) -> Array:
-    """Turns what was made about Z to another axis, by a cyclic exchange (right-handed)."""
+    """Rotates geometry from the Z axis to another axis by a cyclic permutation (right-handed)."""
     order = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}[axis]
     return np.ascontiguousarray(values[:, order], np.float32)
 
 
 @lru_cache(maxsize=256)
 def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> Shape:
-    """A profile turned about an axis: radius and z, and their normals, from bottom to top."""
+    """Revolves the profile of a shape about an axis; the profile runs from bottom to top."""
     half = 0.5 * height
     pieces: list[tuple[NDArray[Any], NDArray[Any]]] = []
     if kind == "sphere":
@@ -198,10 +199,10 @@ def _revolve(kind: str, bottom: float, top: float, height: float, axis: str) -> 
 
 
 def _side(bottom: float, top: float, height: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The profile of a cylinder's, or a truncated cone's, side, and its normals."""
+    """Returns the profile of the side of a cylinder or truncated cone, and its normals."""
     half = 0.5 * height
     slope = np.array([height, bottom - top]) / (math.hypot(height, bottom - top) or 1.0)
-    # What ends in a tip needs rows towards it for the normals to stay smooth.
+    # A side that ends in a tip needs more rows, so that interpolated normals stay smooth.
     s = np.linspace(0.0, 1.0, 2 if bottom and top else 9)[:, None]
     return (1 - s) * (bottom, -half) + s * (top, half), np.tile(slope, (len(s), 1))
 
@@ -216,7 +217,7 @@ def _arc(
 
 
 def _sweep(profile: NDArray[Any], turn: NDArray[Any]) -> NDArray[Any]:
-    """Profile (rows, 2) of radius and z about Z: (rows * columns, 3)."""
+    """Revolves a profile (rows, 2) of radius and z about Z; returns (rows * columns, 3)."""
     out = np.empty((len(profile), len(turn), 3))
     out[..., :2] = profile[:, None, :1] * turn
     out[..., 2] = profile[:, None, 1]
@@ -234,4 +235,4 @@ _READERS: dict[str, Callable[[Number, Token], Shape]] = {
     "Plane": _plane,
 }
 SHAPES = tuple(_READERS)
-"""Type names of the prims that ``read_shape`` knows."""
+"""Type names of the prims that ``read_shape`` supports."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shutter, and where things are while it is open."""
+"""Motion blur: the shutter, and transforms and sample times while it is open."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ from wavecomb.usd.stage.times import frame_number
 Matrices = NDArray[np.float64]
 
 MOST_STEPS = 64
-"""Steps that may be asked for."""
+"""Most motion steps that the user may request."""
 
 _CHOICES = (2, 3, 4, 5, 8)
-"""Steps that are tried where none are asked for: as few as show the motion."""
+"""Numbers of motion steps that are tried in turn if none is requested."""
 
 _BEND = 5e-3
-"""How far straight lines between steps may be from the motion, as a share of what moves."""
+"""Largest deviation of the motion from straight lines between steps, relative to the motion."""
 
 
 @dataclass(frozen=True)
 class Blur:
-    """How motion is blurred.
+    """Motion blur options.
 
     Attributes:
-        shutter: When it opens and closes, time codes from the frame; None: as the camera says.
-        steps: Of every motion; None: as many as each needs, up to 8.
-        off: Not at all.
+        shutter: Opening and closing time relative to the frame, in time codes; None uses the
+            camera's.
+        steps: Motion steps of every animated object; None chooses up to 8 as needed.
+        off: Whether motion blur is disabled.
     """
 
     shutter: tuple[float, float] | None = None
@@ -47,7 +48,7 @@ class Blur:
     def chosen(
         cls, shutter: Any = None, motion_blur: bool = True, steps: int | None = None
     ) -> Blur:
-        """As options say; raises WavecombError where they cannot be meant."""
+        """Creates the options; raises WavecombError for invalid values."""
         if shutter is not None:
             good = len(shutter) == 2 and all(np.isfinite(value) for value in shutter)
             if not good or shutter[1] < shutter[0]:
@@ -61,7 +62,7 @@ class Blur:
 
 
 class Track:
-    """The transform of a prim within its group, which changes over time."""
+    """An animated transform from a prim to its group."""
 
     __slots__ = ("_above", "_known", "_motion", "_parent", "_prim")
 
@@ -75,7 +76,7 @@ class Track:
         self._known: dict[float, Gf.Matrix4d] = {}
 
     def at(self, time: float) -> Gf.Matrix4d:
-        """The transform at a time code."""
+        """Returns the transform at a time code."""
         matrix = self._known.get(time)
         if matrix is None:
             own, _ = self._motion.xforms(time).GetLocalTransformation(self._prim)
@@ -84,21 +85,21 @@ class Track:
         return matrix
 
     def steps(self) -> Matrices | None:
-        """(s, 4, 4) at equal steps over the shutter; None where nothing moves after all."""
+        """Returns (s, 4, 4) transforms at equal steps over the shutter; None if nothing moves."""
         return self._motion.steps(lambda time: np.array(self.at(time)))
 
 
 class Motion:
-    """What is asked of a stage while the shutter is open.
+    """The shutter interval and the sampling of animated values over it.
 
     Attributes:
-        frame: Time code of what does not move.
-        open, close: Time codes.
-        middle: Between them: the time of lights.
+        frame: Time code at which static values are read.
+        open, close: Time codes of the shutter.
+        middle: Time code halfway between them, at which lights are read.
     """
 
     def __init__(self, frame: float, interval: tuple[float, float], steps: int | None) -> None:
-        """``steps``: of every motion; None: as many as each needs, up to 8."""
+        """``steps`` is the number of steps of every motion; None chooses up to 8 as needed."""
         self.frame = frame
         self.open, self.close = interval
         self.middle = 0.5 * (self.open + self.close)
@@ -107,40 +108,41 @@ class Motion:
 
     @property
     def shutter(self) -> tuple[float, float]:
-        """When it opens and closes, time codes from the frame."""
+        """Opening and closing time relative to the frame, in time codes."""
         return self.open - self.frame, self.close - self.frame
 
     def xforms(self, time: float) -> UsdGeom.XformCache:
-        """Transforms at a time code."""
+        """Returns the transform cache of a time code."""
         cache = self._caches.get(time)
         if cache is None:
             cache = self._caches[time] = UsdGeom.XformCache(Usd.TimeCode(time))
         return cache
 
     def follow(self, prim: Usd.Prim, parent: Track | None, above: Gf.Matrix4d) -> Track | None:
-        """The track of a prim under one that has one or has not; None: it stands still.
+        """Returns the animated transform of a prim; None if the prim is static.
 
         Args:
-            prim: With a transform.
-            parent: Track of what is above it; None also where the prim resets its transform.
-            above: Transform of what is above it where that stands still.
+            prim: An Xformable prim.
+            parent: Animated transform of its parent; None if the parent is static or if the prim
+                resets the transform stack.
+            above: Transform of a static parent.
         """
         if parent is None and not UsdGeom.Xformable(prim).TransformMightBeTimeVarying():
             return None
         return Track(self, prim, parent, above)
 
     def times(self, count: int) -> list[float]:
-        """Time codes of ``count`` equal steps."""
+        """Returns the time codes of ``count`` equal steps."""
         return [float(t) for t in np.linspace(self.open, self.close, count)]
 
     def sampled(self, attributes: Sequence[Usd.Attribute], least: int = 2) -> list[float]:
-        """Steps that hit the samples of attributes within the shutter, where 8 can."""
+        """Returns at most 8 step times that coincide with the attributes' samples if possible."""
         interval = Gf.Interval(self.open, self.close, False, False)
         inside = {t for a in attributes for t in a.GetTimeSamplesInInterval(interval)}
         return self.fitting(sorted(inside), least)
 
     def fitting(self, samples: Sequence[float], least: int = 2) -> list[float]:
-        """The fewest steps that have all ``samples`` among them; 8 where no fewer do."""
+        """Returns the fewest step times that include all ``samples``; 8 if fewer do not suffice."""
         if self._steps is not None:
             return self.times(self._steps)
         share = (np.asarray(samples, np.float64) - self.open) / (self.close - self.open)
@@ -151,9 +153,10 @@ class Motion:
         return self.times(_CHOICES[-1])
 
     def steps(self, matrices: Callable[[float], Matrices]) -> Matrices | None:
-        """Matrices (..., 4, 4) of a time at equal steps (s, ..., 4, 4); None: they stand still.
+        """Samples matrices (..., 4, 4) at equal steps; returns (s, ..., 4, 4), or None if static.
 
-        As few steps as come close to the motion by straight lines, unless a number is set.
+        Uses the fewest steps whose linear interpolation is close to the motion, unless a number is
+        set.
         """
         choices = _CHOICES if self._steps is None else (self._steps,)
         for count in choices:
@@ -168,7 +171,7 @@ class Motion:
 
 
 def _is_straight(values: Matrices, between: Matrices) -> bool:
-    """Whether what is between steps is where straight lines put it."""
+    """Returns whether linear interpolation between steps is close to the values in between."""
     off = np.abs(between - 0.5 * (values[1:] + values[:-1]))
     span = np.abs(values - values[:1])
     size = np.abs(values[..., :3, :3]).max()
@@ -182,13 +185,13 @@ def _is_straight(values: Matrices, between: Matrices) -> bool:
 def find_motion(
     camera: Usd.Prim | None, time: Usd.TimeCode, blur: Blur, report: LoadReport
 ) -> Motion | None:
-    """The motion to be blurred: None where the shutter is open for no time.
+    """Returns the motion to be blurred; None if the shutter interval is empty.
 
     Args:
-        camera: Whose shutter:open and shutter:close count, relative to the frame.
-        time: The frame.
-        blur: May have another shutter.
-        report: For what is odd.
+        camera: Camera whose shutter:open and shutter:close are used, relative to the frame.
+        time: Time code of the frame.
+        blur: Options that may override the shutter.
+        report: Collects warnings.
     """
     shutter = blur.shutter
     if blur.off:

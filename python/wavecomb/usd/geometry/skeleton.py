@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdSkel: what deforms meshes, and shapes of meshes that change while the shutter is open."""
+"""UsdSkel skinning, and mesh points that change while the shutter is open."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.times import frame_number
 
 if TYPE_CHECKING:
-    from pxr import UsdSkel  # 8 ms, where there is a skeleton only
+    from pxr import UsdSkel  # takes 8 ms; functions import it for stages with skeletons
 
     from wavecomb.usd.geometry.shutter import Track
 
@@ -26,7 +26,7 @@ _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 class Skin:
-    """How one mesh is deformed."""
+    """The skinning and blend shapes of one mesh."""
 
     def __init__(
         self, skeleton: UsdSkel.SkeletonQuery, query: UsdSkel.SkinningQuery, report: LoadReport
@@ -42,7 +42,7 @@ class Skin:
             self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(self.prim))
 
     def varies(self) -> bool:
-        """Whether its animation, or the way from skeleton to mesh, may change over time."""
+        """Returns whether the animation or the skeleton-to-mesh transform may change."""
         animation = self.skeleton.GetAnimQuery()
         if animation and (
             animation.JointTransformsMightBeTimeVarying()
@@ -53,7 +53,7 @@ class Skin:
         return self.query.HasJointInfluences() and here != there
 
     def samples(self, interval: Gf.Interval) -> set[float]:
-        """Time codes of the animation's samples."""
+        """Returns time codes of the animation's samples in an interval."""
         animation = self.skeleton.GetAnimQuery()
         if not animation:
             return set()
@@ -63,12 +63,12 @@ class Skin:
         }
 
     def transforms(self, time: float) -> Array:
-        """(k, 4, 4) of the joints: how far straight lines go is seen by them."""
+        """Returns (k, 4, 4) joint transforms, from which the number of motion steps is chosen."""
         found = self.skeleton.ComputeSkinningTransforms(Usd.TimeCode(time))
         return np.zeros((1, 4, 4)) if found is None else np.array(found)
 
     def points(self, points: Any, time: Usd.TimeCode) -> Array:
-        """Points (n, 3) of the mesh in its own space, deformed.
+        """Returns deformed points (n, 3) in object space.
 
         Raises:
             SkinError: The skinning data does not fit the mesh.
@@ -88,9 +88,10 @@ class Skin:
     def normals(
         self, normals: Array, corners: Array | None, count: int, time: Usd.TimeCode
     ) -> Array:
-        """Normals of ``count`` points, or of corners (points ``corners``), likewise; (n, 3).
+        """Returns deformed normals (n, 3).
 
-        Blended linearly whatever the method: what is left of that after normalising is small.
+        They belong to ``count`` points, or to corners whose points are ``corners``. All skinning
+        methods use linear blending for normals; after normalisation the difference is small.
 
         Raises:
             SkinError: The skinning data does not fit the mesh.
@@ -116,7 +117,7 @@ class Skin:
         return (turned / np.where(length > 0, length, 1)[:, None]).astype(np.float32)
 
     def _ordered(self, joints: Any) -> list[Gf.Matrix4d]:
-        """Transforms of the skeleton's joints in the order of the mesh's."""
+        """Returns joint transforms of the skeleton in the joint order of the mesh."""
         own = self.query.GetJointOrder()
         if not own:
             return list(joints)
@@ -131,7 +132,7 @@ class Skin:
         return joints
 
     def _blend(self, points: Any, time: Usd.TimeCode) -> None:
-        """Adds blend shapes to points in place."""
+        """Applies blend shapes to points in place."""
         animation, mapper = self.skeleton.GetAnimQuery(), self.query.GetBlendShapeMapper()
         if self._shapes is None or not animation or mapper is None:
             return
@@ -145,22 +146,22 @@ class Skin:
             raise SkinError("blend shapes that do not fit")
 
     def _to_mesh(self, time: Usd.TimeCode) -> Gf.Matrix4d:
-        """From the skeleton's space to the mesh's."""
+        """Returns the transform from the skeleton's to the mesh's object space."""
         xforms = UsdGeom.XformCache(time)
         inverse = xforms.GetLocalToWorldTransform(self.prim).GetInverse()
         return xforms.GetLocalToWorldTransform(self.skeleton.GetPrim()) * inverse
 
 
 MOST_APART = 100_000
-"""Instances that are read one by one; instances in instances may multiply them."""
+"""Most instances that are read separately, since nested instancing can multiply them."""
 
 
 class SkinError(ValueError):
-    """Skinning data that does not fit; says why in a few words."""
+    """Skinning data does not fit; the message gives the reason in a few words."""
 
 
 class Skeletons:
-    """The skins of a stage, found as its skeletal roots are met."""
+    """The skins of a stage, collected as the traversal reaches SkelRoots."""
 
     def __init__(self, report: LoadReport) -> None:
         self.report = report
@@ -171,7 +172,7 @@ class Skeletons:
         self._apart = 0
 
     def enter(self, prim: Usd.Prim) -> None:
-        """Looks for what is bound to skeletons below a SkelRoot."""
+        """Collects the meshes below a SkelRoot that are bound to skeletons."""
         if prim.GetPath() in self._roots:
             return
         from pxr import UsdSkel
@@ -189,12 +190,12 @@ class Skeletons:
                     self._skins[query.GetPrim().GetPath()] = skin
 
     def of(self, prim: Usd.Prim) -> Skin | None:
-        """The skin of a mesh; None where nothing deforms it."""
+        """Returns the skin of a mesh; None if it is not deformed."""
         return self._skins.get(prim.GetPath()) if self._skins else None
 
     def keeps_apart(self, instance: Usd.Prim, prototype: Usd.Prim) -> bool:
-        """Whether an instance cannot share its prototype: its animation may be its own."""
-        # The prototype's own prim has no type: that is the instance's.
+        """Returns whether an instance needs a separate prototype because of its animation."""
+        # The prototype's root prim has no type; the instance has it.
         apart = (
             instance.GetTypeName() == "SkelRoot"
             or prototype.GetPath() in self._holders(prototype.GetStage())
@@ -204,7 +205,7 @@ class Skeletons:
             return False
         self._apart += 1
         if self._apart > MOST_APART:
-            what = f"more than {MOST_APART} instances with skeletons: the rest as the first of each"
+            what = f"more than {MOST_APART} skeletal instances: the rest use the first one's pose"
             self.report.warn(what, instance.GetPath())
             return False
         return True
@@ -213,14 +214,14 @@ class Skeletons:
         return any(above in self._roots for above in path.GetPrefixes())
 
     def _holders(self, stage: Usd.Stage) -> set[Sdf.Path]:
-        """Prototypes with a SkelRoot in them, or in what is instanced there."""
+        """Returns prototypes that contain a SkelRoot, also in nested instances."""
         if self._holding is None:
             self._holding = holders(stage, lambda prim: prim.GetTypeName() == "SkelRoot")
         return self._holding
 
 
 def skinned_points(skin: Skin, points: Any, time: Usd.TimeCode) -> Any:
-    """Points of a mesh as its skin has them; as they are, and a warning, where it cannot."""
+    """Returns skinned points of a mesh; if skinning fails, warns and returns the rest pose."""
     try:
         return skin.points(points, time)
     except SkinError as error:
@@ -230,7 +231,7 @@ def skinned_points(skin: Skin, points: Any, time: Usd.TimeCode) -> Any:
 
 
 def _moving_above(prim: Usd.Prim) -> set[Sdf.Path]:
-    """Prims from a prim up whose transforms may change over time."""
+    """Returns the paths of the prim and those ancestors whose transforms are animated."""
     moving: set[Sdf.Path] = set()
     while prim:
         xformable = UsdGeom.Xformable(prim)
@@ -247,7 +248,7 @@ def _under(points: Array, matrix: Gf.Matrix4d) -> Array:
 
 
 def _normal_matrix(matrix: Gf.Matrix4d) -> Array:
-    """(3, 3) for row vectors of normals: the inverse transpose."""
+    """Returns the inverse transpose (3, 3) for normals as row vectors."""
     linear = np.array(matrix)[:3, :3]
     if abs(np.linalg.det(linear)) < 1e-12:
         return np.eye(3)
@@ -255,7 +256,7 @@ def _normal_matrix(matrix: Gf.Matrix4d) -> Array:
 
 
 def deforms(prim: Usd.Prim, skin: Skin | None) -> bool:
-    """Whether the shape of a mesh may change over time."""
+    """Returns whether the shape of a mesh may change over time."""
     if skin is not None and skin.varies():
         return True
     points = prim.GetAttribute("points")
@@ -268,7 +269,7 @@ def _has_velocities(prim: Usd.Prim) -> bool:
 
 
 def points_now(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
-    """Points at one time, as USD has them: velocities carry those of the sample before."""
+    """Returns the points at one time; velocities extrapolate from the preceding sample."""
     if frame_number(time) is not None and _has_velocities(prim):
         found = UsdGeom.PointBased(prim).ComputePointsAtTime(time, time)
         if found:
@@ -277,7 +278,7 @@ def points_now(prim: Usd.Prim, time: Usd.TimeCode) -> Any:
 
 
 def step_times(prim: Usd.Prim, skin: Skin | None, motion: Motion) -> list[float]:
-    """Time codes at which its shape is taken."""
+    """Returns the time codes at which the shape of a mesh is sampled."""
     get = prim.GetAttribute
     attributes = [a for a in (get("points"), get("normals"), get("primvars:normals")) if a]
     if skin is None:
@@ -293,10 +294,9 @@ def step_times(prim: Usd.Prim, skin: Skin | None, motion: Motion) -> list[float]
 def points_at(
     prim: Usd.Prim, skin: Skin | None, times: list[float], frame: float, report: LoadReport
 ) -> list[Array] | None:
-    """Points (n, 3) at each time, in the mesh's space; None, and a note, where they do not match.
+    """Returns points (n, 3) at each time in object space; None and a note if their counts differ.
 
-    Velocities and accelerations count as UsdGeomPointBased has it: they go before what lies
-    between samples.
+    Velocities and accelerations precede interpolation between samples, as in UsdGeomPointBased.
     """
     codes = [Usd.TimeCode(time) for time in times]
     found: list[Any] | None
@@ -317,5 +317,5 @@ def points_at(
 
 
 def matrix_at(track: Track | None, still: Gf.Matrix4d, time: float) -> Gf.Matrix4d:
-    """From a mesh to its group."""
+    """Returns the transform from a mesh to its group at a time code."""
     return still if track is None else track.at(time)

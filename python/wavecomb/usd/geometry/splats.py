@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeomPoints as spheres, and Gaussian splats."""
+"""Reads UsdGeomPoints as spheres, and Gaussian splats."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from wavecomb.usd.geometry.triangulate import MeshError
 from wavecomb.usd.stage.report import LoadReport
 
 SPLATS = "ParticleField3DGaussianSplat"
-"""The type of the prims."""
+"""Type name of Gaussian splat prims."""
 
 LEAST_SCALE, MOST_SCALE = 1e-9, 1e9
-"""Between which the core takes scales."""
+"""Range of scales that the core accepts."""
 
 _MOST_DEGREE = 3
 _REACH = 3.0
@@ -40,13 +40,13 @@ _SH = "radiance:sphericalHarmonics"
 
 @dataclass
 class SplatArrays(CurveArrays):
-    """Gaussian splats in their group's space; ``radii`` are of balls around them.
+    """Gaussian splats in the space of their group; ``radii`` are those of bounding spheres.
 
     Attributes:
-        scales: (n, 3) standard deviations along their axes.
+        scales: (n, 3) standard deviations along the splats' axes.
         orientations: (n, 4) quaternions w, x, y, z.
         opacities: (n,) from 0 to 1.
-        harmonics: (n, k, 3), k 1, 4, 9 or 16: spherical harmonics of the colour less 0.5.
+        harmonics: (n, k, 3) spherical harmonics of the colour minus 0.5; k is 1, 4, 9 or 16.
     """
 
     scales: Array
@@ -56,21 +56,21 @@ class SplatArrays(CurveArrays):
 
 
 class SplatReader:
-    """Reads splats of one stage."""
+    """Reader of the Gaussian splats of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time
         self.report = report
 
     def splats(self, prim: Usd.Prim, matrix: Gf.Matrix4d) -> SplatArrays | None:
-        """Splats in their group's space; None where there are none.
+        """Reads splats in the space of their group; returns None if there are none.
 
         Args:
             prim: A ParticleField3DGaussianSplat.
-            matrix: From the prim to its group: a translation.
+            matrix: Transform from the prim to its group, which must be a translation.
 
         Raises:
-            MeshError: They cannot be drawn.
+            MeshError: The splats are invalid.
         """
         check_matrix(matrix)
         found = self._values(prim, "positions", 3)
@@ -114,7 +114,10 @@ class SplatReader:
         )  # fmt: skip
 
     def _values(self, prim: Usd.Prim, name: str, width: int) -> NDArray[Any] | None:
-        """(n, width) of an attribute in floats, else in halves; None where neither has values."""
+        """Returns the float values (n, width) of an attribute, else its half values.
+
+        Returns None if neither exists.
+        """
         for full in (name, f"{name}h"):
             values = as_array(prim.GetAttribute(full).Get(self.time))
             if values is not None and len(values) and values.shape[1] == width:
@@ -124,10 +127,13 @@ class SplatReader:
     def _fitting(
         self, prim: Usd.Prim, name: str, otherwise: tuple[float, ...], count: int
     ) -> NDArray[Any]:
-        """(count, width). As UsdVol says, what is too long is cut, what is too short ignored."""
+        """Returns (count, width) values.
+
+        As UsdVol requires, cuts longer arrays and ignores shorter ones.
+        """
         values = self._values(prim, name, len(otherwise))
         if values is not None and len(values) > count:
-            self.report.warn(f"more {name} than splats: the first count", prim.GetPath())
+            self.report.warn(f"more {name} than splats: the first ones are used", prim.GetPath())
         if values is not None and len(values) < count:
             self.report.warn(f"fewer {name} than splats: ignored", prim.GetPath())
             values = None
@@ -136,7 +142,7 @@ class SplatReader:
         return values[:count]
 
     def _harmonics(self, prim: Usd.Prim, count: int) -> Array:
-        """(count, k, 3) of the colours; grey where there are none that fit."""
+        """Returns colour harmonics (count, k, 3); grey if there are none that fit."""
         degree = prim.GetAttribute(f"{_SH}Degree").Get()
         degree = 3 if degree is None else int(degree)
         values = self._values(prim, f"{_SH}Coefficients", 3)
@@ -148,7 +154,7 @@ class SplatReader:
             self.report.warn(what, prim.GetPath())
             values = None
         elif len(values) > wanted:
-            what = f"more harmonics of splats than degree {degree} asks for: the first count"
+            what = f"more harmonics of splats than degree {degree} needs: the first ones are used"
             self.report.warn(what, prim.GetPath())
         if values is None:
             return np.zeros((count, 1, 3), np.float32)
@@ -164,7 +170,7 @@ def _plain(values: NDArray[Any]) -> Array:
 
 
 class PointReader:
-    """Reads points of one stage."""
+    """Reader of the points of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self.time = time
@@ -177,9 +183,9 @@ class PointReader:
         uv_names: Sequence[str],
         inherited: Sequence[Any] = (),
     ) -> CurveArrays | None:
-        """Points in their group's space; None where there are none.
+        """Reads points in the space of their group; returns None if there are none.
 
-        Arguments and errors are those of ``CurveReader.curves``.
+        Arguments and errors are the same as for ``CurveReader.curves``.
         """
         check_matrix(matrix)
         positions = read_points(prim, self.time)
@@ -188,7 +194,7 @@ class PointReader:
         layout = lay_out_points(len(positions))
         bad = bad_points(positions)
         if bad.all():
-            raise MeshError("their places are not finite or absurdly far away")
+            raise MeshError("their positions are not finite or absurdly far away")
         if matrix != IDENTITY:
             positions = bake(positions, matrix)
         widths, _ = read_widths(prim, layout, self.time, self.report)

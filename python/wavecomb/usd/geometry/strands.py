@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves of one prim as Bezier segments, all at once; fewer and wider ones where they are thin.
+"""Layout of a prim's curves as Bezier segments, and simplification of thin strands.
 
-Every basis and wrap becomes runs of Bezier control points (or of points of lines) that neighbouring
-segments share, so that the core knows one kind of cubic. The change of basis is exact but for
-rounding.
+Every basis and wrap mode becomes runs of Bezier control points (or points of polylines) that
+adjacent segments share, so that the core supports a single kind of cubic. The change of basis is
+exact up to rounding.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ Index = NDArray[np.intp]
 
 GOES_ON_BEFORE = 0x80000000
 GOES_ON_AFTER = 0x40000000
-"""Flags of a segment: its curve goes on beyond its first (last) point."""
+"""Segment flags: the curve continues before the segment's first (after its last) point."""
 
 _TO_BEZIER: dict[str, NDArray[np.float64]] = {
     "bspline": np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
     "catmullRom": np.array([[0, 6, 0, 0], [-1, 6, 1, 0], [0, 1, 6, -1], [0, 0, 6, 0]]) / 6.0,
 }
-"""Rows: Bezier control points of a segment from the four authored points about it."""
+"""Rows: Bezier control points of a segment from its four authored points."""
 
 
 PER_CURVE = ("kept", "counts", "starts", "segments", "varying_starts")
-"""Attributes of Strands that have a value for each curve."""
+"""Attributes of ``Strands`` with one value per curve."""
 
 _AT_ONCE = 1 << 16
-"""Segments whose values are worked out together: bounds the memory that it takes."""
+"""Segments that are computed together, which bounds the memory used."""
 
 
 def runs(counts: Index) -> tuple[Index, Index]:
-    """For runs of so many things each: which run each thing is of, and its place in the run."""
+    """Returns the run of each element and its position in the run, for runs of given lengths."""
     owner = np.repeat(np.arange(len(counts)), counts)
     starts = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - starts[owner]
@@ -49,19 +49,19 @@ def runs(counts: Index) -> tuple[Index, Index]:
 
 @dataclass(frozen=True)
 class Strands:
-    """How the curves of a prim are laid out, as authored and as Bezier segments.
+    """The layout of a prim's curves, as authored and as Bezier segments.
 
-    Curves without a segment are not among the k here.
+    Excludes curves without segments from the k curves.
 
     Attributes:
         basis: linear, bezier, bspline or catmullRom.
         wrap: nonperiodic, periodic or pinned.
-        kept: (k,) which of the prim's curves.
-        counts: (k,) authored points of each curve.
-        starts: (k,) the first of them.
-        segments: (k,) segments of each curve.
-        varying_starts: (k,) the first of each curve's values of interpolation varying.
-        sizes: How many values each interpolation has.
+        kept: (k,) index of each curve in the prim.
+        counts: (k,) number of authored points of each curve.
+        starts: (k,) index of its first point.
+        segments: (k,) number of segments of each curve.
+        varying_starts: (k,) index of the first varying value of each curve.
+        sizes: Number of values of each interpolation.
     """
 
     basis: str
@@ -85,41 +85,44 @@ class Strands:
 
     @property
     def _step(self) -> int:
-        """Control points from one segment to the next."""
+        """Offset in control points from one segment to the next."""
         return 3 if self.cubic else 1
 
     @property
     def _lead(self) -> int:
-        """Control points of closed curves before the first segment, and behind the last."""
+        """Number of additional control points at each end of a closed curve."""
         return 1 if self.periodic else 0
 
     @property
     def _run_sizes(self) -> Index:
-        """(k,) control points of each curve."""
+        """(k,) number of control points of each curve."""
         return self._step * self.segments + 1 + 2 * self._lead
 
     @property
     def count(self) -> int:
-        """Segments of all curves."""
+        """Number of segments of all curves."""
         return int(self.segments.sum())
 
     @property
     def point_count(self) -> int:
-        """Points of the prim."""
+        """Number of points of the prim."""
         return self.sizes["vertex"]
 
     def only(self, kept: NDArray[np.bool_] | slice) -> Strands:
-        """Some of the curves: a slice, or those for which ``kept``, (k,), holds."""
+        """Returns a subset of the curves, given by a slice or a mask (k,)."""
         return replace(self, **{name: getattr(self, name)[kept] for name in PER_CURVE})
 
     def over_each(self, combine: np.ufunc, values: NDArray[Any]) -> NDArray[np.float64]:
-        """(k,) ``combine`` over the values (n,) of each curve's authored points."""
+        """Reduces the values (n,) of each curve's authored points with ``combine``.
+
+        Returns (k,).
+        """
         owner, at = runs(self.counts)
         mine = np.asarray(values, np.float64)[self.starts[owner] + at]
         return np.asarray(combine.reduceat(mine, np.cumsum(self.counts) - self.counts))
 
     def greatest(self, values: NDArray[Any], kind: str) -> NDArray[np.float64]:
-        """(k,) the greatest of the values (n, 1) of an interpolation on each curve."""
+        """Returns the largest value (k,) on each curve of values (n, 1) with an interpolation."""
         if kind == "vertex":
             return self.over_each(np.maximum, values[:, 0])
         first, last = self.ends(values, kind)
@@ -127,7 +130,7 @@ class Strands:
         return np.asarray(np.maximum.reduceat(np.maximum(first, last)[:, 0], starts))
 
     def segment_words(self) -> NDArray[np.uint32]:
-        """(count,) first control point of each segment, with flags."""
+        """Returns the first control point of each segment (count,), combined with flags."""
         step, lead = self._step, self._lead
         sizes = self._run_sizes
         base = np.cumsum(sizes) - sizes + lead
@@ -138,10 +141,10 @@ class Strands:
         return words
 
     def controls(self, values: NDArray[Any], kind: str) -> Array:
-        """Values (n, c) of an interpolation as float32 at every control point.
+        """Returns float32 values at every control point from values (n, c) of an interpolation.
 
         Args:
-            values: As authored for the whole prim; ``sizes[kind]`` of them.
+            values: Authored values of the whole prim, ``sizes[kind]`` of them.
             kind: constant, uniform, varying or vertex.
         """
         if kind == "vertex" and self.wrap == "nonperiodic" and self.basis in ("linear", "bezier"):
@@ -174,14 +177,14 @@ class Strands:
         return out
 
     def at_controls(self, each: NDArray[Any]) -> Array:
-        """A value (k,) of each curve at every one of its control points, as float32."""
+        """Returns a value (k,) per curve as float32 at all of its control points."""
         first = np.repeat(np.asarray(each, np.float64), self.segments)[:, None]
         return self._pack([first] * (4 if self.cubic else 2))[:, 0]
 
     def ends(
         self, values: NDArray[Any], kind: str
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Values (n, c) of an interpolation at the first and last point of each segment."""
+        """Returns values (n, c) of an interpolation at the first and last point of each segment."""
         values = np.asarray(values, np.float64)
         curve, at = runs(self.segments)
         if kind == "constant":
@@ -198,10 +201,10 @@ class Strands:
         return first, last
 
     def fit(self, primvar: Primvar, width: int) -> tuple[NDArray[Any], str]:
-        """Values of a primvar, (n, width), and the interpolation that their number fits.
+        """Returns values (n, width) of a primvar and the interpolation that their number fits.
 
         Raises:
-            PrimvarError: It fits none.
+            PrimvarError: The number fits no interpolation.
         """
         values, kind = primvar.values, primvar.interpolation
         if values.shape[1] < width:
@@ -211,7 +214,7 @@ class Strands:
             kind = "varying"
         if len(values) == self.sizes.get(kind):
             return values, kind
-        # One value without a word on its interpolation is common, and can only be meant for all.
+        # A single value without authored interpolation is common and applies to all curves.
         if len(values) == 1:
             return values, "constant"
         raise PrimvarError(
@@ -220,7 +223,7 @@ class Strands:
         )
 
     def _bezier(self, values: NDArray[Any]) -> list[NDArray[np.float64]]:
-        """Values per authored point as control points 0 to 3 (1) of each segment, (count, c)."""
+        """Returns the Bezier (or line) points of each segment as 4 (or 2) arrays (count, c)."""
         curve, at = runs(self.segments)
         start, size = self.starts[curve], self.counts[curve]
         step = 3 if self.basis == "bezier" else 1
@@ -231,8 +234,8 @@ class Strands:
             if self.periodic:
                 return np.asarray(values[start + i % size], np.float64)
             out = np.asarray(values[start + np.clip(i, 0, size - 1)], np.float64)
-            # Pinned curves get a point before the first and behind the last, by reflection, so
-            # that they reach their ends.
+            # Pinned curves get a reflected point before the first and after the last one, so that
+            # they reach their end points.
             for outside, end, inner in ((i < 0, 0, 1), (i >= size, size - 1, size - 2)):
                 where = np.flatnonzero(outside)
                 if len(where):
@@ -250,9 +253,9 @@ class Strands:
         ]
 
     def _pack(self, points: list[NDArray[np.float64]]) -> Array:
-        """Control points of segments as runs that neighbours share.
+        """Stores control points of segments as runs that adjacent segments share.
 
-        Closed curves have one more at either end.
+        Closed curves have one additional control point at each end.
         """
         step, lead = self._step, self._lead
         sizes = self._run_sizes
@@ -266,14 +269,15 @@ class Strands:
         end = base + step * self.segments
         out[end] = points[step][last]
         if lead:
-            out[end] = points[0][first]  # the same point, and the same bits
+            # The same point with the same bits.
+            out[end] = points[0][first]
             out[base - 1] = points[step - 1][last]
             out[end + 1] = points[1][first]
         return out
 
 
 def lay_out(counts: Index, basis: str, wrap: str) -> Strands:
-    """The layout of curves of ``counts`` points each."""
+    """Returns the layout of curves with ``counts`` points each."""
     if basis == "linear":
         segments = np.where(counts >= 2, counts - (0 if wrap == "periodic" else 1), 0)
         if wrap == "periodic":
@@ -309,7 +313,7 @@ def lay_out(counts: Index, basis: str, wrap: str) -> Strands:
 
 
 def lay_out_points(count: int) -> Strands:
-    """Points as if they were curves of one segment, for primvars."""
+    """Returns a layout that treats each point as a curve with one segment, for primvars."""
     every = np.arange(count)
     one = np.ones(count, np.intp)
     sizes = {"constant": 1, "varying": count, "vertex": count}
@@ -317,20 +321,20 @@ def lay_out_points(count: int) -> Strands:
 
 
 LEAST_SHARE = 1.0 / 256.0
-"""Of strands that are kept, however thin they are."""
+"""Smallest fraction of strands that is kept, however thin they are."""
 
 
 class StrandDetail:
-    """Thins out strands for one view.
+    """Simplification of thin strands for one view.
 
-    Of strands that are narrower than ``pixels``, a share is kept that is as large as they are
-    narrow, and each is widened by as much, so that together they cover what they covered (Cook,
-    Halstead, Planck and Ryu 2007, stochastic simplification). Which are kept is a matter of their
-    number in the prim: farther away there are always fewer of the same ones.
+    Strands narrower than ``pixels`` are kept with a probability equal to width / ``pixels`` and
+    widened by its inverse, which preserves coverage (stochastic simplification, Cook, Halstead,
+    Planck and Ryu 2007). The choice depends on the strand's index in the prim, so that with
+    distance the kept strands form a shrinking subset.
     """
 
     def __init__(self, view: ViewSize, pixels: float, report: LoadReport) -> None:
-        """``pixels``: no strand is made wider than that."""
+        """``pixels`` is the width in pixels up to which strands are widened."""
         self.view = view
         self.target = pixels
         self.report = report
@@ -343,14 +347,14 @@ class StrandDetail:
         widths: NDArray[Any],
         matrix: Gf.Matrix4d,
     ) -> tuple[Strands, NDArray[np.float64]]:
-        """The strands that are kept, and how many times as wide each of them is to be.
+        """Returns the kept strands and the factor by which each one is widened.
 
         Args:
-            path: Of the prim.
-            strands: All of them.
-            points: (n, 3) as authored.
-            widths: (k,) the greatest of each, in the units of the points.
-            matrix: From the prim to the world.
+            path: Path of the prim.
+            strands: All strands.
+            points: (n, 3) authored points.
+            widths: (k,) largest width of each strand, in units of the points.
+            matrix: Transform from the prim to the world.
         """
         share = np.clip(self._pixels(strands, points, widths, matrix) / self.target, 0.0, 1.0)
         share = np.maximum(share, LEAST_SHARE)
@@ -369,7 +373,7 @@ class StrandDetail:
         widths: NDArray[Any],
         matrix: Gf.Matrix4d,
     ) -> NDArray[np.float64]:
-        """Widths of strands where they are nearest to the camera."""
+        """Returns the widths of strands in pixels where they are closest to the camera."""
         to_world = np.array(matrix)
         size = np.cbrt(abs(np.linalg.det(to_world[:3, :3])))
         nearest = strands.over_each(np.minimum, self.view.distances(points, to_world))
@@ -378,7 +382,7 @@ class StrandDetail:
 
 
 def even(numbers: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Numbers in [0, 1) that look random, one for each (the finaliser of SplitMix64)."""
+    """Maps integers to pseudo-random numbers in [0, 1) with the finaliser of SplitMix64."""
     with np.errstate(over="ignore"):
         x = numbers.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
         x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subdivides and displaces meshes, once it is known how large they are in the picture."""
+"""Subdivides and displaces meshes once their size in the image is known."""
 
 from __future__ import annotations
 
@@ -31,31 +31,31 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.group import Group
 
 TARGET_PIXELS = 2.0
-"""Edges of refined faces are to be no longer than this, and longer than half of it."""
+"""Longest edge of refined faces in pixels; edges are longer than half of it."""
 
 AUTO_LEVEL = 8
-"""Highest level that is chosen; one that is asked for may go to ``MAX_LEVEL``."""
+"""Highest level that is chosen automatically; a requested level may be up to ``MAX_LEVEL``."""
 
 MAX_LEVEL = 10
 
 AUTO_TRIANGLES = 16_000_000
-"""Triangles of all subdivided meshes together that automatic levels may make."""
+"""Most triangles that all subdivided meshes together may have at automatic levels."""
 
 BYTES_PER_TRIANGLE = 210
-"""Peak memory for each refined triangle, while it is refined; less in the scene (measured)."""
+"""Peak memory per refined triangle during refinement (measured); the scene keeps less."""
 
 _COARSE_FACES = 4096
-"""Faces of a cage above which framing takes it for its limit surface."""
+"""Faces of a cage above which framing uses the cage itself as the limit surface."""
 
 _BATCH_TRIANGLES = 4_000_000
-"""Refined at once: bounds the memory that refinement itself takes."""
+"""Triangles that are refined together, which bounds the memory of refinement."""
 
 
 def parse_level(text: str | int) -> str | int:
-    """``off``, ``auto`` or a level from 0 to ``MAX_LEVEL``.
+    """Parses ``off``, ``auto`` or a level from 0 to ``MAX_LEVEL``.
 
     Raises:
-        WavecombError: It is none of these.
+        WavecombError: The text is none of these.
     """
     if text in ("off", "auto"):
         return str(text)
@@ -75,15 +75,15 @@ class Surface:
     """A mesh to be refined.
 
     Attributes:
-        number: Of the polygons that stand for it in the scene.
+        number: Id of the polygon mesh that represents it in the scene until then.
         draw: Its prim and bindings.
         cage: Its polygons.
-        bounds: (2, 3), in its group.
-        worn: Its materials, and what they read of it.
-        group: It is in.
+        bounds: (2, 3) bounds in the space of its group.
+        worn: Material ids and the primvars that the materials read.
+        group: Its group.
         moves: Displacements: lengths or texture uses.
-        face_moves: (faces,) which of them each face has, -1: none.
-        level: Chosen.
+        face_moves: (faces,) index into ``moves`` of each face; -1 means no displacement.
+        level: Subdivision level.
     """
 
     number: int
@@ -98,12 +98,12 @@ class Surface:
 
     @property
     def is_plain(self) -> bool:
-        """Whether cage and level alone decide over it: materials have no say."""
+        """Whether the result depends only on cage and level, not on materials."""
         return not self.moves and not self.worn.reads
 
     @property
     def lowest(self) -> int:
-        """Level that makes sense: displaced subdivision surfaces are subdivided."""
+        """Lowest useful level; displaced subdivision surfaces need at least one."""
         return 1 if self.moves and self.cage.scheme != "none" else 0
 
 
@@ -120,12 +120,13 @@ class Surfaces:
 
     @property
     def subdivide(self) -> bool:
-        """Whether subdivision is asked for."""
+        """Whether subdivision is enabled."""
         return self.choice != "off"
 
     def is_displaced(self, draw: Draw) -> bool:
-        """Whether a material that is bound to a mesh moves its points."""
-        if not draw.subsets:  # nearly all
+        """Returns whether a material that is bound to a mesh displaces its points."""
+        # Nearly all meshes have no subsets.
+        if not draw.subsets:
             material = draw.material
             return material is not None and bool(self.materials.surface(material).displacement)
         bound = (draw.material, *draw.subset_materials)
@@ -139,7 +140,7 @@ class Surfaces:
         mesh: MeshArrays,
         worn: Worn,
     ) -> None:
-        """Notes a mesh that was added as polygons."""
+        """Records a mesh that was added as polygons."""
         cage = mesh.cage
         if cage is None:
             return
@@ -152,9 +153,9 @@ class Surfaces:
             self.report.tally("subdivision meshes")
 
     def limit_points(self, cage: Cage) -> NDArray[np.float32] | None:
-        """Points near the limit surface of a cage that will be subdivided, or None.
+        """Returns points near the limit surface of a cage that will be subdivided, or None.
 
-        Of a fine cage none: it is near that surface itself.
+        Returns None for a fine cage as well, since its own points are close to that surface.
         """
         if cage.scheme == "none" or not self.subdivide or self.choice == 0:
             return None
@@ -171,7 +172,7 @@ class Surfaces:
         return np.concatenate(points) if points else None
 
     def _displacements(self, surface: Surface) -> None:
-        """Which displacement each face has."""
+        """Finds the displacement of each face."""
         draw, count = surface.draw, len(surface.cage.counts)
         which = np.full(count, -1, np.int32)
         moves: list[Any] = []
@@ -195,10 +196,10 @@ class Surfaces:
             surface.moves, surface.face_moves = moves, which
 
     def finish(self, world: Group, view: View) -> None:
-        """Chooses levels for a view and puts the refined meshes into the scene.
+        """Chooses subdivision levels for a view and replaces polygons by refined meshes.
 
         Raises:
-            WavecombError: The level that was asked for needs more memory than there is.
+            WavecombError: The requested level needs more memory than the machine has.
         """
         if not self._all:
             return
@@ -206,7 +207,8 @@ class Surfaces:
         levels = Counter(surface.level for surface in self._all if surface.cage.scheme != "none")
         waiting = deque(surface for surface in self._all if surface.level or surface.moves)
         if self.cache is None:
-            self._all = []  # cages that stay as they are go now, others when they are refined
+            # Releases unrefined cages now and refined ones after refinement.
+            self._all = []
         while waiting:
             self._refine(self._next_batch(waiting))
         if levels:
@@ -214,7 +216,7 @@ class Surfaces:
             self.report.note(f"subdivision meshes refined: {text}")
 
     def _next_batch(self, waiting: deque[Surface]) -> list[Surface]:
-        """Takes those that are refined at once."""
+        """Removes the next batch of meshes to refine together."""
         batch: list[Surface] = []
         triangles = 0
         while waiting and triangles < _BATCH_TRIANGLES:
@@ -226,9 +228,9 @@ class Surfaces:
     def has_same_levels(
         self, world: Group, view: View, size: tuple[int, int] | None = None
     ) -> bool:
-        """Whether another view asks for the levels that ``finish`` chose, which had a cache.
+        """Returns whether another view needs the levels that ``finish`` chose; requires a cache.
 
-        ``size``: of its picture; None: as it was.
+        ``size`` is the size of the other image; None means that it is unchanged.
         """
         size_before, self.size = self.size, self.size if size is None else size
         before = [surface.level for surface in self._all]
@@ -269,7 +271,7 @@ class Surfaces:
         self._keep_in_memory(chosen)
 
     def _keep_in_memory(self, chosen: list[Surface]) -> None:
-        """Lowers the levels of the largest until all fit in ``AUTO_TRIANGLES``."""
+        """Lowers the levels of the largest meshes until all fit in ``AUTO_TRIANGLES``."""
         counts = [s.cage.triangles_at(s.level) for s in chosen]
         total = sum(counts)
         heap = [(-count, i) for i, count in enumerate(counts) if chosen[i].level > chosen[i].lowest]
@@ -284,12 +286,12 @@ class Surfaces:
             total += count + now
             if surface.level > surface.lowest:
                 heapq.heappush(heap, (-now, i))
-        what = "subdivided less than the picture asks for, to bound memory"
+        what = "subdivided less than the image needs, to limit memory"
         for i in sorted(lowered):
             self.report.note(what, chosen[i].draw.prim.GetPath())
 
     def _refine(self, batch: list[Surface]) -> None:
-        """Refines meshes, in parallel, and replaces the polygons that stand for them."""
+        """Refines meshes in parallel and replaces the polygons that represent them."""
         fresh = []
         for surface in batch:
             known = self._cached(surface)
@@ -313,7 +315,7 @@ class Surfaces:
             self._take(surface, refined)
 
     def _cached(self, surface: Surface) -> dict[str, Any] | None:
-        """What the frame before made of a surface, if it can be this one's."""
+        """Returns the previous frame's refined mesh if it is still valid."""
         if self.cache is None or not surface.is_plain:
             return None
         return self.cache.get(surface.cage, surface.level)
@@ -325,7 +327,7 @@ class Surfaces:
         self._replace(surface, refined)
 
     def _describe(self, surface: Surface) -> dict[str, Any]:
-        """What ``SceneBuilder.make_surfaces`` takes."""
+        """Returns the description that ``SceneBuilder.make_surfaces`` takes."""
         cage = surface.cage
         out: dict[str, Any] = {
             "level": surface.level,
@@ -346,10 +348,10 @@ class Surfaces:
         return out
 
     def _polygons(self, cage: Cage) -> dict[str, Any]:
-        """Polygons that are displaced where their points are."""
+        """Describes polygons that are displaced without subdivision."""
         topology = cage.topology
         out: dict[str, Any] = {
-            # Its triangles are turned the right way already.
+            # These triangles already have the correct winding.
             "left_handed": False,
             "triangles": topology.triangles,
             "triangle_faces": np.ascontiguousarray(topology.face_ids(), np.uint32),
@@ -383,7 +385,7 @@ class Surfaces:
 
 
 def _joined(steps: list[Any]) -> Any:
-    """What was refined at the steps of the shutter as one; else the first error."""
+    """Combines the refined meshes of all shutter steps; returns the first error if there is one."""
     first = next((step for step in steps if isinstance(step, str)), steps[0])
     if len(steps) == 1 or isinstance(first, str):
         return first

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Polygons as triangles, and their smooth normals."""
+"""Triangulates polygons and computes smooth normals."""
 
 from __future__ import annotations
 
@@ -12,30 +12,33 @@ from numpy.typing import NDArray
 from wavecomb import _core
 
 _CHUNK = 1 << 17
-"""Polygons split at once: bounds the memory in use."""
+"""Polygons that are split together, which bounds the memory used."""
 
 _EAR_STEPS = 1 << 26
-"""Work that one polygon gets, about a second: one of 100,000 corners takes two thirds at the worst
-that is known."""
+"""Limit of steps for one polygon, about one second of work.
+
+The worst known polygon of 100,000 corners takes two thirds of it.
+"""
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be drawn; says why in a few words."""
+    """A mesh is invalid; the message gives the reason in a few words."""
 
 
 @dataclass(frozen=True)
 class Topology:
-    """Triangles and where their corners and faces come from.
+    """Triangles with their source corners and faces.
 
     Attributes:
-        triangles: (m, 3) points of each triangle, uint32.
-        corners: (m, 3) positions in faceVertexIndices, or None where triangle i has 3i, 3i+1, 3i+2.
-        faces: (m,) face of each triangle, or None where every face has ``per_face`` triangles.
+        triangles: (m, 3) point indices, uint32.
+        corners: (m, 3) positions in faceVertexIndices; None if triangle i has 3i, 3i+1, 3i+2.
+        faces: (m,) face of each triangle; None if every face has ``per_face`` triangles.
         indices: (corner_count,) faceVertexIndices.
         point_count: Number of points.
-        face_count: Number of faces, holes included.
-        per_face: Triangles of each face where ``faces`` is None.
-        hurried: Faces that cross themselves too often to be split with care.
+        face_count: Number of faces, including holes.
+        per_face: Triangles of each face if ``faces`` is None.
+        hurried: Number of faces that cross themselves so often that their split is only
+            approximate.
     """
 
     triangles: NDArray[np.uint32]
@@ -53,13 +56,13 @@ class Topology:
         return len(self.triangles)
 
     def corner_ids(self) -> NDArray[np.intp]:
-        """(m, 3) positions in faceVertexIndices."""
+        """Returns (m, 3) positions in faceVertexIndices."""
         if self.corners is None:
             return np.arange(3 * self.count).reshape(-1, 3)
         return self.corners
 
     def face_ids(self) -> NDArray[np.intp]:
-        """(m,) face of each triangle."""
+        """Returns the face (m,) of each triangle."""
         return np.arange(self.count) // self.per_face if self.faces is None else self.faces
 
 
@@ -70,17 +73,19 @@ def triangulate(
     holes: NDArray[np.int32] | None = None,
     flip: bool = False,
 ) -> Topology:
-    """Splits polygons: quads along the better diagonal, convex ones as fans, others by their ears.
+    """Triangulates polygons.
+
+    Splits quads along the better diagonal, convex polygons as fans, and others by clipping ears.
 
     Args:
         points: (n, 3).
-        counts: (faces,) corners of each face; faces of fewer than 3 corners are dropped.
-        indices: (corners,) points of each corner.
-        holes: Faces that are not drawn.
-        flip: Turn every triangle round.
+        counts: (faces,) number of corners of each face; faces with fewer than 3 are dropped.
+        indices: (corners,) point index of each corner.
+        holes: Indices of faces that are not drawn.
+        flip: Whether to reverse the winding of every triangle.
 
     Raises:
-        MeshError: Counts and indices do not fit together.
+        MeshError: Counts and indices are inconsistent.
     """
     if len(counts) == 0:
         raise MeshError("no faces")
@@ -92,7 +97,7 @@ def triangulate(
         raise MeshError(
             f"the face counts add up to {total}, but there are {len(indices)} face indices"
         )
-    # Negative ones are large as unsigned.
+    # Negative indices are large when read as unsigned.
     if total and int(np.maximum.reduce(indices.view(np.uint32))) >= len(points):
         raise MeshError("a face index is out of range")
     has_holes = holes is not None and len(holes) > 0
@@ -127,9 +132,9 @@ def _split(
     indices: NDArray[np.int32],
     faces: NDArray[np.intp],
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
-    """Corners (m, 3) and faces (m,) of the triangles of some faces, in face order.
+    """Returns corners (m, 3) and faces (m,) of the triangles of some faces, in face order.
 
-    Then how many of the faces were split in a hurry.
+    The third result is the number of faces whose split is only approximate.
     """
     starts = np.cumsum(counts, dtype=np.intp) - counts
     sizes = counts[faces]
@@ -156,7 +161,7 @@ def _split(
 def _quads(
     points: NDArray[np.float32], indices: NDArray[np.int32], flip: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
-    """Corners and points (m, 3) of the triangles of a mesh of quads alone."""
+    """Returns corners and points (m, 3) of the triangles of a mesh that has only quads."""
     corners = _core.split_quads(points, indices)
     if flip:
         corners = np.ascontiguousarray(corners[:, ::-1])
@@ -166,9 +171,9 @@ def _quads(
 def _split_rings(
     points: NDArray[np.float32], indices: NDArray[np.int32], ring: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], int]:
-    """Triangles (faces, k - 2, 3) of polygons of k corners each, ring (faces, k).
+    """Splits polygons of k corners, ring (faces, k), into triangles (faces, k - 2, 3).
 
-    Then how many of the polygons were split in a hurry.
+    The second result is the number of polygons whose split is only approximate.
     """
     size = ring.shape[1]
     if size == 3:
@@ -178,7 +183,7 @@ def _split_rings(
         return pairs.reshape(-1, 2, 3), 0
     p = points.take(indices[ring], axis=0).astype(np.float64)
     p -= p[:, :1]
-    # Newell's normal; the fan is right where each of its triangles turns the same way.
+    # Newell's normal; a fan is valid if all of its triangles have the same orientation.
     normal = cross(p, np.roll(p, -1, axis=1)).sum(axis=1)
     areas = np.einsum("fkc,fc->fk", cross(p[:, 1:-1], p[:, 2:]), normal)
     bad = areas.min(axis=1) < -1e-9 * np.einsum("ij,ij->i", normal, normal)
@@ -195,7 +200,7 @@ def _split_rings(
 
 
 def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """Cross product along the last axis; np.cross is slow on small arrays."""
+    """Returns the cross product along the last axis; np.cross is slow on small arrays."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     out = np.empty(a.shape, a.dtype)
@@ -208,10 +213,10 @@ def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 def clip_ears(
     points: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], int]:
-    """Triangles (k - 2, 3) of one simple polygon, points (k, 3), by clipping ears.
+    """Splits one simple polygon (k, 3) into triangles (k - 2, 3) by clipping ears.
 
-    One that crosses itself is split, too, whichever way. Then the corners that were cut without a
-    look, after ``_EAR_STEPS``.
+    A polygon that crosses itself is split as well, with overlaps. The second result is the number
+    of corners that were cut without a check after ``_EAR_STEPS`` steps.
     """
     drop = int(np.argmax(np.abs(normal)))
     axes = [(drop + 1) % 3, (drop + 2) % 3]
@@ -223,11 +228,11 @@ Ints = NDArray[np.int32]
 
 
 _TRIANGLES = 1 << 16
-"""Triangles whose normals are added at once: bounds the memory in use."""
+"""Triangles whose normals are added together, which bounds the memory used."""
 
 
 def _unit(total: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Rows of length 1; (0, 0, 1) for those of length 0."""
+    """Normalises rows; rows of length 0 become (0, 0, 1)."""
     out = np.empty(total.shape, np.float32)
     for first in range(0, len(total), _TRIANGLES):
         part = total[first : first + _TRIANGLES]
@@ -242,12 +247,12 @@ def smooth_normals(
     topology: Topology,
     creases: NDArray[np.int64] | None = None,
 ) -> NDArray[np.float32]:
-    """Area-weighted normals: (n, 3) per point, or (m, 3, 3) per corner where edges are sharp.
+    """Computes area-weighted normals: (n, 3) per point, or (m, 3, 3) per corner with hard edges.
 
     Args:
         points: (n, 3).
-        topology: The triangles, turned the way that is outside.
-        creases: (k, 2) points of the sharp edges.
+        topology: The triangles; their winding defines the outside.
+        creases: (k, 2) end points of the hard edges.
     """
     triangles = topology.triangles
     sharp = creases is not None and len(creases) > 0
@@ -263,7 +268,7 @@ def smooth_normals(
         face = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         where = index[3 * first : 3 * (first + _TRIANGLES)]
         for axis in range(3):
-            # In order of triangles, however they are cut.
+            # The order of additions is that of the triangles, independent of the block size.
             np.add.at(total[axis], where, np.repeat(face[:, axis], 3))
     normals = _unit(np.ascontiguousarray(total.T))
     return normals[index].reshape(-1, 3, 3) if sharp else normals
@@ -272,8 +277,8 @@ def smooth_normals(
 def _smoothing_groups(
     triangles: NDArray[np.int64], creases: NDArray[np.int64], point_count: int
 ) -> NDArray[np.int64]:
-    """(3 m,) label of each corner: equal where one point's corners meet across smooth edges."""
-    # Both ends of every half edge: corners (at the lower point, at the higher point).
+    """Returns corner labels (3 m,), equal for corners of a point that meet across smooth edges."""
+    # Corners at both ends of every half-edge: at the lower and at the higher point index.
     corner = np.arange(triangles.size).reshape(-1, 3)
     a, b = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     ca, cb = corner.ravel(), np.roll(corner, -1, axis=1).ravel()

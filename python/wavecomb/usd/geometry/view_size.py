@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How large edges of meshes and widths of strands are in the picture."""
+"""Measures mesh edges and strand widths in pixels."""
 
 from __future__ import annotations
 
@@ -18,24 +18,25 @@ if TYPE_CHECKING:
 Matrices = NDArray[np.float64]
 
 NEAREST = 16
-"""Placements of a mesh that are measured edge by edge; the others look smaller than these."""
+"""Instances of a mesh that are measured edge by edge; the remaining ones appear smaller."""
 
 
 class ViewSize:
-    """Measures in pixels of one view.
+    """Conversion of lengths to pixels of one view.
 
     Attributes:
-        pixels: Of a unit of the camera's window.
-        per_length: Of a unit of length where ``distances`` is 1.
+        pixels: Pixels per unit of the camera's window.
+        per_length: Pixels per unit of length where ``distances`` is 1.
     """
 
     def __init__(self, view: View, size: tuple[int, int]) -> None:
-        """``size``: of the picture, width and height."""
+        """``size`` is the width and height of the image."""
         x0, x1, y0, y1 = camera_window(view.options, *size)
         half = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
         self.centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
         self.half = half
-        # The longer way where pixels are not square: more is refined, not less.
+        # For pixels that are not square, use the finer direction, so that more is refined, not
+        # less.
         shape = pixel_aspect(view.options, *size)
         self.pixels = size[0] / (2.0 * half[0]) * (shape if shape > 1.0 + 1e-5 else 1.0)
         self.projection = str(view.options.get("projection", "perspective"))
@@ -44,10 +45,10 @@ class ViewSize:
         self.to_camera = np.linalg.inv(np.asarray(view.transform, np.float64))
 
     def distances(self, points: NDArray[Any], to_world: Matrices) -> NDArray[np.float64]:
-        """By what lengths at points, (n, 3) of a prim, are divided in the picture: (n,).
+        """Returns the distances (n,) by which lengths at points (n, 3) of a prim appear reduced.
 
-        Their depth before a perspective camera, their distance behind it and from a latlong one;
-        1 for an orthographic one.
+        For a perspective camera this is the depth in front of it, or the distance behind it. For a
+        latlong camera it is the distance, and for an orthographic camera 1.
         """
         if self.projection == "orthographic":
             return np.ones(len(points))
@@ -59,12 +60,12 @@ class ViewSize:
         return np.asarray(away, np.float64)
 
     def edges(self, cage: Cage, bounds: NDArray[Any], placed: Matrices) -> float:
-        """The largest mean length in pixels of a cage's edges (``_core.edge_pixels``).
+        """Returns the largest mean edge length of a cage in pixels (``_core.edge_pixels``).
 
         Args:
-            cage: What is measured.
-            bounds: (2, 3), in its group.
-            placed: (k, 4, 4) from its group to the world.
+            cage: The cage.
+            bounds: (2, 3) bounds in the space of its group.
+            placed: (k, 4, 4) transforms from its group to the world.
         """
         from wavecomb import _core
 
@@ -78,7 +79,7 @@ class ViewSize:
         )  # fmt: skip
 
     def _largest(self, bounds: NDArray[Any], placed: Matrices) -> NDArray[np.intp]:
-        """The placements in which a bounding sphere looks largest, those in the picture first."""
+        """Returns the instances whose bounding spheres appear largest, visible ones first."""
         centre = 0.5 * (bounds[0] + bounds[1]).astype(np.float64)
         radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
         linear = placed[:, :3, :3]

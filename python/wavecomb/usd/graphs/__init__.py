@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value graphs: expressions of typed operations, folded, shared and put into flat programs.
+"""Value graphs: typed expressions that are folded, shared and compiled to flat programs.
 
-``node`` says what a value is, ``expressions`` makes values, ``linear`` knows sums among them,
-``program`` gives them registers. ``surface``, ``attributes``, ``bind`` and ``colour`` are what
-surfaces have of them.
+``values`` defines values and compiles them, ``surface`` maps them to surface parameters, and
+``bind`` specialises them for one mesh.
 """

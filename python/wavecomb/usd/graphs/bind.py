@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value graphs on one mesh: its primvars and its place in the group take their places in them."""
+"""Specialises value graphs for one mesh: inserts its primvars and its transform."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _LOCAL, _AXES = OF_SPACE[:2], OF_SPACE[2:]
 
 _CONSTANTS = {*TEXTURED_PARAMETERS, "ior"} - {"normal"}
-"""Parameters beside those of layers that a constant may stand for."""
+"""Parameters, besides those of OpenPBR layers, that may become constants."""
 
 
 def bound(
@@ -41,13 +41,13 @@ def bound(
     primvars: Mapping[str, Sequence[float]],
     attributes: Mapping[str, int] = MappingProxyType({}),
 ) -> Surface:
-    """The surface as a mesh wears it.
+    """Returns the surface specialised for one mesh.
 
     Args:
-        surface: With a graph that asks for the object's space, or for primvars.
-        matrix: From the mesh to its group, 4 x 4, for row vectors.
-        primvars: Values of primvars that are one for the whole mesh.
-        attributes: Primvars that vary over it, with how many components.
+        surface: A surface whose graph reads object space or primvars.
+        matrix: (4, 4) transform from the mesh to its group, for row vectors.
+        primvars: Values of constant primvars.
+        attributes: Number of components of varying primvars.
     """
     graph = surface.graph
     if graph is None:
@@ -90,12 +90,12 @@ def bound(
 
 
 def at_other_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface:
-    """The surface on a mesh whose texture coordinates are not those that it reads.
+    """Returns the surface for a mesh whose own texture coordinates are not those that it reads.
 
     Args:
-        surface: As ``bound`` gives it, where its graph reads primvars.
-        sets: By textured parameter, the primvar of its coordinates.
-        own: That of the coordinates in its graph; "": the mesh's.
+        surface: Result of ``bound`` if its graph reads primvars.
+        sets: UV primvar of each textured parameter.
+        own: UV primvar of its graph; "" means the mesh's texture coordinates.
     """
     make = Expressions()
     mesh = make.input("uv")
@@ -118,7 +118,7 @@ def at_other_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surfac
 
 
 def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> Value:
-    """What a texture use gives at other coordinates."""
+    """Returns the value of a texture use at other coordinates."""
     m = use["uv"]
     at = tuple(
         make.op("add", make.op("dot", uv, numbers(*row[:2])), numbers(row[2]))[0]
@@ -135,7 +135,7 @@ def _texel(make: Expressions, use: Mapping[str, Any], uv: Value, width: int) -> 
 
 
 def _in_object_space(make: Expressions, matrix: NDArray[np.float64]) -> dict[str, Value]:
-    """The group's position, normal and axes of normals, brought to the mesh's own space."""
+    """Expresses object-space position, normal and normal axes by those of the group."""
     inverse = np.linalg.pinv(matrix)
 
     def mapped(vector: Value, rows: NDArray[Any]) -> Value:

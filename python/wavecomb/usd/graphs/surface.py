@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What drives the parameters of a surface: constants, plain textures, or a value graph."""
+"""Maps value graphs to surface parameters as constants, plain textures or compiled graphs."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ from wavecomb.usd.looks.texture import TextureTable
 from wavecomb.usd.stage.report import LoadReport
 
 BASE, COLOUR, NUMBER, NORMAL = "base", "colour", "number", "normal"
-"""What a value is for: the base colour, another colour, a number, or a normal in tangent space."""
+"""Uses of a value: base colour, another colour, a number, or a tangent-space normal."""
 COLOURS = (BASE, COLOUR)
 
 _SAMPLES = 8
-"""Points along each axis of the texture at which a graph is looked at for what it comes to."""
+"""Sample points per axis of the texture at which a graph is evaluated for estimates."""
 
 
 class Networks(Protocol):
-    """What gives values: the networks of shaders of one material."""
+    """Interface that evaluates the shader networks of one material."""
 
     make: Expressions
     material: Usd.Prim
@@ -55,21 +55,24 @@ class Networks(Protocol):
     uv_names: list[str]
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
-        """What feeds an input; None where nothing does, or nothing that can be read."""
+        """Returns the value of an input; None if nothing valid is connected or authored."""
 
     def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
-        """What an output of a node gives."""
+        """Returns the value of a node's output."""
 
     def in_working_space(self) -> Networks:
-        """The same networks with constant colours of the working space; tells nothing."""
+        """Returns these networks with constants in the working space; it reports nothing."""
 
 
 Replaced = Callable[[Node, tuple[Value, ...]], Value | None]
-"""Called as replaced(node, its operands made anew); None: the node stays."""
+"""Callback replaced(node, rebuilt operands); returns a new value, or None to keep the node."""
 
 
 def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
-    """A value made anew with other values in the place of some nodes; primvars give way always."""
+    """Rebuilds a value with some nodes replaced.
+
+    Primvar placeholders always become their default.
+    """
     done: dict[Node, Value] = {}
 
     def part_of(part: Part) -> Part:
@@ -85,7 +88,10 @@ def substituted(make: Expressions, value: Value, replaced: Replaced) -> Value:
 
 
 def in_working_space(make: Expressions, value: Value, working: str) -> Value:
-    """A colour of linear Rec.709 in the working space; what follows r, g and b stays."""
+    """Converts a colour from linear Rec.709 to the working space.
+
+    Keeps components after r, g, b.
+    """
     if working == "rec709":
         return value
     matrix = from_rec709(np.eye(3), working)
@@ -96,7 +102,7 @@ def in_working_space(make: Expressions, value: Value, working: str) -> Value:
 
 
 def uv_matrix(uv: Value) -> tuple[float, ...] | None:
-    """The matrix m: u' = m[0] u + m[1] v + m[2], v' = m[3] u + ...; None where there is none."""
+    """Returns m with u' = m[0] u + m[1] v + m[2], v' = m[3] u + ...; None if it is not affine."""
     rows: list[float] = []
     for part in uv:
         found: Linear | None = linear(part, _is_uv)
@@ -115,7 +121,7 @@ def _is_uv(node: Node) -> bool:
 
 
 def sampled(value: Value) -> Any:
-    """A value at some points of the texture (n, components), textures taken for white."""
+    """Evaluates a value at sample points (n, components), with textures taken as white."""
     points = np.zeros((_SAMPLES * _SAMPLES, POINT_SIZE), np.float32)
     steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     points[:, 0], points[:, 1] = (axis.ravel() for axis in np.meshgrid(steps, steps))
@@ -126,7 +132,7 @@ def sampled(value: Value) -> Any:
 
 
 def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
-    """A texture use that gives a value: texel * scale + bias at affine coordinates; else None."""
+    """Returns an equivalent texture use (texel * scale + bias, affine coordinates), or None."""
     found = [linear(part, lambda node: node.code == "image") for part in value]
     if any(one is None or len(one[0]) != 1 for one in found):
         return None
@@ -161,7 +167,7 @@ def plain_use(value: Value, wide: bool) -> dict[str, Any] | None:
 
 
 class Drivers:
-    """Collects what drives the parameters of one surface."""
+    """The values that drive the parameters of one surface."""
 
     def __init__(self, networks: Networks) -> None:
         self.networks = networks
@@ -171,18 +177,18 @@ class Drivers:
 
     @property
     def uv_names(self) -> tuple[str, ...]:
-        """Primvars of texture coordinates that are read, first use first."""
+        """Names of the UV primvars that are read, in order of first use."""
         return tuple(dict.fromkeys(self.networks.uv_names))
 
     def value(self, shader: UsdShade.Shader, name: str, parameter: str) -> Value | None:
-        """What feeds an input that is to drive a parameter; None where nothing does.
+        """Returns the value of an input that drives a parameter; None if there is none.
 
-        Constants are as authored; what varies is in the working space.
+        Constants have their authored values; varying colours are in the working space.
         """
         return self._read(parameter, lambda networks, kind: networks.input(shader, name, kind))
 
     def output(self, shader: UsdShade.Shader, output: str, parameter: str) -> Value | None:
-        """What a node's output gives, likewise."""
+        """Returns the value of a node's output; the rules of ``value`` apply."""
         return self._read(parameter, lambda networks, kind: networks.node(shader, output, kind))
 
     def _read(self, parameter: str, read: Callable[[Networks, str], Value | None]) -> Value | None:
@@ -197,7 +203,7 @@ class Drivers:
         return read(self._converted, kind)
 
     def scaled(self, value: Value, by: Value) -> Value:
-        """A product; of constants in double precision."""
+        """Multiplies two values; constants in double precision."""
         if is_constant(value) and is_constant(by):
             factors = by * len(value) if len(by) == 1 else by
             return tuple(
@@ -207,7 +213,7 @@ class Drivers:
         return self.networks.make.op("multiply", value, by)
 
     def put(self, parameter: str, value: Value) -> tuple[float, ...] | None:
-        """Lets a value drive a parameter; gives it back where it is a constant."""
+        """Assigns a value to a parameter; returns it if it is constant."""
         width = PARAMETERS[parameter][1]
         value = fit(value, width)
         if is_constant(value):
@@ -220,7 +226,7 @@ class Drivers:
         return None
 
     def surface(self, program: str, parameters: dict[str, Any]) -> Surface:
-        """The surface of the material, with these constants."""
+        """Returns the surface of the material with these constants."""
         return Surface(
             str(self.networks.material.GetPath()),
             program,
@@ -231,9 +237,9 @@ class Drivers:
         )
 
     def graph(self) -> SurfaceGraph | None:
-        """The graphs of what neither constants nor textures drive; None where that is nothing.
+        """Returns the graph of parameters without constants or textures; None if there are none.
 
-        Where a graph is too large, parameters are left out of it, the last one first, and said.
+        If the graph is too large, reports and leaves out parameters, the last one first.
         """
         left = dict(self._outputs)
         while left:
@@ -247,10 +253,10 @@ class Drivers:
 
 
 def graphs_of(outputs: Mapping[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
-    """The graphs that drive parameters, primvars at their defaults; None for no parameter.
+    """Compiles graphs of parameters, with primvars at their defaults; None if there are none.
 
     Raises:
-        GraphTooLarge: There is no room for them.
+        GraphTooLarge: The graph exceeds the size limit.
     """
     if not outputs:
         return None
@@ -274,7 +280,7 @@ def _as_it_is(_node: Node, _operands: tuple[Value, ...]) -> Value | None:
 
 
 def kind_of(parameter: str) -> str:
-    """What values of a parameter are."""
+    """Returns the use of a parameter's values."""
     if parameter == "base_color":
         return BASE
     if parameter == "normal":
@@ -294,7 +300,10 @@ Linear = tuple[dict[tuple[Node, int], float], float]
 
 
 def linear(part: Part, is_leaf: Callable[[Node], bool]) -> Linear | None:
-    """A part as a sum of components of leaves times numbers, and a number; None where it is not."""
+    """Returns a part as a linear combination of leaf components plus a constant.
+
+    Returns None if it is not.
+    """
     known: dict[tuple[Node, int], Linear | None] = {}
 
     def of(one: Part) -> Linear | None:

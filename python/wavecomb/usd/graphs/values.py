@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of graphs: how they are made, folded and compiled to the flat programs of the core.
+"""Creates, folds and compiles values of graphs to the flat programs of the core.
 
-A value is a tuple of parts, one for each component. A part is a number, or a component of a node:
+A value is a tuple of parts, one per component. A part is a number or a component of a node, so that
 swizzles, extractions and combinations need no operation.
 """
 
@@ -18,26 +18,29 @@ from wavecomb import _core
 CODES = {name: number for number, name in enumerate(_core.GRAPH_CODES)}
 INPUTS = {name: number for number, name in enumerate(_core.GRAPH_INPUTS)}
 PARAMETERS: dict[str, tuple[int, int]] = dict(_core.GRAPH_PARAMETERS)
-"""Parameter -> (its first component, how many it has)."""
+"""Parameter -> (index of its first component, number of components)."""
 
 POINT_SIZE = 3 * len(INPUTS) - 3
-"""Numbers of a point: uv, its width, then position, local position, normal, local normal, tangent,
-view and the three axes of normals, of three each."""
+"""Floats per evaluation point.
+
+They are uv and its filter width, then three each for position, local position, normal, local
+normal, tangent, view direction and the three normal axes.
+"""
 
 OF_SPACE = ("local_position", "local_normal", "normal_x", "normal_y", "normal_z")
-"""Inputs that depend on the object's own space."""
+"""Inputs that depend on object space."""
 
 PRIMVAR = "primvar"
-"""A node that stands for what a mesh gives."""
+"""Code of a placeholder node for a primvar of the mesh."""
 
 
 class GraphTooLarge(Exception):
-    """A graph needs more registers or operations than there are."""
+    """A graph needs more registers or operations than available."""
 
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """One operation; ``Expressions`` makes equal ones once."""
+    """One operation; ``Expressions`` creates equal nodes only once."""
 
     code: str
     width: int
@@ -48,12 +51,12 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Which input it is; "" of other operations."""
+        """Name of the input; "" for other operations."""
         return str(_core.GRAPH_INPUTS[self.number]) if self.code == "input" else ""
 
     @property
     def results(self) -> int:
-        """Registers that it writes."""
+        """Number of registers that it writes."""
         return 1 if self.code == "dot" else self.width
 
 
@@ -63,17 +66,17 @@ Operand = Value | float
 
 
 def is_constant(value: Value) -> bool:
-    """Whether all components are numbers."""
+    """Returns whether all components are numbers."""
     return all(isinstance(part, float) for part in value)
 
 
 def numbers(*values: float) -> Value:
-    """A constant, in 32 bits; what is not finite is 0."""
+    """Creates a constant in float32; values that are not finite become 0."""
     return tuple(float(np.float32(v)) if np.isfinite(v) else 0.0 for v in values)
 
 
 def fit(value: Value, width: int) -> Value:
-    """Another number of components: numbers spread, vectors lose or gain some."""
+    """Changes the number of components: repeats a number, cuts or extends a vector."""
     if len(value) == width:
         return value
     if len(value) == 1:
@@ -84,7 +87,7 @@ def fit(value: Value, width: int) -> Value:
 
 
 def nodes_of(parts: Sequence[Part]) -> list[Node]:
-    """All nodes that parts need, operands before what reads them."""
+    """Returns all nodes that the parts depend on, in evaluation order."""
     order: list[Node] = []
     done: set[Node] = set()
     stack: list[tuple[Node, bool]] = [
@@ -112,9 +115,9 @@ _OP = np.dtype(
 
 @dataclass(frozen=True)
 class Graph:
-    """A flat program, as ``SceneBuilder.add_graph`` takes it.
+    """A compiled program in the form that ``SceneBuilder.add_graph`` takes.
 
-    ``attributes``: primvars that it reads, with how many components.
+    ``attributes`` are names of primvars that it reads, with their numbers of components.
     """
 
     ops: bytes
@@ -125,16 +128,19 @@ class Graph:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of its attributes."""
+        """Names of its attributes."""
         return tuple(name for name, _ in self.attributes)
 
     @property
     def count(self) -> int:
-        """Operations."""
+        """Number of operations."""
         return len(self.ops) // _OP.itemsize
 
     def run(self, points: Any, lanes: int = 1) -> Any:
-        """Its outputs at points (n, ``POINT_SIZE``), textures taken for white, without a mesh."""
+        """Evaluates the program at points (n, ``POINT_SIZE``) without a mesh.
+
+        Textures are taken as white.
+        """
         array = np.ascontiguousarray(points, np.float32)
         return _core.run_graph(
             self.ops, self.constants, self.images, self.outputs, self.names, array, lanes=lanes
@@ -142,16 +148,16 @@ class Graph:
 
 
 def assemble(outputs: dict[int, Part]) -> Graph:
-    """The program whose outputs are these parts, by component number.
+    """Compiles parts, by component number, to a program.
 
     Raises:
-        GraphTooLarge: It needs more registers or operations than there are.
+        GraphTooLarge: It needs more registers or operations than available.
     """
     return _Assembler(outputs).graph()
 
 
 class _Assembler:
-    """Gives nodes registers, in their order, and writes operations."""
+    """Compiler state: the registers of nodes, and the operations written so far."""
 
     def __init__(self, outputs: dict[int, Part]) -> None:
         self._outputs = outputs
@@ -210,7 +216,7 @@ class _Assembler:
             self._release(place, width)
 
     def _operand(self, value: Value) -> tuple[int, int, bool]:
-        """Where a value is, whether it is a vector, and whether it was copied to be there."""
+        """Returns the register of a value, whether it is a vector, and whether it was copied."""
         if len(set(value)) == 1:
             return self._single(value[0]), 0, False
         if is_constant(value):
@@ -267,26 +273,26 @@ _POINTS = {"noise2": 2, "noise3": 3, "fractal3": 3, "cell2": 2, "cell3": 3, "wor
 
 
 class Expressions:
-    """Makes nodes, each once, and folds what is constant."""
+    """Factory of nodes that creates equal nodes only once and folds constants."""
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[Any, ...], Node] = {}
 
     def input(self, name: str) -> Value:
-        """What the surface says: of ``GRAPH_INPUTS``."""
+        """Returns an input of the shading point, one of ``GRAPH_INPUTS``."""
         width = 2 if name == "uv" else 3
         return self._all(self._node("input", width, (), INPUTS[name]))
 
     def image(self, texture: int, uv: Value, stretch: float) -> Value:
-        """r, g, b and alpha of a texture."""
+        """Returns r, g, b and alpha of a texture."""
         return self._all(self._node("image", 4, (uv,), 0, (texture, stretch)))
 
     def primvar(self, number: int, otherwise: Value) -> Value:
-        """A value that each mesh gives; ``otherwise`` where it does not. Replaced before use."""
+        """Returns a placeholder for a primvar, replaced per mesh; ``otherwise`` is its default."""
         return self._all(self._node(PRIMVAR, len(otherwise), (otherwise,), number))
 
     def again(self, node: Node, operands: tuple[Value, ...]) -> Value:
-        """A node with other operands."""
+        """Returns a copy of a node with other operands."""
         if node.code == "input":
             return self.input(node.name)
         if node.code == "image" and node.image is not None:
@@ -296,29 +302,32 @@ class Expressions:
         return self.op(node.code, *operands, number=node.number, width=node.width)
 
     def attribute(self, name: str, width: int, fallback: Value) -> Value:
-        """A primvar of the mesh at hits; ``fallback`` where it has none of so many components."""
+        """Returns a primvar that is read at hits.
+
+        Its value is ``fallback`` on a mesh without such a primvar or with fewer components.
+        """
         return self._all(self._node("attribute", width, (fit(fallback, width),), 0, None, name))
 
     def add(self, a: Operand, b: Operand) -> Value:
-        """The sum a + b."""
+        """Returns the sum a + b."""
         return self.op("add", a, b)
 
     def sub(self, a: Operand, b: Operand) -> Value:
-        """The difference a - b."""
+        """Returns the difference a - b."""
         return self.op("subtract", a, b)
 
     def mul(self, a: Operand, b: Operand) -> Value:
-        """The product a b."""
+        """Returns the product a b."""
         return self.op("multiply", a, b)
 
     def div(self, a: Operand, b: Operand) -> Value:
-        """The quotient a / b."""
+        """Returns the quotient a / b."""
         return self.op("divide", a, b)
 
     def op(self, code: str, *given: Operand, number: int = 0, width: int = 0) -> Value:
-        """An operation on values: by component, except for those on whole vectors.
+        """Returns an operation on values: per component, or on whole vectors for some codes.
 
-        ``width``: components of the result where the operands do not say.
+        ``width`` is the number of result components if the operands do not determine it.
         """
         operands = tuple(numbers(one) if isinstance(one, float) else one for one in given)
         if code in _POINTS:
@@ -381,7 +390,7 @@ class Expressions:
 
 
 def _simplified(code: str, parts: tuple[Part, ...]) -> Part | None:
-    """What an operation comes to without one; None where it is needed."""
+    """Simplifies an operation algebraically; returns None if the operation is needed."""
     a = parts[0]
     b = parts[1] if len(parts) > 1 else None
     if code == "add":

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdLux lights."""
+"""Reads UsdLux lights, light filters and IES profiles."""

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What domes have of their own: how they are turned, images in other formats, portals.
+"""Orientation, image formats and portals of dome lights.
 
-UsdLux names the formats of images and leaves open how they are turned. Here the middle of each
-looks at the dome's +z, as that of a latlong image does, with +y up. Angular maps and crosses are
-seen from inside: their right is -x. A mirrored ball is a photograph: its right is +x.
+UsdLux names image formats but does not define their orientation. Here the image centre of every
+format maps to the dome's +z with +y up, as for latlong images. Angular maps and cube crosses are
+seen from inside, so that image right is -x. A mirrored ball is a photograph, so that image right is
++x.
 """
 
 from __future__ import annotations
@@ -24,30 +25,30 @@ from wavecomb.usd.stage.instancing import sound
 Matrices = NDArray[np.float64]
 
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
-"""Turns +Y to +Z, row vectors: what UsdLux does to a dome on a Z-up stage."""
+"""Rotation from +Y to +Z for row vectors, which UsdLux applies to domes on Z-up stages."""
 
 
 class DomeReader:
-    """Reads the domes of one stage."""
+    """Reader of the dome lights of one stage."""
 
     def __init__(self, context: LoadContext, textures: TextureTable | None) -> None:
-        """``textures``: None: images are not asked for."""
+        """Creates a reader; images are not read if ``textures`` is None."""
         self.time, self.report = context.time, context.report
         self.up_axis = context.up_axis
         self.textures = textures
         self._made: dict[tuple[str, str, str], int] = {}
 
     def pole(self, prim: Usd.Prim) -> Matrices:
-        """Where the pole starts (4, 4): +Y for DomeLight, by poleAxis for DomeLight_1."""
+        """Returns the rotation (4, 4) to the pole: +Y for DomeLight, poleAxis for DomeLight_1."""
         axis = prim.GetAttribute("poleAxis").Get(self.time)
         if axis == "scene":
             axis = self.up_axis
         return Y_TO_Z if axis == "Z" else np.eye(4)
 
     def resampled(self, prim: Usd.Prim, path: str, image: Image, tag: str) -> int | None:
-        """The texture of an image in a format other than latlong, as a latlong one.
+        """Returns a texture with the image resampled to latlong; None if it already is latlong.
 
-        None: it is latlong. ``tag``: colour space, or auto.
+        ``tag`` is the colour space of the image, or auto.
         """
         form = format_of(self._format(prim), image.size)
         if form == "latlong" or self.textures is None:
@@ -75,9 +76,9 @@ class DomeReader:
         return form
 
     def portals(self, prim: Usd.Prim, local: Matrices) -> Matrices | None:
-        """The portals of a dome (k, 4, 4), from the unit square to the dome's own space.
+        """Returns the transforms (k, 4, 4) from the unit square to dome space, one per portal.
 
-        ``local``: From ``pole``. None: there are none.
+        Returns None if the light has no valid portal. ``local`` is the result of ``pole``.
         """
         relation = prim.GetRelationship("portals")
         found = []
@@ -100,7 +101,7 @@ class DomeReader:
 
 
 def soft_dome() -> NDArray[np.float32]:
-    """The environment of a stage without lights, (64, 128, 3): bright above, warm grey below."""
+    """Returns the default environment (64, 128, 3): bright above, warm grey below."""
     rows = (np.arange(64, dtype=np.float32) + 0.5) / 64
     height = np.cos(np.pi * rows)[:, None]
     blend = 1.0 / (1.0 + np.exp(-6.0 * height))
@@ -111,7 +112,7 @@ def soft_dome() -> NDArray[np.float32]:
 
 FORMATS = ("latlong", "mirroredBall", "angular", "cubeMapVerticalCross")
 MAX_HEIGHT = 2048
-"""Rows of a latlong image that is made."""
+"""Largest height of a resampled latlong image in pixels."""
 
 _SUBSAMPLES = 2
 _ROWS = 64
@@ -120,9 +121,9 @@ Floats = NDArray[np.float64]
 
 
 def format_of(name: str, size: tuple[int, int]) -> str:
-    """The format of an image (height, width) where "automatic" is asked for; else ``name``.
+    """Returns ``name``, or the format of an image (height, width) if the name is "automatic".
 
-    Four faces high and three wide is a cross, anything else latlong.
+    An image four faces high and three wide is a cross; any other image is latlong.
     """
     if name != "automatic":
         return name
@@ -131,9 +132,9 @@ def format_of(name: str, size: tuple[int, int]) -> str:
 
 
 def to_latlong(pixels: NDArray[Any], form: str) -> NDArray[np.float32]:
-    """An image (h, w, c) of one of ``FORMATS`` as a latlong one (n, 2 n, c).
+    """Resamples an image (h, w, c) of one of ``FORMATS`` to latlong (n, 2 n, c).
 
-    Each pixel is the mean of bilinear samples of the original.
+    Each pixel is the mean of several bilinear samples of the original.
     """
     height, width, channels = pixels.shape
     face = height // 4 if form == "cubeMapVerticalCross" else 0
@@ -157,12 +158,12 @@ def to_latlong(pixels: NDArray[Any], form: str) -> NDArray[np.float32]:
 
 
 def _place(x: Floats, y: Floats, z: Floats, form: str) -> tuple[Floats, Floats, Any, Any]:
-    """Where directions lie in an image: u to the right and v down, in [0, 1]; and the bounds.
+    """Maps directions to image coordinates in [0, 1]: u to the right, v down.
 
-    The bounds (u, v), lowest and highest, are what bilinear samples stay within.
+    Also returns the lowest and highest (u, v) that bilinear samples may read.
     """
     if form == "mirroredBall":
-        # The ball's normal is halfway between the direction and the one to the viewer, +z.
+        # The ball's normal is halfway between the direction and the viewing direction +z.
         length = np.sqrt(np.maximum(2.0 + 2.0 * z, 1e-30))
         return 0.5 + 0.5 * x / length, 0.5 - 0.5 * y / length, (0.0, 0.0), (1.0, 1.0)
     if form == "angular":
@@ -178,7 +179,7 @@ def _cross(x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Any, Any]:
     along_y = ~along_x & (ay > az)
     along_z = ~along_x & ~along_y
     faces = (
-        # where, column, row, right, up
+        # mask, column, row, right, up
         (along_z & (z > 0), 1, 1, -x, y),
         (along_y & (y > 0), 1, 0, -x, -z),
         (along_y & (y <= 0), 1, 2, -x, z),

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Filters of lights: what they are, their inputs by who wrote them, and gels.
+"""Inputs of light filters as different renderers name them, and colour gels.
 
-Gels multiply all the light of a lamp, whatever its kind: Karma's ``kma_lfilter_gel`` and what its
-barn doors and gobos say beside, RenderMan's PxrIntMult.
+A gel multiplies all light of a light source: Karma's ``kma_lfilter_gel``, the gel inputs of Karma's
+barn doors and gobos, and RenderMan's PxrIntMult.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ _PREFIXES = (
     "inputs:", "inputs:ri:light:", "inputs:ri:lightFilter:", "inputs:arnold:", "arnold:",
     "primvars:arnold:", "ri:light:", "ri:lightFilter:", "",
 )  # fmt: skip
-"""What inputs of filters begin with."""
+"""Prefixes of filter input names."""
 OF_LIGHTS = ("inputs:", "")
-"""What doors begin with that a light has itself."""
+"""Prefixes of barn door inputs that are authored on the light itself."""
 
 
 @dataclass(frozen=True)
 class FilterInputs:
-    """The inputs of a filter, or of a light that has doors of its own."""
+    """The inputs of a filter, or of a light with its own barn doors."""
 
     prim: Usd.Prim
     time: Usd.TimeCode
     prefixes: tuple[str, ...] = _PREFIXES
 
     def attribute(self, *names: str) -> Usd.Attribute | None:
-        """The first of some names that says something."""
+        """Returns the first attribute with one of the names that is authored or connected."""
         for name in names:
             for prefix in self.prefixes:
                 attribute = self.prim.GetAttribute(prefix + name)
@@ -45,22 +45,22 @@ class FilterInputs:
         return None
 
     def value(self, *names: str) -> Any:
-        """Of the first of some names that says something; None: none does."""
+        """Returns the value of the first authored input with one of the names, or None."""
         attribute = self.attribute(*names)
         return None if attribute is None else attribute.Get(self.time)
 
     def number(self, name: str, default: float, *others: str) -> float:
-        """A finite number."""
+        """Returns a finite number."""
         value = self.value(name, *others)
         return default if value is None else number(value, default)
 
     def word(self, name: str, default: str, *others: str) -> str:
-        """A token or string."""
+        """Returns a token or string."""
         value = self.value(name, *others)
         return default if value is None else word(value, default)
 
     def colour(self, name: str, default: Colour, report: LoadReport) -> Colour:
-        """A finite colour in linear Rec.709."""
+        """Returns a finite colour in linear Rec.709."""
         value = self.value(name)
         if value is None:
             return default
@@ -69,7 +69,7 @@ class FilterInputs:
 
 
 def filter_prims(light: Usd.Prim) -> list[tuple[str, Usd.Prim | None]]:
-    """What a light's ``light:filters`` names: path, prim or None."""
+    """Returns path and prim (or None) of each target of a light's ``light:filters``."""
     relationship = light.GetRelationship("light:filters")
     targets = relationship.GetForwardedTargets() if relationship else []
     stage = light.GetStage()
@@ -77,7 +77,7 @@ def filter_prims(light: Usd.Prim) -> list[tuple[str, Usd.Prim | None]]:
 
 
 def kind_of(prim: Usd.Prim) -> str:
-    """What a filter is: its prim's type, or what a LightFilter's ``shaderId`` says."""
+    """Returns the kind of a filter: its prim type, or the ``shaderId`` of a generic LightFilter."""
     name = str(prim.GetTypeName())
     if name in ("LightFilter", "PluginLightFilter", ""):
         name = word(prim.GetAttribute("lightFilter:shaderId").Get())
@@ -85,24 +85,24 @@ def kind_of(prim: Usd.Prim) -> str:
 
 
 def plain_kind(prim: Usd.Prim) -> str:
-    """That in small letters, without what comes before a colon, and without underscores."""
+    """Returns ``kind_of`` in lower case, without namespace and underscores."""
     return kind_of(prim).lower().replace("_", "").rsplit(":", 1)[-1]
 
 
 GELS = frozenset({"kmalfiltergel", "pxrintmultlightfilter", "pxrintmult"})
-"""Kinds of filters that are nothing but gels."""
+"""Kinds of filters that are only gels."""
 
 _WITH_GEL = GELS | {"kmalfilterbarndoor", "kmalfiltergobo"}
 
 
 @dataclass(frozen=True)
 class Gel:
-    """What a light's gels do together.
+    """The combined effect of a light's gels.
 
     Attributes:
         tint: Factor of the light's colour, linear Rec. 709.
-        saturation: Of what comes of that: 0 is grey of its luminance.
-        diffuse, specular: Factors of the light's own multipliers.
+        saturation: Saturation of the tinted colour; 0 gives grey of the same luminance.
+        diffuse, specular: Factors of the light's diffuse and specular multipliers.
     """
 
     tint: Colour = (1.0, 1.0, 1.0)
@@ -111,7 +111,7 @@ class Gel:
     specular: float = 1.0
 
     def over(self, rgb: Colour) -> Colour:
-        """A light's colour through it."""
+        """Applies the gel to a light's colour."""
         r, g, b = (c * t for c, t in zip(rgb, self.tint, strict=True))
         if self.saturation == 1:
             return (r, g, b)
@@ -120,7 +120,7 @@ class Gel:
         return (r, g, b)
 
     def multiplied(self, options: Mapping[str, Any]) -> dict[str, float]:
-        """The multipliers of a light whose other options are known, where they change."""
+        """Returns the changed multipliers of a light with these options."""
         return {
             name: factor * float(options.get(name, 1.0))
             for name, factor in (("diffuse", self.diffuse), ("specular", self.specular))
@@ -129,7 +129,7 @@ class Gel:
 
 
 def gel_of(light: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> Gel:
-    """The gels among a light's filters, together; also of what is listed as not supported."""
+    """Combines all gels among a light's filters, including those of unsupported filters."""
     gel = Gel()
     for _, prim in filter_prims(light):
         if prim is not None and plain_kind(prim) in _WITH_GEL:

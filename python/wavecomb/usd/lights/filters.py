@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Filters of lights: barn doors, pictures that are thrown, decay.
+"""Light filters: barn doors, gobos (projected images) and decay.
 
-Filters have no schema of their own in UsdLux: what one is, its prim's type says, or what
-``lightFilter:shaderId`` names, and its inputs are called as the renderer has it whose filter it is.
-Read are RenderMan's barns and cookies, which stand where their prim is, Arnold's barn doors,
-gobos and decay, and Karma's barn doors (which a light may have itself, too) and gobos.
+UsdLux has no schemas for specific filters. The kind of a filter is its prim type or its
+``lightFilter:shaderId``, and its inputs have the names of the renderer that defines it. Supported
+are RenderMan's barn and cookie filters, which are at the position of their prim; Arnold's barn
+doors, gobo and decay; and Karma's barn doors (also on the light itself) and gobo.
 """
 
 from __future__ import annotations
@@ -35,27 +35,27 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 Line = tuple[float, float, float]
-"""a, b, c of a x + b y + c."""
+"""Coefficients a, b, c of a x + b y + c."""
 
 _OPEN: Line = (0.0, 0.0, 1.0)
 _FLAPS = {"left": (1.0, 0.0), "right": (-1.0, 0.0), "bottom": (0.0, 1.0), "top": (0.0, -1.0)}
-"""Karma's, and what of (x, y) grows away from each."""
+"""Karma's barn doors, with the direction in (x, y) that points away from each."""
 _SHARP = 1e5
-"""Steps in a window's size over which a hard edge falls."""
+"""Slope of a hard edge in window sizes."""
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A filter, as ``SceneBuilder.add_light_filter`` takes it.
+    """A filter in the form that ``SceneBuilder.add_light_filter`` takes.
 
     Attributes:
-        matrix: (4, 4) from its own space to the light's.
-        distance: Of the window, along -z; 0: none.
-        sides: Four lines that light must be above.
-        picture: Lines that give u and v of the texture.
-        texture: Its id.
-        decay: near start, near end, far start, far end.
-        density: How much of it there is.
+        matrix: (4, 4) transform from filter space to light space.
+        distance: Distance of the window along -z; 0 means that there is no window.
+        sides: Four lines; light passes where all of them are positive.
+        picture: Two lines that compute u and v of the texture.
+        texture: Texture id.
+        decay: Near start, near end, far start and far end.
+        density: Strength of the filter.
     """
 
     matrix: NDArray[np.float64]
@@ -70,7 +70,7 @@ class Filter:
 def add_filters(
     builder: _core.SceneBuilder, filters: Sequence[Filter], transform: NDArray[np.float64]
 ) -> int | None:
-    """The number of the filters of a light that is placed by ``transform``, together."""
+    """Adds the filters of a light with this transform; returns their combined id."""
     known: int | None = None
     for one in filters:
         known = builder.add_light_filter(
@@ -81,7 +81,7 @@ def add_filters(
 
 
 class FilterReader:
-    """Reads the filters of the lights of one stage."""
+    """Reader of the light filters of one stage."""
 
     def __init__(self, context: LoadContext, textures: TextureTable | None) -> None:
         self._time, self._report = context.time, context.report
@@ -97,9 +97,9 @@ class FilterReader:
         }  # fmt: skip
 
     def of(self, light: Usd.Prim, kind: str) -> tuple[Filter, ...]:
-        """What is read of a light's ``light:filters`` and of its own doors; the rest is listed.
+        """Returns a light's filters and its own barn doors; reports unsupported ones.
 
-        Gels are not among them: ``gels``.
+        Gels are read by ``gel_of`` instead.
         """
         prims = [(path, prim) for path, prim in filter_prims(light) if not _gel(prim)]
         doors = FilterInputs(light, self._time, OF_LIGHTS)
@@ -130,7 +130,7 @@ class FilterReader:
     # ---- kinds -----------------------------------------------------------------------------
 
     def _barn(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
-        """A window at the prim's own origin, whose edge lies outside."""
+        """Reads a RenderMan barn: a window at its prim's origin, with the soft edge outside."""
         if inputs.word("barnMode", "physical") != "physical":
             self._report.missing("analytic light barns (as physical ones)", inputs.prim.GetPath())
         if inputs.number("radius", 0.0) > 0:
@@ -149,7 +149,7 @@ class FilterReader:
         return Filter(_before(inputs.prim, light, self._time), 1.0, sides)
 
     def _cookie(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
-        """A picture at the prim's own origin, as seen from where light comes; black beyond it."""
+        """Reads a RenderMan cookie: an image at its prim's origin with a black exterior."""
         texture = self._texture(inputs, inputs.word("tileMode", "off"), "textureMap")
         if texture is None:
             return None
@@ -160,7 +160,10 @@ class FilterReader:
         )  # fmt: skip
 
     def _doors(self, inputs: FilterInputs, light: Usd.Prim) -> Filter:
-        """Flaps over the square around a spot light's cone, from 0 at its left and top to 1."""
+        """Reads Arnold barn doors over the square around a spot light's cone.
+
+        Door positions are 0 at the left or top edge of the square and 1 at the opposite edge.
+        """
         away, size = self._cone(inputs, light)
         usual = {"top": 0.0, "left": 0.0, "bottom": 1.0, "right": 1.0}
         ends = {"top": ("left", "right"), "bottom": ("left", "right")}
@@ -171,7 +174,8 @@ class FilterReader:
                 for end in ends.get(flap, ("top", "bottom"))
             )
             edge = inputs.number(f"barndoor_{flap}_edge", 0.0)
-            # (across, along) = what the flap moves by, and what its ends are at; in the square.
+            # Coordinates in the square: across is the direction in which the door moves, along is
+            # its edge.
             across, along = (
                 ((0.0, -0.5 / size, 0.5), (0.5 / size, 0.0, 0.5))
                 if flap in ends
@@ -185,7 +189,7 @@ class FilterReader:
         return Filter(np.eye(4), away, sides)
 
     def _gobo(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
-        """A picture over the square around a spot light's cone."""
+        """Reads an Arnold gobo: an image over the square around a spot light's cone."""
         texture = self._texture(inputs, inputs.word("swrap", "clamp"), "slidemap")
         if texture is None:
             return None
@@ -207,9 +211,12 @@ class FilterReader:
         return Filter(np.eye(4), decay=(decay[0], decay[1], decay[2], decay[3]))
 
     def _flaps(self, inputs: FilterInputs, light: Usd.Prim, before: str = "") -> Filter:
-        """Karma's doors: of 0 they are open, of 1 across the whole cone; edges likewise."""
+        """Reads Karma barn doors: 0 is open and 1 covers the whole cone.
+
+        Edges use the same scale.
+        """
         if inputs.value("invert", "invertblockers", "invert_blockers"):
-            self._report.missing("inverted light doors (as they are)", inputs.prim.GetPath())
+            self._report.missing("inverted light doors (not inverted)", inputs.prim.GetPath())
         away, size = self._cone(inputs, light)
         sides = []
         for flap, (x, y) in _FLAPS.items():
@@ -224,7 +231,7 @@ class FilterReader:
         return Filter(np.eye(4), away, sides)
 
     def _slide(self, inputs: FilterInputs, light: Usd.Prim) -> Filter | None:
-        """Karma's gobo: a picture over the square around a spot light's cone."""
+        """Reads a Karma gobo: an image over the square around a spot light's cone."""
         for name in ("blur", "invert", "invertcolor"):
             if inputs.value(name):
                 self._report.missing(f"{name} of a light's gobo", inputs.prim.GetPath())
@@ -246,7 +253,7 @@ class FilterReader:
     # ---- inputs ----------------------------------------------------------------------------
 
     def _cone(self, inputs: FilterInputs, light: Usd.Prim) -> tuple[float, float]:
-        """A distance at which the light is small; half the side of the square around its cone."""
+        """Returns a distance that is large for the light, and half the cone's width there."""
         angle = number(light.GetAttribute("inputs:shaping:cone:angle").Get(self._time), 90.0)
         if not angle < 89.0:
             self._report.missing(
@@ -259,7 +266,7 @@ class FilterReader:
         return away, away * math.tan(math.radians(max(angle, 0.1)))
 
     def _texture(self, inputs: FilterInputs, wrap: str, *names: str) -> int | None:
-        """The id of a file that an input names, or the image that is connected to it."""
+        """Returns the texture of a file input, or of the image node that is connected to it."""
         attribute = inputs.attribute(*names)
         if attribute is not None and attribute.HasAuthoredConnections():
             sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(attribute))
@@ -281,28 +288,29 @@ class FilterReader:
 
 
 def _gel(prim: Usd.Prim | None) -> bool:
-    """Whether it is nothing but a gel, which ``gels`` reads."""
+    """Returns whether a filter is only a gel."""
     return prim is not None and plain_kind(prim) in GELS
 
 
 def _before(prim: Usd.Prim, light: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float64]:
-    """From a filter, whose window is at its origin, to the light's space."""
+    """Returns the transform from a filter with a window at its origin to light space."""
     cache = UsdGeom.XformCache(time)
     there = np.array(cache.GetLocalToWorldTransform(light), np.float64)
-    # Types that USD does not know have transforms that its caches do not see.
+    # XformCache ignores the transforms of prim types that USD does not know.
     local = UsdGeom.Xformable(prim).GetLocalTransformation(time)
     own = np.array(local, np.float64) @ np.array(cache.GetParentToWorldTransform(prim), np.float64)
     forward = np.eye(4)
-    forward[3, 2] = 1.0  # a window is at -1
+    # The core's windows are at z = -1.
+    forward[3, 2] = 1.0
     return np.asarray(forward @ own @ np.linalg.pinv(there), np.float64)
 
 
 def _scaled(line: Line, edge: float, size: float) -> Line:
-    """A line that light passes within ``edge``; of 0 at once."""
+    """Scales a line so that it rises from 0 to 1 within ``edge``; 0 gives a hard edge."""
     k = 1.0 / edge if edge > size / _SHARP else _SHARP / size
     return (line[0] * k, line[1] * k, line[2] * k)
 
 
 def _side(x: float, y: float, room: float, edge: float, size: float) -> Line:
-    """The side towards -(x, y), ``room`` from the middle."""
+    """Returns the line of the side in direction -(x, y), at distance ``room`` from the centre."""
     return _scaled((x, y, room), edge, max(size, 1e-6))

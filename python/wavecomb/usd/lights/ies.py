@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""IES profiles: luminaire data by ANSI/IES LM-63."""
+"""Reads IES profiles: luminaire data in ANSI/IES LM-63 format."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from wavecomb.usd.stage.context import LoadContext
 Floats = NDArray[np.float64]
 
 MOST_BYTES = 1 << 26
-"""Larger files are no profiles."""
+"""Largest size of a profile in bytes."""
 _MOST_VALUES = 1 << 24
 _WORDS = re.compile(r"[^\s,]+")
 _TYPES = {1: "C", 2: "B", 3: "A"}
 
 
 class IesError(ValueError):
-    """What is wrong with a file, in a few words."""
+    """A file is invalid; the message gives the reason in a few words."""
 
 
 @dataclass(frozen=True)
 class IesProfile:
-    """Candela over directions, expanded to the whole circle.
+    """Luminous intensity over directions, expanded to the full circle.
 
     Attributes:
-        vertical: (v,), degrees from the luminaire's axis, in [0, 180], ascending.
-        horizontal: (h,), degrees around it, from 0 to 360; or 0 alone: alike all around.
-        candela: (h, v).
+        vertical: (v,) angles from the luminaire's axis in degrees, in [0, 180], ascending.
+        horizontal: (h,) angles around the axis in degrees, 0 to 360; a single 0 means rotational
+            symmetry.
+        candela: (h, v) intensities in candela.
     """
 
     vertical: Floats
@@ -43,10 +44,10 @@ class IesProfile:
 
 
 def parse_ies(text: str) -> IesProfile:
-    """The profile of an LM-63 file (1986 to 2019): photometry of type C, B or A.
+    """Parses an LM-63 file (1986 to 2019) with photometry of type C, B or A.
 
-    Candela are multiplied by the file's own multiplier, its ballast factor and its ballast-lamp
-    factor. ``TILT=INCLUDE`` is read over: it tells of lamps that hang askew. Raises IesError.
+    Multiplies candela by the file's multiplier, its ballast factor and its ballast-lamp factor.
+    Skips ``TILT=INCLUDE`` data, which describes tilted lamps. Raises IesError.
     """
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT")), None)
@@ -64,7 +65,7 @@ def parse_ies(text: str) -> IesProfile:
     rows, columns = _count(numbers, "vertical angles"), _count(numbers, "horizontal angles")
     kind = _TYPES.get(int(_take(numbers, 1, "head")[0]))
     if kind is None:
-        raise IesError("its photometric type is none of 1, 2 and 3")
+        raise IesError("its photometric type is not 1, 2 or 3")
     _, _, _, _, ballast, lamp, _ = _take(numbers, 7, "head")
     if rows * columns > _MOST_VALUES:
         raise IesError(f"it says that it has {rows} x {columns} values")
@@ -85,12 +86,13 @@ def parse_ies(text: str) -> IesProfile:
 
 
 def _numbers(text: str) -> Iterator[float]:
-    for match in _WORDS.finditer(text):  # one at a time: a list of all would be 20 times the text
+    # Converts one number at a time, since a list of all would take 20 times the memory of the text.
+    for match in _WORDS.finditer(text):
         word = match[0]
         try:
             yield float(word)
         except ValueError:
-            raise IesError(f"{word[:20]!r} is no number") from None
+            raise IesError(f"{word[:20]!r} is not a number") from None
 
 
 def _take(numbers: Iterator[float], n: int, what: str) -> Floats:
@@ -114,18 +116,20 @@ def _ascending(angles: Floats, what: str) -> Floats:
 
 
 def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfile:
-    """Type C, by the symmetry that the range of horizontal angles tells of."""
+    """Expands type C by the symmetry that the range of horizontal angles implies."""
     first, last = horizontal[0], horizontal[-1]
     if len(horizontal) == 1:
         return IesProfile(vertical, np.zeros(1), candela)
 
     def mirrored(about: float) -> None:
         nonlocal horizontal, candela
-        inner = slice(-2, None, -1)  # all but the plane of symmetry itself
+        # All planes except the plane of symmetry itself.
+        inner = slice(-2, None, -1)
         horizontal = np.append(horizontal, 2 * about - horizontal[inner])
         candela = np.append(candela, candela[inner], axis=0)
 
-    if (first, last) == (90, 270):  # phi and 180 - phi are alike
+    # Intensities at phi and 180 - phi are equal.
+    if (first, last) == (90, 270):
         both = np.append(horizontal, (180 - horizontal) % 360)
         horizontal, rows = np.unique(both, return_index=True)
         candela = np.append(candela, candela, axis=0)[rows]
@@ -152,13 +156,14 @@ def _expand_c(vertical: Floats, horizontal: Floats, candela: Floats) -> IesProfi
 
 
 def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) -> IesProfile:
-    """Types A and B at each degree of type C.
+    """Resamples types A and B to type C at every degree.
 
-    The axis of type A's poles is upright, that of type B's level. With x to the side, y up and z
-    along the luminaire's axis, the horizontal angle H and the vertical one V of a direction are
+    The polar axis of type A is vertical, that of type B is horizontal. With x to the side, y up and
+    z along the luminaire's axis, the horizontal angle H and the vertical angle V of a direction are
         A: tan H = x / z, sin V = y        B: sin H = x, tan V = y / z.
     """
-    if horizontal[0] == 0 and horizontal[-1] > 0:  # both sides alike
+    # The file holds one half; the other is its mirror image.
+    if horizontal[0] == 0 and horizontal[-1] > 0:
         horizontal = np.append(-horizontal[:0:-1], horizontal)
         candela = np.append(candela[:0:-1], candela, axis=0)
     if horizontal[0] < -90 or horizontal[-1] > 90 or vertical[0] < -90 or vertical[-1] > 90:
@@ -196,14 +201,14 @@ def _resample(vertical: Floats, horizontal: Floats, candela: Floats, kind: str) 
 
 
 class IesTable:
-    """Adds profiles to the scene, each file once."""
+    """The IES profiles of a scene; each file is added once."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder, self._report = context.builder, context.report
         self._found: dict[str, int | IesError] = {}
 
     def add(self, path: str, prim: object) -> int | None:
-        """The number of a file's profile; None and a warning where it cannot be read."""
+        """Returns the id of a file's profile; warns and returns None if it is unreadable."""
         if path not in self._found:
             self._found[path] = self._read(path)
         found = self._found[path]

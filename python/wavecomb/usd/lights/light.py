@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdLux lights."""
+"""Reads UsdLux lights."""
 
 from __future__ import annotations
 
@@ -40,31 +40,31 @@ from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
 
 KINDS = kind_of_prims()
-"""Lights that are drawn, by prim type."""
+"""Kinds of supported lights, by prim type."""
 
 _READ_APART = frozenset({
     "color", "normalize", "focus", "focus_tint", "cone_angle", "cone_softness", "ies_angle_scale",
     "ies_normalize",
 })  # fmt: skip
-"""Parameters that depend on other inputs, or on the kind of light."""
+"""Parameters that depend on other inputs or on the kind of light, and are read separately."""
 
 
 class Profiles(Protocol):
-    """Takes IES profiles by their files."""
+    """Interface of a table of IES profiles."""
 
     def add(self, path: str, prim: Sdf.Path) -> int | None:
-        """Its number; None where it cannot be read."""
+        """Returns the id of a profile; None if the file is unreadable."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """A light as ``SceneBuilder.add_light`` takes it, before its transform is known in full.
+    """A light in the form that ``SceneBuilder.add_light`` takes, without its world transform.
 
     Attributes:
         kind: rect, disk, sphere, cylinder, distant or dome.
         options: Keyword arguments.
-        local: (4, 4) applied before the prim's transform.
-        filters: What stands before it, relative to it.
+        local: (4, 4) transform that is applied before the prim's transform.
+        filters: Light filters in light space.
     """
 
     kind: str
@@ -74,12 +74,12 @@ class Light:
 
 
 def blackbody(kelvin: float) -> tuple[float, float, float]:
-    """Linear Rec. 709 colour of a black body, of the luminance of (1, 1, 1).
+    """Returns the linear Rec. 709 colour of a black body with the luminance of (1, 1, 1).
 
-    That of ``Gf.Color``, Krystek's approximation of the Planckian locus from 1000 to 15000 K, which
-    OpenUSD's Embree delegate uses: what is beyond is taken for the nearest end.
-    ``UsdLux.BlackbodyTemperatureAsRgb``, a table that ends at 10000 K, is within 0.002 of it from
-    2000 K on. Components that Rec. 709 cannot hold (blue below 1900 K) are 0.
+    Uses ``Gf.Color``, Krystek's approximation of the Planckian locus from 1000 to 15000 K, like
+    OpenUSD's Embree delegate; clamps temperatures to this range.
+    ``UsdLux.BlackbodyTemperatureAsRgb``, a table up to 10000 K, differs by at most 0.002 above 2000
+    K. Components outside of Rec. 709 (blue below 1900 K) are 0.
     """
     found = Gf.Color(Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709))
     found.SetFromPlanckianLocus(min(max(kelvin, 1000.0), 15000.0), 1.0)
@@ -90,7 +90,7 @@ def blackbody(kelvin: float) -> tuple[float, float, float]:
 
 
 class LightReader:
-    """Reads the lights of one stage."""
+    """Reader of the lights of one stage."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class LightReader:
         profiles: Profiles | None = None,
         links: LinkTable | None = None,
     ) -> None:
-        """``textures``, ``profiles``, ``links``: None: lights are read without theirs."""
+        """Creates a reader; None for ``textures``, ``profiles`` or ``links`` skips that kind."""
         self.time, self.report = context.time, context.report
         self.hidden = context.hides_lights
         self.textures = textures
@@ -111,7 +111,10 @@ class LightReader:
         self.filters = FilterReader(context, textures)
 
     def read(self, prim: Usd.Prim, scale: float = 1.0) -> Light:
-        """The light of a prim whose type is in ``KINDS``; scale: of its transform."""
+        """Reads a light whose prim type is in ``KINDS``.
+
+        ``scale`` is the scale of its transform.
+        """
         kind = KINDS[str(prim.GetTypeName())]
         options = self._common(prim, kind)
         if group := self.groups.of(prim):
@@ -141,14 +144,14 @@ class LightReader:
         return Light(kind, options, local, self.filters.of(prim, kind))
 
     def read_mesh(self, prim: Usd.Prim) -> dict[str, Any]:
-        """The light of a mesh that is one, as ``SceneBuilder.add_mesh_light`` takes it."""
+        """Reads a mesh light as keyword arguments of ``SceneBuilder.add_mesh_light``."""
         options = self._common(prim, "mesh")
         options["normalize"] = bool(self._get(prim, "normalize", False))
         self.filters.of(prim, "mesh")
         return options
 
     def _common(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
-        """Options that lights of all kinds have."""
+        """Reads options that all kinds of lights have."""
         gel = gel_of(prim, self.time, self.report)
         radiance = self._colour(prim, gel)
         if not all(0 <= value < 1e30 for value in radiance):
@@ -167,7 +170,10 @@ class LightReader:
         return options
 
     def _plain(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
-        """What is read as it stands: of the shape always, others where they say something."""
+        """Reads parameters that map directly to inputs.
+
+        Except for shape, only non-default values.
+        """
         options = {}
         for row in of_kind(kind):
             if not row.input or row.kind not in EDITABLE or row.name in _READ_APART:
@@ -178,7 +184,7 @@ class LightReader:
         return options
 
     def _value(self, prim: Usd.Prim, row: LightParameter) -> Any:
-        """A parameter within its range; sizes below 0 are as large as those above."""
+        """Returns a parameter clamped to its range; negative sizes become positive."""
         found = self._get(prim, row.input, row.default)
         if row.kind == "flag":
             return bool(found)
@@ -198,8 +204,8 @@ class LightReader:
         return default if value is None else value
 
     def _colour(self, prim: Usd.Prim, gel: Gel) -> tuple[float, float, float]:
-        """Colour * intensity * 2^exposure * colour temperature, through gels."""
-        # What is not finite stays so, and is warned of.
+        """Returns colour * intensity * 2^exposure * colour temperature, filtered by gels."""
+        # NaN marks invalid values, for which the caller warns.
         bad = math.nan
         authored = base = colour(self._get(prim, "color", (1.0, 1.0, 1.0)), (bad, bad, bad))
         base = self._linear(prim, "color", base)
@@ -213,23 +219,24 @@ class LightReader:
         rgb = gel.over((r, g, b))
         working = "rec709" if self.textures is None else self.textures.working
         r, g, b = (float(value) for value in from_rec709(np.array(rgb), working))
-        if min(authored) >= 0:  # what the working space cannot hold is at its edge
+        # Colours outside the gamut of the working space are clipped.
+        if min(authored) >= 0:
             r, g, b = max(r, 0.0), max(g, 0.0), max(b, 0.0)
         return (r, g, b)
 
     def _linear(self, prim: Usd.Prim, name: str, value: Colour) -> Colour:
-        """A colour of an input in linear Rec.709."""
+        """Converts the colour of an input to linear Rec.709."""
         return read_colour(value, prim.GetAttribute(f"inputs:{name}"), self.report, prim.GetPath())
 
     def _sphere(
         self, prim: Usd.Prim, options: dict[str, Any], normalize: bool, scale: float
     ) -> None:
-        """A point light gets the radiant intensity that the sphere would have."""
+        """Converts a sphere to a point light with the same radiant intensity if needed."""
         radius = options["radius"]
         point = prim.GetAttribute("treatAsPoint")
         if radius > 0 and not (point and point.Get(self.time)):
             return
-        # Radiance L over the disk pi r^2 that is seen; normalized, L / (4 pi r^2).
+        # The sphere's intensity is L times its disk pi r^2; normalised radiance is L / (4 pi r^2).
         area = 0.25 if normalize or radius == 0 else math.pi * (scale * radius) ** 2
         options["radius"] = 0.0
         options["color"] = tuple(area * value for value in options["color"])
@@ -237,7 +244,7 @@ class LightReader:
             self.report.note("sphere light of radius 0: taken as normalized", prim.GetPath())
 
     def _cylinder(self, prim: Usd.Prim, options: dict[str, Any], normalize: bool) -> bool:
-        """Whether it is normalized. A thin one stands for a line."""
+        """Replaces a radius of 0 by a thin cylinder; returns whether the light is normalised."""
         length: float = options["length"]
         if options["radius"] == 0 and length > 0:
             self.report.note(
@@ -247,7 +254,7 @@ class LightReader:
         return normalize
 
     def _shaping(self, prim: Usd.Prim, kind: str, options: dict[str, Any]) -> None:
-        """UsdLuxShapingAPI: where it is not applied its attributes are not there."""
+        """Reads UsdLuxShapingAPI; its attributes do not exist unless it is applied."""
 
         def read(name: str, default: float) -> float:
             return number(self._get(prim, f"shaping:{name}", default), default)
@@ -301,7 +308,7 @@ class LightReader:
 
 
 class LinkTable:
-    """Adds the sets of geometry that lights are linked to, equal ones once."""
+    """The sets of linked geometry of a scene; equal sets are merged."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder = context.builder
@@ -309,12 +316,12 @@ class LinkTable:
         self._known: dict[tuple[tuple[str, str], ...], int] = {}
 
     def set_of(self, prim: Usd.Prim, name: str) -> int | None:
-        """The set of a light's collection, lightLink or shadowLink; None: it names everything."""
+        """Returns the geometry set of a light's lightLink or shadowLink; None for all geometry."""
         rules = self._collections.rules(prim, name)
         return None if rules is None else self._set(rules)
 
     def nothing(self) -> int:
-        """The set that nothing is in."""
+        """Returns the empty geometry set."""
         return self._set({})
 
     def _set(self, rules: Rules) -> int:

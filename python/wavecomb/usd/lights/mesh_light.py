@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that are lights: UsdLuxMeshLightAPI, and UsdLuxLightAPI on a mesh or an implicit shape."""
+"""Reads mesh lights: UsdLuxMeshLightAPI, or UsdLuxLightAPI on a mesh or implicit shape."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ SYNC_MODES = ("materialGlowTintsLight", "independent", NO_RESPONSE)
 
 @dataclass(frozen=True)
 class MeshLight:
-    """A light of the scene for the triangles of one gprim.
+    """A light that is made of the triangles of one gprim.
 
     Attributes:
-        number: As ``add_mesh`` takes it.
-        material: To wear in place of what is bound; None: that.
-        is_sampled_only: Paths that meet it by a bounce get nothing of its light.
+        number: Light id for ``add_mesh``.
+        material: Material id that replaces the binding; None keeps the bound material.
+        is_sampled_only: Whether only light sampling finds it, so that BSDF sampling contributes
+            none.
     """
 
     number: int
@@ -36,10 +37,10 @@ class MeshLight:
 
 
 class MeshLights:
-    """Adds the mesh lights of one stage.
+    """The mesh lights of one stage, which it adds to the scene.
 
     Attributes:
-        any: Whether there is one.
+        any: Whether there is a mesh light.
     """
 
     def __init__(self, context: LoadContext, lights: LightReader, materials: MaterialTable) -> None:
@@ -49,15 +50,15 @@ class MeshLights:
         self._materials = materials
 
     def of(self, draw: Draw, kind: str) -> MeshLight | None:
-        """The light that a gprim is; None: it is none.
+        """Returns the mesh light of a gprim; None if it is not a light.
 
-        ``draw``: With its matrix to its group; ``kind``: as ``Draw.kind``.
+        ``draw`` holds the gprim and its transform to its group; ``kind`` is ``Draw.kind``.
         """
         if not draw.prim.HasAPI(UsdLux.LightAPI):
             return None
         path = draw.prim.GetPath()
         if kind not in ("mesh", "patch", "shape"):
-            self._report.missing(f"{kind} as lights (they shine by their material alone)", path)
+            self._report.missing(f"{kind} as lights (only their materials emit)", path)
             return None
         sync = word(draw.prim.GetAttribute("light:materialSyncMode").Get(), NO_RESPONSE)
         if sync not in SYNC_MODES:
@@ -75,12 +76,12 @@ class MeshLights:
         return MeshLight(number, material, sync == "independent" or bool(kept))
 
     def say_moving(self, path: Sdf.Path) -> None:
-        """Says what is not done for a light that moves and is found by light sampling alone."""
-        what = "shadows of their own and the sync mode independent of moving mesh lights"
+        """Reports features that do not work for a moving light that only light sampling finds."""
+        what = "shadow settings and the sync mode independent of moving mesh lights"
         self._report.missing(what, path)
 
     def _lamp(self, hidden: bool) -> int:
-        """The material of a mesh that has no response: radiance 1, tinted in the core."""
+        """Returns the material of meshes without response: radiance 1, tinted in the core."""
         parameters = {"emission": (1.0, 1.0, 1.0)}
         if not hidden:
             return self._materials.add(Surface("mesh light", "emissive", parameters))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials: networks of shaders to programs, parameters, textures and value graphs."""
+"""Materials: converts shader networks to programs, parameters, textures and value graphs."""

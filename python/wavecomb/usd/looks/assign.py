@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials of a mesh, bound, of its subsets or of its display colour, and what they read of it."""
+"""Assigns materials to gprims: bound materials, GeomSubset bindings or the display colour."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ FaceIds = NDArray[np.uint32]
 
 @dataclass(slots=True)
 class Parent:
-    """A prim that others are children of.
+    """A prim with its children's common properties.
 
     Attributes:
-        prim: It.
-        asset: How much of its path names its asset, once somebody asked (``identity.Assets``).
+        prim: The parent prim.
+        asset: Number of path elements that name its asset, once ``identity.Assets`` computed it.
     """
 
     prim: Usd.Prim
@@ -47,15 +47,15 @@ class Draw:
 
     Attributes:
         prim: Mesh, implicit shape, curves, points or splats.
-        matrix: From it to its group.
+        matrix: Transform from the gprim to its group.
         inherited: Constant primvars of its ancestors.
         subsets: GeomSubset prims that bind materials.
-        material: Bound to it.
-        subset_materials: Bound to each subset.
-        track: In place of ``matrix`` where that changes while the shutter is open.
-        names: Properties that it has opinions of (``authored_names``).
-        kind: What it is to the walk: mesh, patch, shape, curves, points or splats.
-        parent: The prim that it is a child of, where the walk came from there.
+        material: Material bound to the gprim.
+        subset_materials: Material bound to each subset.
+        track: Animated transform; replaces ``matrix`` if it changes while the shutter is open.
+        names: Names of properties with authored opinions (``authored_names``).
+        kind: Kind of geometry: mesh, patch, shape, curves, points or splats.
+        parent: The parent prim, if the traversal visited it.
     """
 
     prim: Usd.Prim
@@ -72,12 +72,12 @@ class Draw:
 
 @dataclass
 class Worn:
-    """What a gprim wears.
+    """The materials that are bound to a gprim.
 
     Attributes:
-        material: Of all that has none of its own.
-        by_face: One for each face of the prim where they differ.
-        reads: Primvars that its materials read, by name.
+        material: Material id of all faces that ``by_face`` does not cover.
+        by_face: (face count,) material ids, if they differ between faces.
+        reads: Primvars that the materials read, by name.
     """
 
     material: int
@@ -86,7 +86,7 @@ class Worn:
 
 
 class Assigner:
-    """Gives meshes their materials."""
+    """Assignment of materials to gprims, with the primvars that the materials read."""
 
     def __init__(self, context: LoadContext, table: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
@@ -95,7 +95,7 @@ class Assigner:
         self._bound_graphs: dict[tuple[Any, ...], tuple[Surface, Surface]] = {}
 
     def uv_names(self, draw: Draw) -> tuple[str, ...]:
-        """Texture coordinates that the bound materials read, first use first."""
+        """Returns names of the UV sets that the bound materials read, in order of first use."""
         if not draw.subsets:
             own = () if draw.material is None else self._surface(draw, draw.material).uv_names
             if len(own) <= 1:
@@ -107,12 +107,13 @@ class Assigner:
         return tuple(dict.fromkeys(names))
 
     def assign(self, draw: Draw, mesh: MeshArrays | CurveArrays, otherwise: int | None) -> Worn:
-        """The materials of a mesh.
+        """Returns the materials of a gprim.
 
         Args:
             draw: The gprim with its bindings.
-            mesh: Its arrays.
-            otherwise: Id to use where nothing is bound and there is no display colour; None: grey.
+            mesh: Its geometry arrays.
+            otherwise: Material id if there is neither a binding nor a display colour; None means
+                grey.
         """
         surface = None if draw.material is None else self._surface(draw, draw.material)
         self._tell_of_hair(draw, mesh)
@@ -120,7 +121,8 @@ class Assigner:
             return Worn(self.table.add(surface))
         primvars = _Primvars(draw, mesh, self.time, self.report)
         sets = self.uv_names(draw)
-        if len(sets) > 1:  # the mesh has the first that is there
+        # The mesh's texture coordinates are the first set that exists.
+        if len(sets) > 1:
             primvars.own_uv = next((n for n in sets if primvars.find(n, 2) is not None), "")
         if surface is None or surface.stand_in:
             worn = Worn(self._display(primvars, otherwise))
@@ -132,7 +134,7 @@ class Assigner:
         return worn
 
     def _surface(self, draw: Draw, material: UsdShade.Material) -> Surface:
-        """The surface of a material on a gprim."""
+        """Returns the surface of a material on a gprim."""
         surface = self.table.surface(material)
         if not surface.object_reads:
             return surface
@@ -147,7 +149,7 @@ class Assigner:
         self, draw: Draw, material: UsdShade.Material, surface: Surface
     ) -> Surface:
         values: dict[str, Any] = {}
-        # A primvar may name another one: twice is enough for that.
+        # A primvar may name another primvar; two rounds resolve one such level.
         for _ in range(2):
             new = [name for name in surface.object_reads if name not in values]
             if not new:
@@ -158,7 +160,10 @@ class Assigner:
         return surface
 
     def _one_value(self, draw: Draw, name: str) -> Any:
-        """The value of a primvar on a gprim; its mean, and listed, where it varies."""
+        """Returns the value of a primvar on a gprim.
+
+        Reports a varying primvar and uses its mean.
+        """
         path = draw.prim.GetPath()
         if (text := _text_of(draw, name, self.time)) is not None:
             return text
@@ -177,14 +182,14 @@ class Assigner:
         return _plain(values[0])
 
     def _tell_of_hair(self, draw: Draw, mesh: MeshArrays | CurveArrays) -> None:
-        """Says where hair is worn by what is no tube."""
+        """Reports hair materials on geometry other than tubes."""
         worn = (draw.material, *draw.subset_materials)
         if not any(m is not None and self.table.surface(m).program == "hair" for m in worn):
             return
         if isinstance(mesh, MeshArrays):
             what = "hair on a mesh (as tubes along its texture's u)"
         elif mesh.kind.endswith("ribbon"):
-            what = "hair on ribbons (each point as of a round fibre)"
+            what = "hair on ribbons (shaded as round fibres)"
         else:
             return
         self.report.missing(what, draw.prim.GetPath())
@@ -200,7 +205,7 @@ class Assigner:
             index = as_integers(subset.GetAttribute("indices").Get(self.time), np.int64)
             inside = (index >= 0) & (index < topology.face_count)
             if not inside.all():
-                self.report.warn("subset names faces that are not there", subset.GetPath())
+                self.report.warn("subset refers to faces that do not exist", subset.GetPath())
                 index = index[inside]
             surface = self._surface(draw, material)
             shown = self._display(primvars, None) if surface.stand_in else None
@@ -209,7 +214,7 @@ class Assigner:
         return per_face if bound else None
 
     def _bound(self, primvars: _Primvars, surface: Surface) -> int:
-        """The id of a surface, with this gprim's values where it reads constant primvars."""
+        """Returns the material id of a surface with this gprim's constant primvars put in."""
         if surface.graph is not None and surface.graph.depends_on_mesh:
             surface = self._with_graph(primvars, surface)
         if primvars.own_uv:
@@ -235,7 +240,7 @@ class Assigner:
         return self.table.add(self.table.varied(surface, tuple(varying)), brightest)
 
     def _with_graph(self, primvars: _Primvars, surface: Surface) -> Surface:
-        """A surface whose graph reads the mesh's own space or its primvars, as it is there."""
+        """Returns the surface with its graph specialised to the gprim's transform and primvars."""
         graph = surface.graph
         values: dict[str, tuple[float, ...]] = {}
         varying: dict[str, int] = {}
@@ -255,12 +260,12 @@ class Assigner:
                 made = bound(surface, matrix, values, varying)
             except GraphTooLarge:
                 made = surface
-            # Holding the surface keeps its address from being used again.
+            # The key contains id(surface); storing the surface keeps that id from being reused.
             self._bound_graphs[key] = (surface, made)
         return self._bound_graphs[key][1]
 
     def _at_other_sets(self, primvars: _Primvars, surface: Surface) -> Surface:
-        """A surface whose textures are at coordinates that the mesh has as primvars."""
+        """Returns the surface with textures that read further UV sets of the mesh as primvars."""
         first = surface.uv_names[0] if surface.uv_names else ""
         named = {p: surface.texture_uvs.get(p, first) for p in surface.textures}
         others = {name for name in (first, *named.values()) if name and name != primvars.own_uv}
@@ -280,7 +285,7 @@ class Assigner:
         return self._bound_graphs[key][1]
 
     def _display(self, primvars: _Primvars, otherwise: int | None) -> int:
-        """The id for displayColor and displayOpacity."""
+        """Returns the material id for displayColor and displayOpacity."""
         colours = primvars.find("displayColor", 3)
         opacities = primvars.find("displayOpacity", 1)
         if colours is None and opacities is None:
@@ -300,20 +305,21 @@ class Assigner:
 
 
 def is_alike(surface: Surface) -> bool:
-    """Whether a surface is the same on all gprims."""
+    """Returns whether a surface is the same on all gprims."""
     graph = surface.graph
     reads = surface.primvars or (graph and graph.depends_on_mesh) or surface.emission_attributes()
     return not (reads or surface.texture_uvs or surface.object_reads or surface.stand_in)
 
 
 class _Primvars:
-    """Finds primvars of a gprim, each once, and tells what is wrong with them."""
+    """The primvars of a gprim; each is read once, and invalid ones are reported."""
 
     def __init__(
         self, draw: Draw, mesh: MeshArrays | CurveArrays, time: Usd.TimeCode, report: LoadReport
     ) -> None:
         self.read: dict[str, Wanted] = {}
-        self.own_uv = ""  # the mesh's texture coordinates, where materials read other ones, too
+        # The primvar that the mesh has as its texture coordinates, if materials read several sets.
+        self.own_uv = ""
         self._draw = draw
         self._mesh = mesh
         self._time = time
@@ -322,18 +328,18 @@ class _Primvars:
 
     @property
     def path(self) -> Sdf.Path:
-        """The path of the gprim."""
+        """Path of the gprim."""
         return self._draw.prim.GetPath()
 
     @property
     def matrix(self) -> NDArray[np.float64]:
-        """(4, 4) From the gprim to its group."""
+        """(4, 4) transform from the gprim to its group."""
         return np.array(self._draw.matrix, np.float64)
 
     def find(self, name: str, width: int) -> Wanted | None:
-        """A primvar of at least so many components; None where there is none that fits.
+        """Returns a primvar with at least ``width`` components; None if there is no valid one.
 
-        ``width``: 0: as many as it has, at most ``MAX_WIDTH``.
+        A ``width`` of 0 accepts any number of components, at most ``MAX_WIDTH``.
         """
         key = name, width
         if key not in self._found:
@@ -345,11 +351,11 @@ class _Primvars:
         return self._found[key]
 
     def highest(self, names: Iterable[str]) -> float:
-        """The largest component of some that are read at hits; 0 of none."""
+        """Returns the largest component of those named primvars that are read at hits, else 0."""
         return max((self.read[name].highest for name in names if name in self.read), default=0.0)
 
     def keep(self, wanted: Wanted) -> None:
-        """Notes that a material reads it at hits."""
+        """Records that a material reads the primvar at hits."""
         name = wanted.primvar.name
         known = self.read.get(name)
         if known is None or known.width < wanted.width:
@@ -360,7 +366,8 @@ class _Primvars:
         if primvar is None or len(primvar.values) == 0:
             return None
         primvar = in_linear(primvar, self._report, self.path)
-        if self._mesh.topology is None:  # an implicit shape
+        # Implicit shapes have no topology and take one value.
+        if self._mesh.topology is None:
             primvar = replace(primvar, values=primvar.values[:1], interpolation="constant")
         check_fit(primvar, self._mesh, width)
         values = np.asarray(primvar.values[:, :MAX_WIDTH], np.float32)
@@ -372,7 +379,7 @@ class _Primvars:
 
 
 def _text_of(draw: Draw, name: str, time: Usd.TimeCode) -> str | None:
-    """The text of a constant primvar; None where it is none."""
+    """Returns the value of a constant string or token primvar; None for other primvars."""
     attribute = draw.prim.GetAttribute(f"primvars:{name}")
     if not attribute.HasAuthoredValue():
         inherited = [p.GetAttr() for p in draw.inherited if p.GetPrimvarName() == name]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversions between colour spaces by OpenColorIO's built-in config."""
+"""Conversions between colour spaces with OpenColorIO's built-in config."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 Colour = tuple[float, float, float]
 
 OCIO_NAMES = {"rec709": "Linear Rec.709 (sRGB)", "acescg": "ACEScg"}
-"""Names of the working spaces in OpenColorIO."""
+"""OpenColorIO's names of the working spaces."""
 
 LINEAR = OCIO_NAMES["rec709"]
 SRGB = "sRGB Encoded Rec.709 (sRGB)"
 RAW = "Raw"
 
-# Names that need no OpenColorIO: it takes 30 MB as soon as it is loaded.
+# Names that are resolved without loading OpenColorIO, which takes 30 MB.
 _COMMON = {
     "raw": RAW,
     "data": RAW,
@@ -35,12 +35,12 @@ _COMMON = {
     "lin_rec709_scene": LINEAR,
 }
 _ROWS = 256
-"""Rows of pixels that are converted at once, so that little memory is taken."""
+"""Rows of pixels that are converted together, which bounds the memory used."""
 
 
 @functools.cache
 def canonical(name: str) -> str | None:
-    """OpenColorIO's name of a colour space, or None where it knows none of that name."""
+    """Returns OpenColorIO's name of a colour space, or None if the config does not know it."""
     known = _COMMON.get(name.lower())
     if known is not None:
         return known
@@ -57,7 +57,7 @@ def _config() -> Any:
 
 
 def colours_in_linear(colours: NDArray[Any], name: str) -> NDArray[np.float32]:
-    """Converts colours (k, 3 or more) of a space to linear Rec.709; further components stay.
+    """Converts colours (k, 3 or more) to linear Rec.709; further components are unchanged.
 
     Raises:
         ValueError: OpenColorIO does not know the space.
@@ -72,9 +72,9 @@ def colours_in_linear(colours: NDArray[Any], name: str) -> NDArray[np.float32]:
 
 
 def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float32]:
-    """Converts colours (h, w, 3 or 4) from a space of OpenColorIO to the working space.
+    """Converts colours (h, w, 3 or 4) from an OpenColorIO space to the working space.
 
-    uint8 counts as 0 to 1, alpha stays, and values that are not finite become 0.
+    Maps uint8 to the range 0 to 1, keeps alpha, and replaces values that are not finite by 0.
     """
     import OpenImageIO as oiio
 
@@ -84,7 +84,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
         if pixels.dtype == np.uint8:
             rows /= np.float32(255)
         buffer = oiio.ImageBuf(np.ascontiguousarray(rows[..., :3]))
-        # On this thread alone: OpenImageIO's thread pool can deadlock here.
+        # OpenImageIO's thread pool can deadlock here, so the conversion runs on this thread.
         made = oiio.ImageBufAlgo.colorconvert(
             buffer, source, OCIO_NAMES[working], unpremult=False,
             colorconfig="ocio://default", nthreads=1,
@@ -98,7 +98,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
 
 @functools.cache
 def convert_colour(colour: Colour, source: str, working: str) -> Colour:
-    """Converts one colour, as ``convert`` does."""
+    """Converts one colour with the rules of ``convert``."""
     if source in (RAW, OCIO_NAMES[working]):
         return colour
     r, g, b = convert(np.array(colour, np.float32).reshape(1, 1, 3), source, working)[0, 0]
@@ -109,7 +109,7 @@ def convert_colour(colour: Colour, source: str, working: str) -> Colour:
 
 
 def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
-    """The sRGB transfer curve of IEC 61966-2-1, encoded to linear."""
+    """Decodes the sRGB transfer curve of IEC 61966-2-1 to linear."""
     v = np.asarray(values, np.float32)
     low = v / np.float32(12.92)
     high = ((np.maximum(v, 0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
@@ -117,13 +117,14 @@ def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
-    """An image (h, w, c) at half its size, rounded down, as the core makes mip levels.
+    """Returns an image (h, w, c) at half its size, rounded down, with the core's mip filter.
 
-    Box filter in linear light; ``srgb``: colours of uint8 are encoded. The type stays.
+    Applies a box filter in linear light and keeps the type. ``srgb`` says that uint8 colours are
+    sRGB encoded.
     """
     height, width, channels = pixels.shape
     out = np.empty((max(height // 2, 1), max(width // 2, 1), channels), pixels.dtype)
-    # Bands of an even height stand for themselves; else all at once.
+    # Bands of even height can be filtered independently; an odd height needs the whole image.
     band = 256 if height % 2 == 0 else height
     colours = (channels - 1) if channels % 2 == 0 else channels
     for first in range(0, height, band):
@@ -144,7 +145,7 @@ def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
 
 
 def _halve_axis(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    """Means of boxes along an axis; of an odd number of n values boxes are n / (n // 2) wide."""
+    """Averages boxes along an axis; for an odd size n, boxes are n / (n // 2) values wide."""
     size = values.shape[axis]
     if size == 1:
         return values
@@ -169,6 +170,6 @@ _LINEAR = np.where(
 
 
 def _encode(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The sRGB transfer curve of values of at least 0."""
+    """Encodes linear values of at least 0 with the sRGB transfer curve."""
     high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, 12.92 * linear, high).astype(np.float32)

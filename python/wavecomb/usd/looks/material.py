@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials: which one a prim has, and its id in the scene."""
+"""Resolves material bindings and adds materials to the scene."""
 
 from __future__ import annotations
 
@@ -35,30 +35,30 @@ if TYPE_CHECKING:
     from wavecomb.usd.graphs.values import Graph
 
 INHERIT_MATERIAL = 0xFFFFFFFF
-"""Same as ``_core.INHERIT_MATERIAL``: what the instance says."""
+"""Material id that means the instance's material; equals ``_core.INHERIT_MATERIAL``."""
 
 DEFAULT_COLOUR = (0.5, 0.5, 0.5)
-"""The colour of what has neither a material nor a display colour."""
+"""Colour of geometry with neither a material nor a display colour."""
 
 
 PREVIEW = "preview"
-"""``surface_source`` of UsdPreviewSurface."""
+"""Result of ``surface_source`` for UsdPreviewSurface."""
 
 LAMP = 1.0
-"""Emission from which a material is taken for a lamp, so that a stage without lights gets none."""
+"""Emission from which a material counts as a light; then a stage without lights gets no dome."""
 
 _INSTEAD = "displayColor in its place"
 
 SPLATS = Surface("splats", "emissive", {"emission": (1.0, 1.0, 1.0)})
-"""What Gaussian splats wear: it multiplies the light that they have."""
+"""Material of Gaussian splats, which multiplies their own radiance."""
 
 
 def bound_materials(
     prims: Sequence[Usd.Prim], purposes: Sequence[str] = BINDING_PURPOSES
 ) -> list[UsdShade.Material | None]:
-    """The material of each prim, in bulk.
+    """Returns the material bound to each prim, computed in bulk.
 
-    For each of ``purposes`` in turn a binding of that purpose, else one of all purposes.
+    Tries each of ``purposes`` in turn; a binding of that purpose precedes an all-purpose binding.
     """
     if not prims:
         return []
@@ -74,12 +74,12 @@ def bound_materials(
 
 
 def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
-    """What reads the surface of a material, and its shader.
+    """Returns the kind of a material's surface and its shader.
 
-    ``PREVIEW``, or a shading model of MaterialX; "" where nothing does.
+    The kind is ``PREVIEW`` or a MaterialX shading model; "" if Wavecomb supports no surface output.
     """
     shader = material.ComputeSurfaceSource()[0]
-    # Where a material comes in both forms, the preview is the one for who knows no MaterialX.
+    # If a material offers both, the MaterialX surface precedes the preview surface.
     others = (one for _, one in surface_outputs(material))
     for candidate in chain((material.ComputeSurfaceSource("mtlx")[0], shader), others):
         name = shader_id(candidate)
@@ -93,13 +93,16 @@ def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
 
 
 class BindingScan:
-    """Finds bindings on a prim or above that act on what is inside an instance."""
+    """Search for bindings on a prim or its ancestors that affect prims inside an instance."""
 
     def __init__(self) -> None:
         self._cache: dict[Sdf.Path, tuple[bool, bool]] = {}
 
     def above(self, prim: Usd.Prim) -> tuple[bool, bool]:
-        """(a direct binding stronger than descendants, a collection binding) here or above."""
+        """Returns (has a stronger-than-descendants binding, has a collection binding).
+
+        Both include the prim and its ancestors.
+        """
         above: list[Usd.Prim] = []
         while prim and not prim.IsPseudoRoot() and prim.GetPath() not in self._cache:
             above.append(prim)
@@ -118,10 +121,10 @@ class BindingScan:
 
 
 class MaterialTable:
-    """Adds materials to the scene, equal ones once."""
+    """The materials of a scene; equal materials are merged."""
 
     def __init__(self, context: LoadContext, textures: TextureTable, apart: bool = False) -> None:
-        """``apart``: those of different prims stay apart even where they are equal."""
+        """``apart`` keeps materials of different prims separate even if they are equal."""
         self._apart = apart
         self._names: list[str] = []
         self._builder, self._report = context.builder, context.report
@@ -136,24 +139,24 @@ class MaterialTable:
         self._varied: dict[tuple[int, tuple[str, ...]], tuple[Surface, Surface]] = {}
         self._plain: dict[tuple[Any, ...], int] = {}
         self.glows = False
-        """Whether a material is in use that emits as a lamp does, ``LAMP`` or brighter."""
+        """Whether a material in use emits ``LAMP`` or more and therefore counts as a light."""
         self._emitting: set[int] = set()
         self._emission: dict[int, tuple[Surface, float]] = {}
         self.cloudy: list[str] = []
-        """Names of materials in use that refract and scatter inside."""
+        """Names of materials in use that refract light into a scattering medium."""
 
     @property
     def working(self) -> str:
-        """The space of colours."""
+        """The working colour space."""
         return self._textures.working
 
     def expect(self, material: UsdShade.Material) -> None:
-        """Starts what takes long for a material that will be used: reading its images."""
+        """Starts reading the images of a material that will be used."""
         if material.GetPath() not in self._surfaces:
             self._textures.expect(material.GetPrim(), self.time)
 
     def surface(self, material: UsdShade.Material) -> Surface:
-        """The surface of a bound material."""
+        """Returns the surface of a bound material."""
         known = self._by_object.get(id(material))
         if known is not None:
             return known[1]
@@ -172,20 +175,21 @@ class MaterialTable:
             if is_cloudy(surface):
                 self.cloudy.append(surface.name)
             self._report.tally("materials")
-        # Holding the object keeps its address from being used again.
+        # The key is an id; storing the object keeps that id from being reused.
         self._by_object[id(material)] = material, surface
         return surface
 
     def surface_of_object(
         self, material: UsdShade.Material, primvars: Mapping[str, Any]
     ) -> Surface:
-        """The surface of a material on an object, by values of its ``object_reads``."""
+        """Returns the surface of a material on an object with given values of ``object_reads``."""
         key = (material.GetPath(), tuple(sorted(primvars.items())))
         surface = self._of_objects.get(key)
         if surface is None:
             surface = self.surface(material)
             shader = surface_source(material)[1]
-            again = LoadReport()  # the first reading told most of it
+            # The first reading of the material has reported most problems already.
+            again = LoadReport()
             prim = material.GetPrim()
             reader = PreviewReader(prim, self.time, self._textures, again, primvars)
             surface = replace(reader.read(shader), name=surface.name)
@@ -194,9 +198,9 @@ class MaterialTable:
         return surface
 
     def add(self, surface: Surface, brightest: float = 0.0) -> int:
-        """Material id of a surface.
+        """Returns the material id of a surface.
 
-        ``brightest``: highest emission that primvars give it.
+        ``brightest`` is the highest emission that primvars give it.
         """
         number = self._add(surface)
         if brightest > 0:
@@ -206,7 +210,7 @@ class MaterialTable:
         return number
 
     def varied(self, surface: Surface, varying: tuple[str, ...]) -> Surface:
-        """A surface some of whose parameters read their primvars at hits."""
+        """Returns a surface whose ``varying`` parameters read their primvars at hits."""
         if not varying:
             return surface
         known = self._varied.get((id(surface), varying))
@@ -218,7 +222,7 @@ class MaterialTable:
             what = f"shading network too large for primvars ({error}): left out"
             self._report.missing(what, surface.name)
             varied = surface
-        # Holding the surface keeps its address from being used again.
+        # The key contains id(surface); storing the surface keeps that id from being reused.
         self._varied[id(surface), varying] = surface, varied
         return varied
 
@@ -244,12 +248,12 @@ class MaterialTable:
             if brightest > 0:
                 self._emitting.add(number)
                 self._emission[number] = (surface, 0.0)
-        # Holding the surface keeps its address from being used again.
+        # The key is an id; storing the surface keeps that id from being reused.
         self._surface_ids[id(surface)] = (surface, number)
         return number
 
     def _graphs_of(self, surface: Surface) -> dict[str, Any]:
-        """Ids of a surface's graphs, equal ones once."""
+        """Returns ids of a surface's graphs; equal graphs share an id."""
         if surface.graph is None:
             return {}
         graphs = {
@@ -265,7 +269,7 @@ class MaterialTable:
         return {name: self._graph_ids[g] for name, g in graphs.items() if g is not None}
 
     def _in_working_space(self, parameters: dict[str, Any]) -> dict[str, Any]:
-        """Parameters whose colours are those of the working space."""
+        """Returns the parameters with colours converted to the working space."""
         working = self.working
         if working == "rec709":
             return parameters
@@ -284,19 +288,19 @@ class MaterialTable:
         return parameters
 
     def paths(self) -> tuple[str, ...]:
-        """Prim of each material by id, "" of display colours."""
+        """Returns the prim path of each material by id; "" for display colours."""
         return tuple(name if name.startswith("/") else "" for name in self._names)
 
     def any_emits(self, material: int, faces: NDArray[np.uint32] | None) -> bool:
-        """Whether a mesh with this material, or with these of its faces, emits anything."""
+        """Returns whether a mesh with this material, or these per-face materials, emits light."""
         if faces is None or not self._emitting:
             return material in self._emitting
         return bool(np.isin(faces, list(self._emitting)).any())
 
     def mean_emission(self, material: int) -> float:
-        """Mean luminance of what a material emits over its surface; 0 where it is no lamp.
+        """Returns the mean luminance that a material emits; 0 if it does not count as a light.
 
-        Textures count by the mean of their files; primvars by their highest value.
+        Textures contribute the mean of their files, primvars their highest value.
         """
         surface, highest = self._emission.get(material, (None, 0.0))
         if surface is None or max(highest, surface.brightest()) < LAMP:
@@ -310,9 +314,9 @@ class MaterialTable:
         opacity: float = 1.0,
         varying: tuple[str, ...] = (),
     ) -> int:
-        """Material id of a display colour.
+        """Returns the material id of a display colour.
 
-        ``varying``: which of base_color and opacity primvars give at hits.
+        ``varying`` lists which of base_color and opacity read primvars at hits.
         """
         r, g, b = (max(float(value), 0.0) for value in colour)
         key = (r, g, b, float(opacity), *varying)
@@ -323,7 +327,7 @@ class MaterialTable:
         return number
 
     def splats(self) -> int:
-        """Material id of Gaussian splats, which have light of their own."""
+        """Returns the material id of Gaussian splats, which carry their own radiance."""
         return self.add(SPLATS)
 
     def _convert(self, material: UsdShade.Material) -> Surface:
@@ -343,20 +347,21 @@ class MaterialTable:
         elif not material.GetSurfaceOutputs():
             self._report.warn(f"material without a surface: {_INSTEAD}", prim.GetPath())
         else:
-            self._report.warn(f"material whose surface leads nowhere: {_INSTEAD}", prim.GetPath())
+            what = f"material whose surface output is not connected: {_INSTEAD}"
+            self._report.warn(what, prim.GetPath())
         return _stand_in(prim)
 
 
 def _stand_in(material: Usd.Prim) -> Surface:
-    """What stands for a material that cannot be drawn."""
+    """Returns the surface that replaces a material that cannot be rendered."""
     return replace(fallback_surface(DEFAULT_COLOUR, name=str(material.GetPath())), stand_in=True)
 
 
 def with_attributes(surface: Surface, varying: Sequence[str], working: str) -> Surface:
-    """A surface some of whose parameters read their primvars at hits.
+    """Returns a surface whose ``varying`` parameters read their primvars at hits.
 
     Raises:
-        GraphTooLarge: Together with what drives the surface already it is too much.
+        GraphTooLarge: The extended graph exceeds the size limit.
     """
     make = Expressions()
     graph = surface.graph
@@ -376,7 +381,7 @@ def with_attributes(surface: Surface, varying: Sequence[str], working: str) -> S
 
 
 def mean_emission(surface: Surface, textures: TextureTable) -> NDArray[np.float64]:
-    """(3,) What a surface emits, as a mean over texture coordinates; estimated for graphs."""
+    """Returns the mean emission (3,) over texture coordinates; an estimate for graphs."""
     graph = surface.graph
     if graph is not None and graph.emission is not None:
         value = dict(graph.outputs)["emission"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shader networks: sources of shader inputs, and the values, colours and files of attributes."""
+"""Shader networks: finds the source of an input and reads values, colours and file paths."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wavecomb.usd.stage.report import LoadReport
 Colour = tuple[float, float, float]
 
 MAX_DEPTH = 32
-"""Shaders in a row before a network is taken for a cycle."""
+"""Longest chain of shaders; longer ones are treated as cycles."""
 
 UDIM = "<UDIM>"
 _SMALL_UDIM = "<udim>"
@@ -25,13 +25,13 @@ _NO_ID = "a shader without info:id"
 
 @dataclass(frozen=True)
 class Source:
-    """Where the value of an input comes from: a shader's output, or an attribute with a value.
+    """The source of an input's value: a shader's output, or an attribute with a value.
 
     Attributes:
-        shader: The shader, where the input is connected to one.
-        output: Name of the shader's output.
-        value: The value, where there is one.
-        attribute: The attribute that holds the value.
+            shader: The shader that the input is connected to, if any.
+            output: Name of that shader's output.
+            value: The value, if there is one.
+            attribute: The attribute that holds the value.
     """
 
     shader: UsdShade.Shader | None = None
@@ -41,15 +41,14 @@ class Source:
 
     @property
     def is_value(self) -> bool:
-        """Whether this is a plain value."""
+        """Whether the source is a plain value."""
         return self.value is not None
 
 
 def source_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Source | None:
-    """What feeds an input; None where it is not authored, dangles or runs in a circle.
+    """Returns the source of an input; None if it is unauthored, dangling or cyclic.
 
-    An input that is connected to an input of another shader has the source of that input, though
-    UsdShade resolves such connections for containers only.
+    Follows connections to inputs of other shaders, which UsdShade resolves for containers only.
     """
     shader_input = shader.GetInput(name)
     return _source_of(shader_input, time, MAX_DEPTH) if shader_input else None
@@ -76,15 +75,15 @@ def _source_of(shader_input: UsdShade.Input, time: Usd.TimeCode, depth: int) -> 
 
 
 def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: Any = None) -> Any:
-    """The constant value of an input, or the default."""
+    """Returns the constant value of an input, or the default."""
     source = source_of(shader, name, time)
     return source.value if source is not None and source.is_value else default
 
 
 def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
-    """The layer of the strongest opinion that has a value: relative paths start there.
+    """Returns the layer of the strongest opinion with a value; relative paths are anchored there.
 
-    Stronger opinions may hold metadata or a connection alone.
+    Stronger opinions may hold only metadata or a connection.
     """
     for spec in attribute.GetPropertyStack() if attribute else []:
         has_default = spec.HasDefaultValue() and not isinstance(spec.default, Sdf.ValueBlock)
@@ -94,12 +93,12 @@ def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
 
 
 def shader_id(shader: UsdShade.Shader) -> str:
-    """info:id of a shader, or the empty string."""
+    """Returns the info:id of a shader, or the empty string."""
     return str(shader.GetIdAttr().Get() or "") if shader else ""
 
 
 def number(value: Any, default: float) -> float:
-    """A finite float of a value; of a vector its first component."""
+    """Converts a value to a finite float (the first component of a vector), else the default."""
     try:
         result = float(value[0]) if hasattr(value, "__getitem__") else float(value)
     except (TypeError, ValueError, IndexError, OverflowError):
@@ -108,19 +107,19 @@ def number(value: Any, default: float) -> float:
 
 
 def word(value: Any, default: str = "") -> str:
-    """A token or string; the default for a value of any other type."""
+    """Returns a token or string; the default for a value of any other type."""
     return value if isinstance(value, str) else default
 
 
 def pair(value: Any, default: tuple[float, float]) -> tuple[float, float]:
-    """The first two components of a value, finite; the default where it has fewer."""
+    """Returns the first two components of a value if both are finite, else the default."""
     if isinstance(value, str) or not hasattr(value, "__len__") or len(value) < 2:
         return default
     return number(value[0], default[0]), number(value[1], default[1])
 
 
 def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Three finite floats of a value; a number is taken for grey."""
+    """Converts a value to three finite floats; a single number becomes grey."""
     try:
         if hasattr(value, "__len__"):
             r, g, b = (float(value[i]) for i in range(3))
@@ -135,15 +134,15 @@ def colour(value: Any, default: tuple[float, float, float]) -> tuple[float, floa
 
 
 def space_of(attribute: Usd.Attribute | None) -> str:
-    """The colour space that a stage gives an attribute, directly or by an ancestor prim; or "".
+    """Returns the colour space authored for an attribute or inherited from an ancestor prim, or "".
 
-    The space that an ancestor names applies to values only, not to files.
+    The colour space of an ancestor applies to values only, not to files.
     """
     if not attribute:
         return ""
     if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset or attribute.HasColorSpace():
         return str(attribute.GetColorSpace())
-    # USD's own search stops at names that it does not know, such as srgb_texture.
+    # USD's own search ignores names that it does not know, such as srgb_texture.
     prim = attribute.GetPrim()
     while prim and not prim.IsPseudoRoot():
         if prim.HasAPI(Usd.ColorSpaceAPI):
@@ -155,10 +154,10 @@ def space_of(attribute: Usd.Attribute | None) -> str:
 
 
 def linear_colour(colour: Colour, attribute: Usd.Attribute | None) -> Colour:
-    """A colour of an attribute in linear Rec.709.
+    """Converts an attribute's colour to linear Rec.709.
 
     Raises:
-        ValueError: OpenColorIO does not know its space.
+        ValueError: OpenColorIO does not know the colour space.
     """
     name = space_of(attribute)
     if not name:
@@ -172,7 +171,7 @@ def linear_colour(colour: Colour, attribute: Usd.Attribute | None) -> Colour:
 def read_colour(
     colour: Colour, attribute: Usd.Attribute | None, report: LoadReport, place: object
 ) -> Colour:
-    """A colour of an attribute in linear Rec.709; reports an unknown space."""
+    """Converts an attribute's colour to linear Rec.709; reports an unknown colour space."""
     try:
         return linear_colour(colour, attribute)
     except ValueError as error:
@@ -181,7 +180,7 @@ def read_colour(
 
 
 def holds_colour(attribute: Usd.Attribute | None) -> bool:
-    """Whether the type of an attribute is a colour, which has a colour space."""
+    """Returns whether the attribute's type has the colour role and thus a colour space."""
     return attribute is not None and attribute.GetTypeName().role == "Color"
 
 
@@ -189,9 +188,9 @@ def holds_colour(attribute: Usd.Attribute | None) -> bool:
 
 
 def surface_outputs(material: UsdShade.Material) -> list[tuple[str, UsdShade.Shader]]:
-    """Names of the surface outputs that lead to a shader, and the shaders, in the stage's order.
+    """Returns names and shaders of connected surface outputs, in stage order.
 
-    Outputs for other renderers, such as outputs:ri:surface, are among them.
+    Includes outputs for other renderers, such as outputs:ri:surface.
     """
     return [
         (str(output.GetFullName()), shader)
@@ -202,7 +201,7 @@ def surface_outputs(material: UsdShade.Material) -> list[tuple[str, UsdShade.Sha
 
 
 def shader_name(shader: UsdShade.Shader) -> str:
-    """info:id of a shader, else the name of its source."""
+    """Returns the info:id of a shader, else the name of its source asset."""
     if name := shader_id(shader):
         return name
     authored = {one.GetName(): one for one in shader.GetPrim().GetAuthoredAttributes()}
@@ -220,12 +219,12 @@ def shader_name(shader: UsdShade.Shader) -> str:
 
 
 class InputValues:
-    """Reads inputs that have one value for each object, such as the scale of a texture.
+    """Reader of inputs that have one value per object, such as the scale of a texture.
 
-    The values may stand behind node graphs, interfaces, primvar readers and constant nodes.
+    Resolves values through node graphs, interfaces, primvar readers and constant nodes.
 
     Attributes:
-        reads: Primvars of the object that values come from, first use first.
+        reads: Names of the object's primvars that were read, in order of use.
     """
 
     def __init__(
@@ -237,7 +236,7 @@ class InputValues:
     ) -> None:
         """``node_value`` evaluates MaterialX nodes (``Networks.node``).
 
-        ``primvars`` holds the object's values; readers of other primvars have their fallback.
+        ``primvars`` holds the object's values; readers of other primvars return their fallback.
         """
         self.reads: dict[str, None] = {}
         self._time = time
@@ -249,9 +248,10 @@ class InputValues:
     def of(
         self, shader: UsdShade.Shader, name: str, default: Any = None, *, by_object: bool = True
     ) -> Any:
-        """The value of an input, or the default where nothing is authored.
+        """Returns the value of an input, or the default if nothing is authored.
 
-        Reports an input that varies, and, unless ``by_object``, one that a primvar gives.
+        Reports an input that varies over the surface, and one that reads a primvar unless
+        ``by_object``.
         """
         source = source_of(shader, name, self._time)
         if source is None:
@@ -273,7 +273,7 @@ class InputValues:
         return default
 
     def _read(self, reader: UsdShade.Shader, default: Any) -> Any:
-        """The value of a primvar reader, whose varname and fallback may be connected."""
+        """Returns the value of a primvar reader, whose varname and fallback may be connected."""
         self._depth += 1
         try:
             name = self.of(reader, "varname", "")
@@ -290,13 +290,14 @@ class InputValues:
 
 
 def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
-    """The file that an asset value names: resolved if it resolves, else as authored.
+    """Returns the resolved file of an asset value, or the authored path if it does not resolve.
 
-    For a UDIM texture this is the pattern with ``<UDIM>`` in it.
+    For a UDIM texture this is the pattern that contains ``<UDIM>``.
     """
     if not isinstance(value, Sdf.AssetPath):
         return _file_of_text(str(value or ""), attribute)
-    if _SMALL_UDIM in value.path:  # as Arnold writes it
+    # Arnold writes the token in lower case.
+    if _SMALL_UDIM in value.path:
         return _file_of_text(value.path, attribute)
     path = value.resolvedPath or value.path
     if UDIM not in path and UDIM not in value.path:
@@ -306,25 +307,29 @@ def asset_file(value: Any, attribute: Usd.Attribute | None) -> str:
     layer = layer_of_value(attribute)
     found = UsdShade.UdimUtils.ResolveUdimPath(value.path, layer)
     if not found and layer is not None and value.path.startswith("."):
-        return str(layer.ComputeAbsolutePath(value.path))  # for messages: there are no tiles
+        # No tile exists; the absolute pattern is used in messages.
+        return str(layer.ComputeAbsolutePath(value.path))
     return found or value.path
 
 
 def _file_of_text(name: str, attribute: Usd.Attribute | None) -> str:
-    """The file that a text names; relative names start at the layer that has the text."""
+    """Returns the file that a string names.
+
+    Relative names are anchored at the layer that has it.
+    """
     name = name.replace(_SMALL_UDIM, UDIM)
     layer = layer_of_value(attribute)
     return str(layer.ComputeAbsolutePath(name)) if name and layer is not None else name
 
 
 def tile_files(pattern: str) -> list[tuple[int, str]]:
-    """Numbers and files of the existing tiles of a UDIM pattern, 1001 to 1100."""
+    """Returns numbers (1001 to 1100) and files of the existing tiles of a UDIM pattern."""
     found = UsdShade.UdimUtils.ResolveUdimTilePaths(pattern, None)
     return [(int(number), path) for path, number in found]
 
 
 def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    """Files that the shaders in a material name: a guess at the images that it will need."""
+    """Yields files that shaders in a material name, as a guess at the images that it needs."""
     for prim in _each_once(material):
         for attribute in prim.GetAuthoredAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Asset:
@@ -338,7 +343,7 @@ def image_files(material: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
 
 
 def _each_once(top: Usd.Prim) -> Iterator[Usd.Prim]:
-    """A prim and its descendants; prims in instances once for each prototype."""
+    """Yields a prim and its descendants; prims in instances once per prototype."""
     tops = [top.GetPrimInPrototype() if top.IsInstanceProxy() else top]
     known: set[Sdf.Path] = set()
     while tops:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the parameters of materials and lights come from: for programs that let people change them.
+"""Editable parameters of materials and lights, with the attributes that hold them.
 
-``wavecomb.usd.looks.material`` reads surfaces; here each constant of one is traced to the attribute
-that holds it, so that a change can be written back.
+``wavecomb.usd.looks.material`` reads surfaces; this module finds the attribute behind each
+constant, so that programs such as the viewer can write a change back to the stage.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.identity import LightGroups
 from wavecomb.usd.stage.report import LoadReport
 
-IN_INSTANCE = "it is inside an instance, where USD takes no opinions"
+IN_INSTANCE = "it is inside an instance, where USD does not accept opinions"
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,14 @@ class Parameter:
     """One parameter of a material.
 
     Attributes:
-        name: Keyword argument of ``SceneBuilder.add_material``; of MaterialX the shader's input.
-        value: As the loader reads it: a number, three, or a bool; None where it is driven.
-        attribute: To author for another value, there already or not; None: there is none.
-        type_name: Of that attribute.
-        driven_by: What else gives the value: "texture marble.png", "primvar displayColor"; "" of a
-            constant.
-        reason: Why there is no attribute to author; "" where there is.
-        definition: What MaterialX says of the input; None of UsdPreviewSurface.
+        name: Keyword argument of ``SceneBuilder.add_material``, or input of the MaterialX shader.
+        value: Value that the loader reads: a number, a colour or a bool; None if it is driven.
+        attribute: Path of the attribute to author, which need not exist yet; None if there is none.
+        type_name: Type of that attribute.
+        driven_by: Driver of the value, such as "texture marble.png" or "primvar displayColor"; ""
+            for a constant.
+        reason: Why there is no attribute to author; "" if there is one.
+        definition: MaterialX definition of the input; None for UsdPreviewSurface.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Parameter:
     definition: InputDefinition | None = None
 
     def authored(self, value: Any) -> Any:
-        """What the attribute must hold for the parameter to be so."""
+        """Converts a parameter value to the value that the attribute must hold."""
         if isinstance(value, bool):
             return value if self.type_name == Sdf.ValueTypeNames.Bool else int(value)
         if isinstance(value, (tuple, list)):
@@ -77,7 +77,7 @@ class Parameter:
 
 
 def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Parameter]:
-    """Parameters of a material by name, in a panel's order; empty where it has no surface."""
+    """Returns parameters of a material by name, in display order; empty if it has no surface."""
     material = UsdShade.Material(prim)
     kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
     if not kind:
@@ -89,7 +89,7 @@ def material_parameters(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Paramet
 
 
 class _Tracer:
-    """Traces the inputs of one surface shader."""
+    """Search for the attributes behind the inputs of one surface shader."""
 
     def __init__(self, prim: Usd.Prim, shader: UsdShade.Shader, time: Usd.TimeCode) -> None:
         self._prim = prim
@@ -97,7 +97,7 @@ class _Tracer:
         self._time = time
 
     def preview(self, program: str) -> dict[str, Parameter]:
-        """Parameters of a UsdPreviewSurface."""
+        """Returns the parameters of a UsdPreviewSurface."""
         wanted = programs()[program].reads
         out: dict[str, Parameter] = {}
         for name, (parameter, default) in INPUTS.items():
@@ -123,7 +123,7 @@ class _Tracer:
         return out
 
     def materialx(self, model_name: str) -> dict[str, Parameter]:
-        """Inputs of a MaterialX surface, those that Wavecomb reads."""
+        """Returns the inputs of a MaterialX surface that Wavecomb reads."""
         known = mtlx.definitions(model_name, shader_id(self._shader))
         return {name: self._own_input(one) for name, one in known.items()}
 
@@ -152,7 +152,7 @@ class _Tracer:
         )
 
     def _path_of(self, name: str, attribute: Usd.Attribute | None) -> Sdf.Path:
-        """The attribute that an input's value is in, or would be."""
+        """Returns the path of the attribute that holds an input's value or would hold it."""
         own = self._shader.GetPath().AppendProperty(f"inputs:{name}")
         return own if attribute is None else attribute.GetPath()
 
@@ -172,8 +172,9 @@ class _Tracer:
     def _encoded(
         self, parameter: str, value: Any, attribute: Usd.Attribute | None, space: str
     ) -> Parameter:
-        """A colour that cannot be edited, since it is written in another space."""
-        with contextlib.suppress(ValueError):  # the loader lists the space
+        """Returns a colour that cannot be edited because it is authored in another colour space."""
+        # The loader reports unknown colour spaces.
+        with contextlib.suppress(ValueError):
             value = linear_colour(value, attribute)
         return Parameter(parameter, value, reason=f"it is in the colour space {space}")
 
@@ -185,7 +186,7 @@ class _Tracer:
         attribute: Usd.Attribute | None,
         usual: Sdf.ValueTypeName,
     ) -> Parameter:
-        """A parameter whose value is that of an attribute, or would be one of the usual type."""
+        """Returns a parameter held by ``attribute``, or by a new attribute of the usual type."""
         if self._prim.IsInstanceProxy() or self._prim.IsInPrototype():
             return Parameter(parameter, value, reason=IN_INSTANCE)
         if not path.HasPrefix(self._prim.GetPath()):
@@ -217,18 +218,19 @@ def _is_triple(type_name: Sdf.ValueTypeName) -> bool:
 
 
 class _AnyProfile:
-    """Takes every IES profile for one that can be read."""
+    """Substitute for the table of IES profiles that accepts every profile."""
 
     def add(self, path: str, prim: Sdf.Path) -> int:
-        """Its number."""
+        """Returns a dummy profile id."""
         return 0
 
 
 def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
-    """What the loader gives ``SceneBuilder.add_light`` for a light outside of instances.
+    """Returns the parameters that the loader passes to ``SceneBuilder.add_light``.
 
-    Numbers, colours and switches, by the names of ``wavecomb.light_table``, all that the kind of
-    light has but whether it is visible. None where the prim is no light that Wavecomb knows.
+    The light must be outside of instances. Returns numbers, colours and switches by the names of
+    ``wavecomb.light_table``: all parameters of this kind of light except its visibility. Returns
+    None if the prim is not a supported light.
     """
     if not prim or str(prim.GetTypeName()) not in LIGHT_KINDS:
         return None
@@ -255,7 +257,7 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
 
 
 def as_stored(value: Any) -> Any:
-    """A number or colour as the core keeps it, in 32 bits; a bool as it is."""
+    """Rounds a number or colour to float32, as the core stores it; returns a bool unchanged."""
     if isinstance(value, bool):
         return value
     if isinstance(value, (tuple, list)):
@@ -264,6 +266,6 @@ def as_stored(value: Any) -> Any:
 
 
 def _other_space(attribute: Usd.Attribute | None) -> str | None:
-    """The colour space of a colour that is not linear Rec.709; None: it is, or says nothing."""
+    """Returns the colour space of an attribute unless it is linear Rec.709 or unauthored."""
     space = space_of(attribute)
     return space if space and canonical(space) not in (LINEAR, RAW) else None

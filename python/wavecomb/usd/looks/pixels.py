@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Image files to arrays, on threads of their own ahead of need."""
+"""Decodes image files to arrays, ahead of need on separate threads."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 65536
 MAX_BYTES = 8 << 30
-"""Most memory that decoding one image may take."""
+"""Memory limit of decoding one image."""
 
 
 Stamp = tuple[int, int]
-"""When a file was changed, in ns, and its size in bytes."""
+"""Modification time of a file in ns, and its size in bytes."""
 
 
 class Image:
     """Pixels (height, width, channels 1 to 4), uint8, float16 or float32; row 0 is the top.
 
     Attributes:
-        size: Height and width.
-        channels: Channels of each pixel.
-        dtype: Of the pixels.
-        stamp: Of its file before it was read; None: not known.
-        wraps: Modes in s and t that the file asks for: black, clamp, repeat or mirror.
-        encoded: Whether the file says that it is sRGB; None: it does not say.
+            size: Height and width.
+            channels: Number of channels.
+            dtype: Type of the pixel values.
+            stamp: Stamp of the file before it was read; None if unknown.
+            wraps: Wrap modes in s and t that the file requests: black, clamp, repeat or mirror.
+            encoded: Whether the file declares sRGB encoding; None if it declares nothing.
     """
 
     def __init__(
@@ -60,11 +60,15 @@ class Image:
 
     @property
     def is_here(self) -> bool:
-        """Whether the pixels were not taken yet."""
+        """Whether the image still holds its pixels."""
         return self._pixels is not None
 
     def take(self) -> NDArray[Any]:
-        """Hands the pixels over, once."""
+        """Returns the pixels and releases them.
+
+        Raises:
+            ValueError: The pixels were taken before.
+        """
         pixels, self._pixels = self._pixels, None
         if pixels is None:
             raise ValueError("the pixels of this image were taken before")
@@ -74,7 +78,7 @@ class Image:
     def automatic_srgb(self) -> bool:
         """Whether ``sourceColorSpace = auto`` means sRGB.
 
-        As the file says, else of 8 bits with 3 or 4 channels.
+        Uses the file's declaration; without one, 8-bit images with 3 or 4 channels are sRGB.
         """
         if self.encoded is not None:
             return self.encoded
@@ -82,11 +86,11 @@ class Image:
 
 
 class TextureError(ValueError):
-    """An image that cannot be used; says why in a few words."""
+    """An image cannot be used; the message gives the reason in a few words."""
 
 
 def stamp_of(path: str) -> Stamp | None:
-    """The stamp of a file, or of the package that it is in; None: it is not there."""
+    """Returns the stamp of a file, or of the package that holds it; None if it does not exist."""
     if Ar.IsPackageRelativePath(path):
         path = Ar.SplitPackageRelativePathOuter(path)[0]
     try:
@@ -100,16 +104,16 @@ def read_image(path: str) -> Image:
     """Reads the first image of a file, or of a file in a package (``a.usdz[b.png]``).
 
     Raises:
-        TextureError: It is missing, unreadable or too large.
+            TextureError: The image is missing, unreadable or too large.
     """
     return _read(path, False)
 
 
 def read_header(path: str) -> Image:
-    """As ``read_image``, but for the pixels: they are all 0 and take no memory.
+    """Reads like ``read_image`` but without pixels: they are all 0 and take no memory.
 
     Raises:
-        TextureError: Likewise.
+        TextureError: The image is missing, unreadable or too large.
     """
     return _read(path, True)
 
@@ -135,14 +139,14 @@ def _why_missing(path: str) -> str:
 
 
 _BY_ENDING = (".jp2", ".j2k", ".j2c", ".jph")
-"""Kinds that OpenImageIO tells by the name only."""
+"""File extensions of formats that OpenImageIO recognises by name only."""
 
 
 @contextmanager
 def _unpacked(data: Any, name: str) -> Iterator[str]:
-    """A file with the content of one in a package, by a name that it has while this lasts.
+    """Yields the name of a temporary file with the content of a file in a package.
 
-    It is in memory and has no name in any folder: whatever ends this process, nothing is left.
+    Uses anonymous memory where possible, so that nothing is left if the process ends abnormally.
     """
     ending = Path(name).suffix.lower()
     if ending not in _BY_ENDING and hasattr(os, "memfd_create"):
@@ -153,7 +157,7 @@ def _unpacked(data: Any, name: str) -> Iterator[str]:
         finally:
             os.close(descriptor)
         return
-    # The ending is one of ours: a package may call its files as it likes.
+    # Packages may contain any file name, so only known extensions are used.
     ending = ending if ending in _BY_ENDING else ""
     descriptor, file = tempfile.mkstemp(suffix=ending, prefix="wavecomb-")
     try:
@@ -176,7 +180,7 @@ _WRAP_WORDS = {"periodic": "repeat"} | {w: w for w in ("black", "clamp", "repeat
 
 
 def _wraps(spec: Any) -> tuple[str, str]:
-    """WrapS and wrapT of a file, or ``wrapmodes`` as texture tools write it; else black."""
+    """Returns wrapS and wrapT of a file, or ``wrapmodes`` as texture tools write it, else black."""
     both = str(spec.getattribute("wrapmodes") or "").split(",")
     words = [
         spec.getattribute(name) or both[min(i, len(both) - 1)]
@@ -187,7 +191,7 @@ def _wraps(spec: Any) -> tuple[str, str]:
 
 
 def _encoded(spec: Any) -> bool | None:
-    """Whether a file of a coloured image says that it is sRGB, or linear; None: neither."""
+    """Returns whether a colour image declares sRGB (True) or linear (False); None for neither."""
     if spec.nchannels < 3:
         return None
     if str(spec.getattribute("oiio:ColorSpace") or "").startswith("lin"):
@@ -199,12 +203,12 @@ def _encoded(spec: Any) -> bool | None:
 def _read_file(
     path: str, stamp: Stamp | None, header_only: bool = False, called: str | None = None
 ) -> Image:
-    """``called``: the file in messages."""
-    # Not before an image is read: the library takes 30 MB as soon as it is loaded.
+    """Reads an image file; ``called`` is its name in messages."""
+    # Imported only when an image is read, since loading the library takes 30 MB.
     import OpenImageIO as oiio
 
     trail.note("decoding", called or path, "image")
-    # Colours as stored: not multiplied by alpha.
+    # Read colours as stored, not premultiplied by alpha.
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(path, config)
@@ -238,17 +242,19 @@ def _read_file(
 
 
 _BAND = 64
-"""Rows that are converted at a time, where the library's type is not ours."""
+"""Rows that are converted together if the library's type differs from the stored type."""
 
 
 def _decoding_bytes(spec: Any, channels: int, itemsize: int, asked: int) -> int:
-    """Memory that decoding takes at most: what the library may hold, what it gives, what we keep.
+    """Returns an upper bound of the memory that decoding takes, in bytes.
+
+    The sum covers the library's buffers, its result and the stored pixels.
 
     Args:
-        spec: Of the file.
-        channels: That we keep.
-        itemsize: Of our values, bytes.
-        asked: Of those that the library gives.
+        spec: OpenImageIO's description of the file.
+        channels: Channels that are stored.
+        itemsize: Size of a stored value, bytes.
+        asked: Size of a value that the library returns, bytes.
     """
     pixels = int(spec.width) * int(spec.height)
     held = spec.pixel_bytes(True) + channels * itemsize
@@ -258,7 +264,7 @@ def _decoding_bytes(spec: Any, channels: int, itemsize: int, asked: int) -> int:
 
 
 def _decoded(source: Any, spec: Any, channels: int, dtype: Any, ask: Any) -> NDArray[Any] | None:
-    """The pixels as they are kept, finite; None where the library cannot read them."""
+    """Returns the pixels in their stored type, finite; None if the library cannot read them."""
     shape = spec.height, spec.width, channels
     if np.dtype(dtype).itemsize == ask.basesize() or spec.tile_width:
         pixels = source.read_image(0, 0, 0, channels, ask)
@@ -283,13 +289,13 @@ def _finite(pixels: NDArray[Any], dtype: Any) -> NDArray[Any]:
 
 
 _EXPONENTS = {2: (0x7C00, 0xFC00), 4: (0x7F800000, 0xFF800000)}
-"""Bits of positive and negative infinity, by the size of the type."""
+"""Bit patterns of positive and negative infinity, by the size of the float type in bytes."""
 
 
 def is_finite(pixels: NDArray[Any]) -> bool:
-    """Whether all float16 or float32 values are, in any number of dimensions.
+    """Returns whether all float16 or float32 values are finite, for any number of dimensions.
 
-    As whole numbers: NumPy looks at float16 one value at a time, and takes longer than decoding.
+    Compares bit patterns as integers: NumPy's isfinite takes longer for float16 than decoding does.
     """
     size = pixels.dtype.itemsize
     if pixels.size == 0 or size not in _EXPONENTS or not pixels.flags.c_contiguous:
@@ -303,16 +309,16 @@ def is_finite(pixels: NDArray[Any]) -> bool:
 
 
 class ReadAhead:
-    """Reads images before they are asked for.
+    """Queue that reads images before they are needed.
 
-    Contract: used by one thread. At most one more than ``threads`` images lie ready, so that memory
-    is bounded; whatever is asked for and not under way is read at once.
+    Contract: used by one thread. At most ``threads`` + 1 images are ready or being read, which
+    bounds memory. An image that is requested but not being read yet is read at once.
     """
 
     def __init__(self, threads: int = 0, limit_bytes: int | None = None) -> None:
-        """``threads`` read, 0: one for each core; with 1 nothing is read ahead.
+        """``threads`` read images; 0 means one per core, and 1 disables reading ahead.
 
-        ``limit_bytes``: of the pixels that lie ready or are under way; None: any.
+        ``limit_bytes`` limits the pixels that are ready or being read; None means no limit.
         """
         self._threads = threads or usable_cores()
         self._limit_bytes = limit_bytes
@@ -323,7 +329,7 @@ class ReadAhead:
         self._ready: dict[str, Future[Image]] = {}
 
     def want(self, paths: Iterable[str]) -> None:
-        """Says that images will be asked for, most likely in this order."""
+        """Queues images that will be needed, most likely in this order."""
         if self._threads == 1:
             return
         for path in paths:
@@ -333,7 +339,7 @@ class ReadAhead:
         self._start()
 
     def read(self, path: str) -> Image:
-        """As ``read_image``, from what was read ahead where it was."""
+        """Returns the image of ``read_image``, which may have been read ahead."""
         self._seen.add(path)
         future = self._ready.pop(path, None)
         if future is None:
@@ -343,12 +349,12 @@ class ReadAhead:
         try:
             return future.result()
         finally:
-            # Its exception holds this frame: a circle that would keep the stage open.
+            # The future's exception refers to this frame; the cycle would keep the stage open.
             del future
             self._start()
 
     def close(self) -> None:
-        """Drops what was not asked for."""
+        """Discards images that were read ahead but not requested."""
         self._waiting.clear()
         self._ready.clear()
         if self._pool is not None:
@@ -357,11 +363,11 @@ class ReadAhead:
 
     @property
     def bytes(self) -> int:
-        """Memory of the pixels that are ready or under way; 0 where no limit was set."""
+        """Memory of the pixels that are ready or being read; 0 if there is no limit."""
         return sum(self._sizes[path] for path in self._ready) if self._sizes else 0
 
     def _fits(self, path: str) -> bool:
-        """Whether an image may be read now, beside those that are ready."""
+        """Returns whether reading an image keeps the memory within the limit."""
         if self._limit_bytes is None:
             return True
         if path not in self._sizes:
@@ -369,7 +375,8 @@ class ReadAhead:
                 header = read_header(path)
                 bytes_ = header.size[0] * header.size[1] * header.channels * header.dtype.itemsize
             except (TextureError, OSError, ValueError):
-                bytes_ = 0  # reading it says what is wrong
+                # Reading the image will report the error.
+                bytes_ = 0
             self._sizes[path] = bytes_
         return self._sizes[path] + self.bytes <= self._limit_bytes
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdPreviewSurface networks to surfaces (specification 2.6)."""
+"""Converts UsdPreviewSurface networks to surfaces (specification 2.6)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ INPUTS: dict[str, tuple[str, Any]] = {
     "ior": ("ior", 1.5),
     "opacityThreshold": ("opacity_threshold", 0.0),
 }
-"""Input of a UsdPreviewSurface -> parameter of a program, and its default."""
+"""Input of UsdPreviewSurface -> parameter of a program and its default."""
 
 _UNIT = (
     "roughness",
@@ -67,7 +67,7 @@ _IDENTITY_UV = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> str:
-    """The program that ``wavecomb:program`` of a material asks for, else principled."""
+    """Returns the program that ``wavecomb:program`` of a material names, else principled."""
     name = material.GetAttribute("wavecomb:program").Get(time)
     if name is None:
         return "principled"
@@ -79,7 +79,7 @@ def program_of(material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> st
 
 
 def constant(parameter: str, value: Any, default: Any) -> Any:
-    """What an authored value gives a parameter: finite, in range."""
+    """Converts an authored value to a parameter value, finite and in range."""
     if isinstance(default, tuple):
         return colour(value, default)
     result = number(value, default)
@@ -87,7 +87,7 @@ def constant(parameter: str, value: Any, default: Any) -> Any:
 
 
 class PreviewReader:
-    """Reads one UsdPreviewSurface network."""
+    """Reader of one UsdPreviewSurface network."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class PreviewReader:
         report: LoadReport,
         primvars: Mapping[str, Any] | None = None,
     ) -> None:
-        """``primvars``: values of the object's primvars that inputs of textures read."""
+        """``primvars`` holds the object's values of primvars that texture inputs read."""
         self.material = material
         self.time = time
         self.textures = textures
@@ -111,7 +111,7 @@ class PreviewReader:
         self.texture_uvs: dict[str, str] = {}
 
     def read(self, shader: UsdShade.Shader) -> Surface:
-        """The surface of a UsdPreviewSurface shader."""
+        """Returns the surface of a UsdPreviewSurface shader."""
         program = program_of(self.material, self.time, self.report)
         wanted = programs()[program].reads
         parameters: dict[str, Any] = {}
@@ -158,11 +158,11 @@ class PreviewReader:
         )
 
     def _value(self, shader: UsdShade.Shader, name: str, default: Any = None) -> Any:
-        """The value of an input that is the same all over an object."""
+        """Returns the value of an input that is constant over an object."""
         return self.values.of(shader, name, default, by_object=self._by_object)
 
     def _flat_normal(self, value: Any) -> None:
-        """Tilts the whole surface by a constant normal, as a map of one texel."""
+        """Adds a constant normal as a normal map of one texel."""
         if value is None or tuple(value) == INPUTS["normal"][1]:
             return
         texel = np.array(value, np.float32).reshape(1, 1, 3)
@@ -175,7 +175,7 @@ class PreviewReader:
         }
 
     def _displacement(self, surface: UsdShade.Shader) -> float | dict[str, Any] | None:
-        """What the material's displacement output leads to: a length or a texture use."""
+        """Reads the material's displacement as a length or a texture use; None if there is none."""
         shader = UsdShade.Material(self.material).ComputeDisplacementSource()[0]
         connected = shader and "UsdPreviewSurface" in shader_id(shader)
         if shader and not connected:
@@ -188,7 +188,8 @@ class PreviewReader:
             what = "displacement that the material's displacement output does not lead to: ignored"
             self.report.note(what, self.material.GetPath())
             return None
-        self._by_object = False  # shapes are displaced by one reading of their material
+        # Geometry is displaced once per material, so values cannot differ between objects.
+        self._by_object = False
         value = self._input("displacement", source, 0.0)
         texture = self.textured.pop("displacement", None)
         if self.primvars.pop("displacement", None) is not None:
@@ -197,7 +198,10 @@ class PreviewReader:
         return texture if texture is not None else (float(value or 0.0) or None)
 
     def _input(self, parameter: str, source: Source, default: Any) -> Any:
-        """A constant for a parameter, None for its default; a texture goes to ``textured``."""
+        """Returns a constant for a parameter; None if its default or a texture is used.
+
+        Adds textures to ``textured`` and primvars to ``primvars``.
+        """
         if source.is_value:
             value = constant(parameter, source.value, default)
             return self._linear(value, source) if parameter in COLOUR_PARAMETERS else value
@@ -223,7 +227,10 @@ class PreviewReader:
         return default
 
     def _network(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
-        """A network of MaterialX's nodes: a constant, or None for what it drives."""
+        """Evaluates a MaterialX node network.
+
+        Returns a constant, or None if it drives the parameter.
+        """
         value = self.drivers.output(shader, output, parameter)
         if value is None:
             return default
@@ -231,11 +238,11 @@ class PreviewReader:
         return None if found is None else constant(parameter, found, default)
 
     def _linear(self, value: Any, source: Source) -> Any:
-        """A colour in linear Rec.709, whatever its attribute holds."""
+        """Converts a colour from its attribute's colour space to linear Rec.709."""
         return read_colour(value, source.attribute, self.report, self.material.GetPath())
 
     def _texture(self, parameter: str, shader: UsdShade.Shader, output: str, default: Any) -> Any:
-        """Adds a texture use; gives a constant where there is no image."""
+        """Adds a texture use; returns a constant if there is no image."""
         scale = _four(self._value(shader, "scale"), _ONES)
         bias = _four(self._value(shader, "bias"), _ZEROS)
         file = source_of(shader, "file", self.time)
@@ -266,7 +273,7 @@ class PreviewReader:
         wraps = [self._wrap(shader, name, image.wraps[i]) for i, name in enumerate(_WRAP_INPUTS)]
         matrix = self._coordinates(shader, parameter)
         if not any((*matrix[:2], *matrix[3:5])):
-            # One texel for all: its border must not be mixed in.
+            # All lookups read one texel, into which the border colour must not be blended.
             wraps = ["clamp", "clamp"]
         self.textured[parameter] = {
             "texture": self.textures.add(
@@ -280,7 +287,7 @@ class PreviewReader:
         return None
 
     def _wrap(self, shader: UsdShade.Shader, name: str, of_file: str) -> str:
-        """A wrap mode, useMetadata being that of the file, else black."""
+        """Returns a wrap mode; useMetadata means the file's mode, or black if it has none."""
         mode = word(self._value(shader, name), "useMetadata")
         if mode not in ("black", "clamp", "repeat", "mirror", "useMetadata"):
             self.report.warn(
@@ -292,7 +299,7 @@ class PreviewReader:
     def _linear_normals(
         self, space: str, image: Image | TiledImage, shader: UsdShade.Shader
     ) -> str:
-        """The colour space of a normal map, which is never sRGB, whatever the stage says."""
+        """Returns the colour space of a normal map, which is always raw; reports other settings."""
         if image.automatic_srgb if space == "auto" else canonical(space) == SRGB:
             if word(self._value(shader, "sourceColorSpace")) == "sRGB":
                 what = "normal map whose sourceColorSpace is sRGB: read as raw"
@@ -303,11 +310,12 @@ class PreviewReader:
         return "raw"
 
     def _colour_space(self, shader: UsdShade.Shader, file: Source | None) -> str:
-        """By sourceColorSpace, else by the colour space of the file's attribute, else auto."""
+        """Returns sourceColorSpace, else the colour space of the file attribute, else auto."""
         space = word(self._value(shader, "sourceColorSpace"))
         if space in ("raw", "sRGB"):
             return str(space)
-        # An explicit auto asks the file; what the stage says of it goes before a default auto.
+        # An authored auto uses the file's metadata; the stage's colour space precedes a default
+        # auto.
         return "auto" if space == "auto" else space_of(file and file.attribute) or "auto"
 
     def _fallback(
@@ -319,7 +327,7 @@ class PreviewReader:
         bias: tuple[float, ...],
         default: Any,
     ) -> Any:
-        """The value that stands for an image that cannot be read."""
+        """Returns the value that replaces an unreadable image."""
         authored = self._value(shader, "fallback")
         if authored is not None:
             texel = _four(authored, (0.0, 0.0, 0.0, 1.0))
@@ -339,11 +347,10 @@ class PreviewReader:
         return default
 
     def _coordinates(self, shader: UsdShade.Shader, parameter: str) -> tuple[float, ...]:
-        """The matrix from mesh to texture coordinates; notes the primvar in ``uv_names``.
+        """Returns the 2 x 3 matrix from the mesh's to the texture's coordinates.
 
-        And in ``texture_uvs`` where the parameter's is not the first of them.
-
-        Without a connection the coordinates are constant, (0, 0) where nothing is authored.
+        Adds the name of the primvar to ``uv_names``, and to ``texture_uvs`` if it is not the first
+        one. Without a connection the coordinates are constant, (0, 0) if nothing is authored.
         """
         matrix: tuple[float, ...] = _IDENTITY_UV
         node, key = shader, "st"
@@ -368,7 +375,7 @@ class PreviewReader:
                 self.report.missing(f"shading node {identifier} for st", self.material.GetPath())
                 self._note_uv("st", parameter)
                 return matrix
-        self.report.warn("texture coordinates that run in a circle", self.material.GetPath())
+        self.report.warn("texture coordinates with a cyclic connection", self.material.GetPath())
         return (0.0,) * 6
 
     def _note_uv(self, name: str, parameter: str) -> None:
@@ -377,7 +384,7 @@ class PreviewReader:
             self.texture_uvs[parameter] = name
 
     def _transform_2d(self, node: UsdShade.Shader) -> tuple[float, ...]:
-        """UsdTransform2d: scale, then rotate counter-clockwise, then translate."""
+        """Returns the matrix of a UsdTransform2d: scale, rotate counter-clockwise, translate."""
         angle = math.radians(number(self._value(node, "rotation"), 0.0))
         sx, sy = pair(self._value(node, "scale"), (1.0, 1.0))
         tx, ty = pair(self._value(node, "translation"), (0.0, 0.0))
@@ -392,7 +399,7 @@ def _four(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _compose(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[float, ...]:
-    """The 2 x 3 matrix that applies ``inner`` first."""
+    """Multiplies two 2 x 3 matrices so that ``inner`` is applied first."""
     a, b, c, d, e, f = outer
     p, q, r, s, t, u = inner
     return (

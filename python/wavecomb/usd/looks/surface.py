@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A material as the core takes it, before it has an id."""
+"""Description of a material surface, from which the loader adds a material to the core."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class InputDefinition:
     """An input of a surface shader.
 
     Attributes:
-        name: As authored, without ``inputs:``.
-        group: Heading that it stands under: "Base", "Coat" ...
-        label: What it is called there.
+        name: Authored name without ``inputs:``.
+        group: Heading in the user interface, such as "Base" or "Coat".
+        label: Label under that heading.
         kind: "number", "colour" or "switch".
-        type_name: Of MaterialX: float, color3 or boolean; a number may be read of a color3.
-        default: A number, three of them, or a bool.
-        low: Least value.
-        high: Greatest value.
-        soft_low: From here ...
-        soft_high: ... to here it is set with a slider.
+        type_name: MaterialX type: float, color3 or boolean. Wavecomb may read a color3 as a number.
+        default: A number, three numbers or a bool.
+        low: Smallest valid value.
+        high: Largest valid value.
+        soft_low: Lower end of the slider.
+        soft_high: Upper end of the slider.
     """
 
     name: str
@@ -47,13 +47,13 @@ class SurfaceGraph:
     """The graphs of a surface.
 
     Attributes:
-        whole: Drives all parameters that constants and plain textures do not.
-        opacity: The part that drives opacity.
-        emission: The part that drives emission.
-        brightest: Highest emission seen at some points, textures taken for white.
-        primvars: That it reads of each mesh.
-        in_object_space: Whether it reads places in the space of the mesh.
-        outputs: What it was compiled from.
+            whole: Graph of all parameters that are neither constants nor plain textures.
+            opacity: The part of it that computes opacity.
+            emission: The part of it that computes emission.
+            brightest: Highest emission found at sample points, with textures taken as white.
+            primvars: Names of the primvars that it reads from each mesh.
+            in_object_space: Whether it reads positions in object space.
+            outputs: Expressions that it was compiled from, by parameter.
     """
 
     whole: Graph
@@ -66,7 +66,7 @@ class SurfaceGraph:
 
     @property
     def depends_on_mesh(self) -> bool:
-        """Whether the graph differs from mesh to mesh."""
+        """Whether the graph differs between meshes."""
         return bool(self.primvars) or self.in_object_space
 
 
@@ -78,7 +78,7 @@ OPENPBR_COLOURS = (
     "fuzz_color",
     "coat_color",
 )
-"""Which of the further parameters of program openpbr are colours."""
+"""Additional parameters of program openpbr that are colours."""
 
 TEXTURED_PARAMETERS = (
     *COLOUR_PARAMETERS,
@@ -103,7 +103,7 @@ DEFAULTS: dict[str, Any] = {
     "normal": (0.0, 0.0, 1.0),
     "ior": 1.5,
 }
-"""What ``SceneBuilder.add_material`` takes for parameters that are not given."""
+"""Defaults of parameters of ``SceneBuilder.add_material``."""
 
 
 @dataclass(frozen=True)
@@ -111,21 +111,23 @@ class Surface:
     """A program with its parameters.
 
     Attributes:
-        name: For messages.
-        program: diffuse, metal, dielectric, plastic, emissive, principled, openpbr or hair.
-        parameters: Keyword arguments of ``SceneBuilder.add_material``.
-        textures: By parameter, as ``SceneBuilder.add_material`` takes them.
-        uv_names: Primvars that hold texture coordinates, first use first.
-        texture_uvs: By textured parameter, the primvar that its texture is read at, where that is
-            not the first of ``uv_names``.
-        primvars: By parameter, the primvar of the mesh that it is read from, where there is that.
-        displacement: How far points move along their normals: a length, or a texture use; None: not
-            at all. Part of the mesh's shape, not of the material's look.
-        graph: Computes parameters that neither constants nor plain textures give.
-        stand_in: Whether it stands for a material that cannot be drawn: the display colour of what
-            it is bound to goes before it.
-        object_reads: Primvars whose one value on an object changes how textures are read: the
-            material is read again for each value.
+            name: Name for messages.
+            program: diffuse, metal, dielectric, plastic, emissive, principled, openpbr or hair.
+            parameters: Keyword arguments of ``SceneBuilder.add_material``.
+            textures: Texture uses by parameter, in the form that ``SceneBuilder.add_material``
+                takes.
+            uv_names: Primvars that hold texture coordinates, in order of use.
+            texture_uvs: UV primvar of each textured parameter that does not use the first of
+                ``uv_names``.
+            primvars: Primvar of the mesh by parameter; it overrides the constant if the mesh has
+                it.
+            displacement: Displacement along normals: a length or a texture use; None for no
+                displacement. It changes the mesh's geometry, not the material.
+            graph: Graph of parameters that are neither constants nor plain textures.
+            stand_in: Whether this surface replaces a material that cannot be rendered. A display
+                colour of the bound prim then takes precedence.
+            object_reads: Primvars whose value on an object changes how textures are read. The
+                material is read again for each value.
     """
 
     name: str
@@ -141,23 +143,23 @@ class Surface:
     stand_in: bool = False
 
     def key(self) -> str:
-        """Equal for surfaces that look alike."""
+        """Returns a key that is equal for surfaces with equal appearance."""
         parameters, textures = sorted(self.parameters.items()), sorted(self.textures.items())
         return repr((self.program, parameters, textures, self.graph))
 
     def texture_uses(self) -> list[dict[str, Any]]:
-        """All that reads a texture; of graphs about how."""
+        """Returns all texture uses; those of graphs have approximate UV matrices."""
         images = self.graph.whole.images if self.graph is not None else ()
         within = [{"texture": texture, "uv": (k, 0, 0, 0, k, 0)} for texture, k in images]
         return [*self.textures.values(), *within]
 
     def emission_attributes(self) -> tuple[str, ...]:
-        """Primvars that what it emits depends on at hits."""
+        """Returns names of primvars that the emission reads at hits."""
         emission = None if self.graph is None else self.graph.emission
         return () if emission is None else emission.names
 
     def brightest(self) -> float:
-        """Highest emission that it can reach, textures taken for white."""
+        """Returns the highest emission that the surface can reach, with textures taken as white."""
         if self.graph is not None and self.graph.emission is not None:
             return self.graph.brightest
         use = self.textures.get("emission")
@@ -166,13 +168,13 @@ class Surface:
         return float(max(self.parameters.get("emission", (0.0,))))
 
     def with_value(self, parameter: str, value: Any) -> Surface:
-        """The surface with a constant for a parameter, in place of its primvar."""
+        """Returns the surface with a constant in place of a parameter's primvar."""
         rest = {name: primvar for name, primvar in self.primvars.items() if name != parameter}
         return replace(self, parameters={**self.parameters, parameter: value}, primvars=rest)
 
 
 def is_cloudy(surface: Surface) -> bool:
-    """Whether a surface bends light into something that scatters it."""
+    """Returns whether a surface refracts light into a scattering medium."""
     layers = surface.parameters.get("openpbr") or {}
     scatters = max(layers.get("transmission_scatter", (0.0, 0.0, 0.0))) > 0
     fills = layers.get("transmission_weight", 0.0) > 0 and layers.get("transmission_depth", 0.0) > 0
@@ -185,9 +187,9 @@ def fallback_surface(
     name: str = "displayColor",
     varying: Sequence[str] = (),
 ) -> Surface:
-    """What is drawn where no material is bound: matt, in the display colour.
+    """Returns the diffuse surface in the display colour, for gprims without a material.
 
-    ``varying``: which of base_color and opacity have a primvar that differs from place to place.
+    ``varying`` lists which of base_color and opacity read a primvar that varies over the gprim.
     """
     parameters: dict[str, Any] = {"base_color": colour}
     primvars = {parameter: _DISPLAY[parameter] for parameter in varying}

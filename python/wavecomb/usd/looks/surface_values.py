@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a MaterialX material's constants come to, without reading an image: for live edits."""
+"""Constants of a MaterialX material without reading images, for live edits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wavecomb.usd.stage.report import LoadReport
 
 
 class _NoTextures:
-    """Stands for the textures of a scene: every file is there, and none is opened."""
+    """Substitute for the scene's textures: every file exists and none is opened."""
 
     working = "rec709"
 
@@ -26,28 +26,27 @@ class _NoTextures:
         self._numbers: dict[Any, int] = {}
 
     def image(self, path: str, prim: object) -> Any:
-        """One of four channels."""
+        """Returns a dummy image with four channels."""
         return SimpleNamespace(channels=4)
 
     def add(self, *key: Any, **more: Any) -> int:
-        """A number for each use that differs."""
+        """Returns a different id for each different texture use."""
         use = (key[0], *key[2:], *sorted(more.items()))
         return self._numbers.setdefault(use, len(self._numbers))
 
     def missing(self) -> int:
-        """The checker."""
+        """Returns the id of the checker texture."""
         return -1
 
 
 @dataclass(frozen=True)
 class SurfaceValues:
-    """A material as the core has it.
+    """The values of a material in the core.
 
     Attributes:
-        constants: Keyword arguments of ``Renderer.edit`` for it, but of what textures and graphs
-            give.
-        structure: Of what cannot be edited in a scene that there is: textures and graphs, with the
-            constants that are part of them.
+        constants: Keyword arguments of ``Renderer.edit``, without values from textures and graphs.
+        structure: Text that identifies textures and graphs with their constants, which cannot be
+            edited in an existing scene.
     """
 
     constants: Mapping[str, Any]
@@ -57,12 +56,12 @@ class SurfaceValues:
 def surface_values(
     prim: Usd.Prim, time: Usd.TimeCode, values: Mapping[str, Any] | None = None
 ) -> SurfaceValues | None:
-    """What the loader would give the core; None where the material is not of MaterialX.
+    """Returns the values that the loader passes to the core; None if it is no MaterialX material.
 
     Args:
         prim: A material.
-        time: Of evaluation.
-        values: Constants of the surface shader in place of what the stage says.
+        time: Time code at which attributes are evaluated.
+        values: Constants of the surface shader that replace the authored ones.
     """
     material = UsdShade.Material(prim)
     kind, shader = surface_source(material) if material else ("", UsdShade.Shader())
@@ -71,7 +70,8 @@ def surface_values(
     textures = cast(TextureTable, _NoTextures())
     try:
         surface = mtlx.surface(prim, time, textures, LoadReport(), shader, kind, values)
-    except (Tf.ErrorException, RecursionError):  # drawn grey
+    # The loader renders such a material in grey.
+    except (Tf.ErrorException, RecursionError):
         return None
     if surface is None:
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Image files to texture ids, each once."""
+"""Adds image files to the scene as textures, each file once."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ if TYPE_CHECKING:
 _WRAPS = ("repeat", "clamp", "mirror", "black")
 
 CURVE = "sRGB curve"
-"""In place of a space to convert from: only the transfer curve of sRGB is undone, by the core."""
+"""Pseudo colour space: the core decodes the sRGB curve, and pixels are not converted."""
 
 
 def checker() -> NDArray[np.uint8]:
-    """Magenta and dark squares (16, 16, 3): what a missing texture looks like."""
+    """Returns the magenta and dark checker (16, 16, 3) that replaces missing textures."""
     squares = (np.indices((16, 16)) // 2).sum(axis=0) % 2
     return np.where(squares[..., None] == 0, (255, 0, 255), (40, 0, 40)).astype(np.uint8)
 
 
 Key = tuple[str, str, str, str]
-"""A plain texture: its file, the space that it is converted from, and its wrap modes."""
+"""A plain texture: its file, the colour space of its pixels, and its wrap modes in s and t."""
 
 
 @dataclass
@@ -55,26 +55,26 @@ class TiledImage:
     """The images of a UDIM texture.
 
     Attributes:
-        first: Image of the lowest number.
-        tiles: Numbers and files.
+            first: Image of the tile with the lowest number.
+            tiles: Tile numbers and files.
     """
 
     first: Image
     tiles: tuple[tuple[int, str], ...]
 
     def __post_init__(self) -> None:
-        """Takes over what ``Image`` says of the first tile; tiles do not wrap."""
+        """Copies the properties of the first tile; tiles do not wrap."""
         self.channels, self.dtype = self.first.channels, self.first.dtype
         self.wraps, self.automatic_srgb = ("clamp", "clamp"), self.first.automatic_srgb
 
 
 def _converts(space: str) -> bool:
-    """Whether the pixels must be made others."""
+    """Returns whether pixels in this space must be converted before they are stored."""
     return space not in (RAW, CURVE)
 
 
 def stored_type(image: Image, space: str) -> Any:
-    """The type of a texture's values: that of its file, but half where 8 bits are converted."""
+    """Returns the stored type: the file's type, but half floats for converted 8-bit images."""
     if image.dtype == np.uint8 and _converts(space):
         return np.dtype(np.float16)
     return image.dtype
@@ -82,13 +82,13 @@ def stored_type(image: Image, space: str) -> Any:
 
 @dataclass(frozen=True)
 class TextureCache:
-    """The textures of a scene, for later ones to share.
+    """The textures of a scene, which later scenes can share.
 
     Attributes:
-        scene: That holds them.
-        images: What they were made of, by file; without pixels.
+        scene: The scene that holds them.
+        images: Source images by file, without pixels.
         ids: Texture ids by file and options.
-        store: What keeps them within a limit.
+        store: The store that limits their memory.
     """
 
     scene: _core.Scene
@@ -103,12 +103,12 @@ MEGABYTE = 1_000_000
 def texture_store(
     limit: float | None, reuse: TextureCache | None, report: LoadReport
 ) -> _core.TextureStore | None:
-    """What keeps textures within ``limit`` MB; None: nothing does.
+    """Returns the store that limits textures to ``limit`` MB; None without a limit.
 
-    That of ``reuse`` where it has the same limit, so that the limit is for what is shared too.
+    Returns the store of ``reuse`` if its limit is equal, so that shared textures count as well.
 
     Raises:
-        WavecombError: The limit cannot be.
+        WavecombError: The store cannot be created with this limit.
     """
     from wavecomb import _core
 
@@ -128,7 +128,7 @@ def texture_store(
 
 
 class TextureTable:
-    """Adds textures to the scene, equal ones once."""
+    """The textures of a scene; equal textures are merged."""
 
     def __init__(
         self,
@@ -136,11 +136,11 @@ class TextureTable:
         reuse: TextureCache | None = None,
         store: _core.TextureStore | None = None,
     ) -> None:
-        """``reuse``: textures to share where their files are what they were.
+        """``reuse`` holds textures to share if their files have not changed.
 
-        ``store``: that of the builder. ``drops`` may be set to say how many of its finest levels a
-        texture leaves out, and ``origin`` to the world position that the scene is built around,
-        for graphs. The stage of the context is not kept: a table may outlive it.
+        ``store`` is the texture store of the builder. ``drops`` may be set to the number of finest
+        mip levels that each texture leaves out, and ``origin`` to the world position of the scene's
+        origin, for graphs. The table does not keep the context's stage, since it may outlive it.
         """
         self.store = store
         self.working = context.options.working_space
@@ -148,7 +148,7 @@ class TextureTable:
         self._reuse = reuse
         self._unchanged: dict[str, Image | None] = {}
         self._builder, self._report = context.builder, context.report
-        # What lies ready is memory of textures too.
+        # Images that are read ahead count as texture memory.
         self._ahead = ReadAhead(
             context.options.threads, None if store is None else store.limit_bytes // 4
         )
@@ -160,12 +160,12 @@ class TextureTable:
         self._by_size: dict[int, list[str]] = {}
 
     def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
-        """Starts to read the images of a material that will be used."""
+        """Starts reading the images of a material that will be used."""
         files = [self._twin(file) for file in image_files(material, time)]
         self._ahead.want(file for file in files if self._known(file) is None)
 
     def _known(self, path: str) -> Image | None:
-        """The image of a file as it was for the scene to share with, unless it changed."""
+        """Returns the image that the previous scene made of this file, unless the file changed."""
         if self._reuse is None:
             return None
         if path not in self._unchanged:
@@ -175,7 +175,7 @@ class TextureTable:
         return self._unchanged[path]
 
     def _twin(self, path: str) -> str:
-        """The first file asked for with the same bytes; mostly the file itself."""
+        """Returns the first requested file with the same bytes, usually the file itself."""
         found = self._twins.get(path)
         if found is None:
             found = path
@@ -187,14 +187,15 @@ class TextureTable:
                     if found is path:
                         others.append(path)
             except (OSError, ValueError):
-                pass  # reading it says what is wrong
+                # Reading the file will report the error.
+                pass
             self._twins[path] = found
         return found
 
     def image(self, path: str, prim: object) -> Image | TiledImage | None:
-        """The image of a file, read once; None and a warning where that fails.
+        """Returns the image of a file or UDIM pattern; warns and returns None if it is unreadable.
 
-        Files with the same bytes are read once for all. Of a UDIM pattern all tiles.
+        Reads files with equal bytes only once, and reads all tiles of a UDIM pattern.
         """
         if UDIM in path:
             tiles = tile_files(path)
@@ -238,17 +239,17 @@ class TextureTable:
         is_colour: bool = False,
         missing: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0),
     ) -> int:
-        """Texture id of an image.
+        """Returns the texture id of an image.
 
         Args:
-            path: Its file, which names it.
-            image: From ``image``.
-            colour_space: auto, or a name that OpenColorIO's built-in config knows.
-            wrap_s: repeat, clamp, mirror or black; anything else is black, as UsdUVTexture says.
-            wrap_t: Likewise.
-            is_colour: Whether what is read is a colour, which is converted to the working space;
-                of anything else only an sRGB curve is undone.
-            missing: Linear colour and alpha of tiles of a UDIM texture that are not there.
+            path: File that names the texture.
+            image: Result of ``image``.
+            colour_space: auto, or a name in OpenColorIO's built-in config.
+            wrap_s: repeat, clamp, mirror or black; any other value means black, as in UsdUVTexture.
+            wrap_t: The same for t.
+            is_colour: Whether the texture holds colours, which are converted to the working space.
+                For other data only an sRGB curve is decoded.
+            missing: Linear colour and alpha of UDIM tiles that do not exist.
         """
         if isinstance(image, TiledImage):
             return self._add_tiles(path, image, colour_space, is_colour, missing)
@@ -274,7 +275,10 @@ class TextureTable:
         is_colour: bool,
         missing: tuple[float, ...],
     ) -> int:
-        """One texture of all tiles that can be read. In auto each is as its own file says."""
+        """Adds a texture of all readable tiles.
+
+        With auto, each tile uses its file's colour space.
+        """
         tiles = []
         for number, file in image.tiles:
             tile = self._image(self._twin(file), path)
@@ -290,7 +294,7 @@ class TextureTable:
         return self._ids[key]
 
     def _space(self, path: str, image: Image, colour_space: str, is_colour: bool) -> str:
-        """The space to convert from, of OpenColorIO's names, or RAW (none), or CURVE."""
+        """Returns OpenColorIO's name of the source colour space, RAW (no conversion) or CURVE."""
         if colour_space == "auto":
             space = SRGB if image.automatic_srgb else LINEAR
         else:
@@ -308,7 +312,7 @@ class TextureTable:
     def _as_stored(
         self, path: str, image: Image, space: str, wraps: tuple[str, str]
     ) -> NDArray[Any]:
-        """Takes the pixels of an image as the core stores them, without its dropped levels."""
+        """Takes the pixels of an image in their stored form, without its dropped mip levels."""
         pixels = image.take()
         dtype = stored_type(image, space)
         if _converts(space):
@@ -325,7 +329,7 @@ class TextureTable:
         return pixels
 
     def _add(self, path: str, image: Image, space: str, wrap_s: str, wrap_t: str) -> int:
-        # An image is dropped once it is in the scene; another use of the file reads it again.
+        # Pixels are released once they are in the scene; a second use reads the file again.
         here = image if image.is_here else read_image(path)
         pixels = self._as_stored(path, here, space, (wrap_s, wrap_t))
         if self.store is not None:
@@ -334,18 +338,20 @@ class TextureTable:
             return self._builder.add_texture(
                 pixels, srgb=space == CURVE, wrap_s=wrap_s, wrap_t=wrap_t, name=path
             )
-        except ValueError as error:  # no room for it
+        # The texture store has no room for it.
+        except ValueError as error:
             raise WavecombError(str(error)) from None
         finally:
             if self.store is not None:
-                # Else the allocator keeps the memory of images.
+                # Without this the allocator would keep the memory of decoded images.
                 del pixels
                 give_back_memory()
 
     def mean(self, number: int) -> NDArray[np.float64]:
-        """Reads a texture's file again for its linear mean (4,); 1 where there is no file."""
+        """Returns a texture's linear mean (4,) by reading its file again; 1 if there is no file."""
         key = next((key for key, known in self._ids.items() if known == number), ())
-        if len(key) == 3:  # of tiles
+        # Keys of UDIM textures have three elements.
+        if len(key) == 3:
             means = [self.mean(tile) for _, tile in key[1]]
             return np.asarray(np.mean(means, axis=0)) if means else np.ones(4)
         if len(key) != 5:
@@ -364,7 +370,7 @@ class TextureTable:
         return np.array([*np.broadcast_to(found[:colours], 3), alpha])
 
     def missing(self) -> int:
-        """Texture id of the checker that stands for a texture that cannot be read."""
+        """Returns the texture id of the checker that replaces unreadable textures."""
         key = ("", "checker")
         if key not in self._ids:
             self._ids[key] = self._builder.add_texture(
@@ -373,17 +379,17 @@ class TextureTable:
         return self._ids[key]
 
     def add_pixels(self, name: str, pixels: NDArray[Any]) -> int:
-        """Texture id of generated pixels, linear Rec.709 where they are colours."""
+        """Returns the texture id of generated pixels; colours are linear Rec.709."""
         return self._builder.add_texture(
             pixels, srgb=False, wrap_s="repeat", wrap_t="clamp", name=name
         )
 
     def cache(self, scene: _core.Scene) -> TextureCache:
-        """What later scenes can share; scene: that was built of these textures."""
+        """Returns the textures for later scenes to share; ``scene`` was built with this table."""
         return TextureCache(scene, self._taken, self._ids, self.store)
 
     def release(self) -> None:
-        """Forgets the pixels that were read."""
+        """Releases the pixels that were read."""
         images = {path: image for path, image in self._images.items() if isinstance(image, Image)}
         self._taken = {path: image for path, image in images.items() if not image.is_here}
         self._images.clear()

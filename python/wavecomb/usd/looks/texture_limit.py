@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the textures of a stage within a limit: chooses which mip levels are made at all.
+"""Keeps the textures of a stage within a memory limit by leaving out mip levels.
 
-Before anything is read, headers of all image files say what the textures would take. While that is
-more than the limit, the texture loses its finest level that has the most texels for each pixel of
-the picture. So a render never waits for a file, and the same stage, view and limit give the same
-picture.
+Before loading, reads the headers of all image files and computes the memory of their textures.
+While the sum exceeds the limit, removes the finest level of the texture with the most texels per
+image pixel. So a render never waits for a file, and the same stage, view and limit give the same
+image.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
     from wavecomb.usd.geometry.view_size import ViewSize
 
 MAX_PRIMS = 100_000
-"""Prims whose size in the picture is looked at; what only later ones use is kept fine."""
+"""Prims whose image size is computed; textures used only by later prims keep their detail."""
 
 _TILE = 8
 _WRAPPED = 2.0
-"""Texels are asked for as if everything were so much larger: surfaces are not flat to the view."""
+"""Safety factor on the required texels, since surfaces do not face the camera exactly."""
 
 
 def pyramid_bytes(width: int, height: int, channels: int, dtype: Any) -> int:
-    """Memory of a texture with all its mip levels, as the core stores it."""
+    """Returns the memory in bytes of a texture with all its mip levels, as the core stores it."""
     texels = 0
     while True:
         texels += -(-width // _TILE) * -(-height // _TILE) * _TILE * _TILE
@@ -52,11 +52,11 @@ def pyramid_bytes(width: int, height: int, channels: int, dtype: Any) -> int:
 
 @dataclass
 class _Entry:
-    """A texture that would be made.
+    """A texture that would be created.
 
     Attributes:
-        wanted: Texels across that the picture can show; None: it is not known, keep it.
-        drop: Finest levels to leave out.
+        wanted: Texels across that the image can resolve; None if unknown, which keeps all levels.
+        drop: Number of finest levels to leave out.
     """
 
     key: Key
@@ -76,12 +76,12 @@ class _Entry:
         return pyramid_bytes(*self.size, self.channels, self.dtype)
 
     def surplus(self) -> float:
-        """Texels for each that the picture can show."""
+        """Returns the ratio of texels to those that the image can resolve."""
         return 0.0 if self.wanted is None else max(self.size) / max(self.wanted, 1e-3)
 
 
 class _Plan(TextureTable):
-    """A table that reads headers only and notes what would be added."""
+    """A texture table that reads only headers and records the textures to be added."""
 
     def __init__(self, context: LoadContext) -> None:
         super().__init__(context)
@@ -89,7 +89,7 @@ class _Plan(TextureTable):
         self._headers: dict[str, Image | None] = {}
 
     def expect(self, material: Usd.Prim, time: Usd.TimeCode) -> None:
-        """Nothing is read ahead."""
+        """Does nothing, since headers are not read ahead."""
 
     def _image(self, path: str, prim: object) -> Image | None:
         if path not in self._headers:
@@ -108,13 +108,13 @@ class _Plan(TextureTable):
         return number
 
     def reached(self, number: int) -> list[_Entry]:
-        """The textures behind an id: itself, or its tiles."""
+        """Returns the textures behind an id: the texture itself, or its tiles."""
         parts = self._builder.tiles.get(number, [number])  # type: ignore[attr-defined]
         return [self.entries[part] for part in parts if part in self.entries]
 
 
 class _NoBuilder:
-    """Gives ids and makes nothing."""
+    """Substitute for the scene builder that assigns ids but creates no textures."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -131,7 +131,7 @@ class _NoBuilder:
 
 
 def plan_levels(context: LoadContext, view: ViewSize, limit_bytes: float) -> dict[Key, int]:
-    """How many of its finest levels each texture leaves out, by its key in ``TextureTable``."""
+    """Returns how many finest levels each texture leaves out, by its key in ``TextureTable``."""
     report = context.report
     options = replace(context.options, threads=1)
     builder: Any = _NoBuilder()
@@ -176,7 +176,7 @@ def _note_lights(context: LoadContext, plan: _Plan) -> None:
 
 
 def _note_materials(context: LoadContext, plan: _Plan, view: ViewSize) -> None:
-    """Notes the textures of all that is bound, and how many texels across each could show."""
+    """Records the textures of all bound materials and the texels that the image can resolve."""
     time = context.time
     materials = MaterialTable(context, plan)
     bounds = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
@@ -209,7 +209,10 @@ def _note_materials(context: LoadContext, plan: _Plan, view: ViewSize) -> None:
 
 
 def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """All that is drawn, prims in instances once for each instance up to ``MAX_PRIMS``."""
+    """Yields active, defined prims, and the prototypes of point instancers once.
+
+    Includes prims in native instances once per instance. Ends after ``4 * MAX_PRIMS`` prims.
+    """
     proxies = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     seen: set[Any] = set()
     for count, prim in enumerate(Usd.PrimRange.Stage(stage, proxies)):
@@ -226,7 +229,7 @@ def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
 
 
 def _pixels_across(prim: Usd.Prim, bounds: UsdGeom.BBoxCache, view: ViewSize) -> float:
-    """Pixels that a prim would be long where it is nearest; infinite where that is not known."""
+    """Returns a prim's largest possible length in pixels; infinite if it is unknown."""
     instancer = prim
     while instancer and not instancer.IsA(UsdGeom.PointInstancer):
         instancer = instancer.GetParent()
@@ -247,7 +250,7 @@ def _pixels_across(prim: Usd.Prim, bounds: UsdGeom.BBoxCache, view: ViewSize) ->
 
 
 def _uv_extent(prim: Usd.Prim, time: Usd.TimeCode) -> float:
-    """How far texture coordinates reach over a prim, 1 where that is not known."""
+    """Returns the extent of texture coordinates over a prim, 1 if it is unknown."""
     reader = UsdGeom.PrimvarsAPI(prim)
     for name in UV_NAMES:
         primvar = reader.FindPrimvarWithInheritance(name)

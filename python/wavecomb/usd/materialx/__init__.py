@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All that is read of MaterialX: files as layers in memory, nodes, surface shaders.
+"""Reads MaterialX: documents as layers in memory, node graphs, and surface shaders.
 
-Nothing outside of this package imports it but ``wavecomb.usd.mtlx``.
+Only ``wavecomb.usd.mtlx`` imports this package from outside.
 """

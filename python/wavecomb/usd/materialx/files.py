@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX documents: the XML of a file and of what it includes, and the files that it names."""
+"""Reads MaterialX documents with their includes, and resolves the files that they name."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from wavecomb.picture.files import kind_of
 from wavecomb.usd.materialx.library import library
 
 MAX_DEPTH = 64
-"""Elements inside of each other; MaterialX reads them with as many calls inside of each other."""
+"""Deepest nesting of elements, since MaterialX parses them recursively."""
 
 MAX_INCLUDES = 256
-"""Files that one document may include, those of its includes too."""
+"""Most files that a document may include directly or indirectly."""
 
 MAX_CHAIN = 32
-"""Files that include each other, one the next: each copies what those below it hold."""
+"""Longest chain of includes, since each file copies the content of the files below it."""
 
 MAX_BYTES = 1 << 26
-"""Most bytes of a document with all that it includes."""
+"""Most bytes of a document with all its includes."""
 
 _INCLUDE = "http://www.w3.org/2001/XInclude include"
 
 
 class MtlxError(Exception):
-    """Why a file cannot be read, as a few words."""
+    """A file cannot be read; the message gives the reason in a few words."""
 
 
 @dataclass(frozen=True)
 class Document:
-    """A document with the definitions that come with MaterialX behind it.
+    """A document that refers to MaterialX's standard library.
 
     Attributes:
-        root: MaterialX's own. Once it has definitions behind it, it gives these with its own ones.
-        file: That was asked for.
-        graphs: Its node graphs.
-        definitions: Names of the node definitions that are its own.
+        root: MaterialX's document object. Its definitions include those of the library.
+        file: File that was requested.
+        graphs: Node graphs of the document, without those of the library.
+        definitions: Names of the node definitions of the document, without those of the library.
     """
 
     root: Any
@@ -53,13 +53,13 @@ class Document:
 
 
 def read_document(path: str) -> Document:
-    """The document of a file with all that it includes, of the newest version.
+    """Reads a file with its includes and upgrades it to the current MaterialX version.
 
     Args:
-        path: As Ar resolved it; may be in a .usdz.
+        path: Path as resolved by Ar; may be inside a .usdz.
 
     Raises:
-        MtlxError: It cannot be read.
+        MtlxError: The file cannot be read.
     """
     root = _read(path, (), _Budget())
     graphs = tuple(root.getNodeGraphs())
@@ -70,14 +70,14 @@ def read_document(path: str) -> Document:
 
 @dataclass
 class _Budget:
-    """What a document may still include."""
+    """Remaining number of files and bytes that a document may include."""
 
     files: int = MAX_INCLUDES
     bytes: int = MAX_BYTES
 
 
 def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
-    """One file; ``above``: those that include it."""
+    """Reads one file; ``above`` lists the files that include it."""
     import MaterialX as mx
 
     data = _bytes(path, left.bytes)
@@ -103,7 +103,7 @@ def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
             try:
                 document.importLibrary(_read(other, (*above, path), left))
             except MtlxError as error:
-                # Of a chain the last file says enough.
+                # For a chain of includes, report only the innermost file.
                 known = str(error).startswith("in ")
                 why = error if known else f"in {name}, which it includes: {error}"
                 raise MtlxError(str(why)) from None
@@ -111,7 +111,8 @@ def _read(path: str, above: tuple[str, ...], left: _Budget) -> Any:
         raise MtlxError("it is not UTF-8") from None
     except MtlxError:
         raise
-    except Exception as error:  # bindings raise types of their own
+    # The MaterialX bindings raise library-specific exception types.
+    except Exception as error:
         raise MtlxError(" ".join(str(error).split())[:200]) from None
     return document
 
@@ -129,10 +130,10 @@ def _bytes(path: str, most: int) -> bytes:
 
 
 def _check(data: bytes) -> list[str]:
-    """The files that a document includes.
+    """Validates the XML of a document and returns the files that it includes.
 
     Raises:
-        MtlxError: It is no XML, no MaterialX, or nested more than MaterialX may be given.
+        MtlxError: It is not XML, not MaterialX, or nested too deeply.
     """
     includes: list[str] = []
     open_elements: list[str] = []
@@ -161,13 +162,13 @@ def _check(data: bytes) -> list[str]:
 
 
 def resolve(name: str, anchor: str) -> str:
-    """The file of that name beside another, resolved; "" where there is none."""
+    """Resolves a file name relative to another file; returns "" if it does not exist."""
     resolver = Ar.GetResolver()
     return str(resolver.Resolve(beside(name, anchor)))
 
 
 def beside(name: str, anchor: str) -> str:
-    """What a name in a file means: relative to that file unless it is absolute."""
+    """Returns the path that a name in a file refers to, relative to that file unless absolute."""
     if os.path.isabs(name) or "://" in name:
         return mapped(name, own_maps())
     if Ar.IsPackageRelativePath(anchor):
@@ -180,14 +181,14 @@ def beside(name: str, anchor: str) -> str:
 
 
 def image_file(value: Any, document: str) -> tuple[str, bool]:
-    """The file that an element of type filename means, and whether ``fileprefix`` was left out.
+    """Returns the file of a filename element, and whether ``fileprefix`` was ignored.
+
+    Names are relative to the document, else to the file that contains them. A prefix is ignored if
+    the file exists only without it.
 
     Args:
         value: The element.
-        document: The file that was asked for; ``value`` may be from one that it includes.
-
-    A name counts from the document, else from the file that it is written in. A prefix that leads
-    nowhere is left out where the name alone leads to a file.
+        document: The requested file; ``value`` may come from a file that it includes.
     """
     full, plain = value.getResolvedValueString(), value.getValueString()
     anchors = [document]

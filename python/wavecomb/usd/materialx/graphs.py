@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes and node graphs as prims."""
+"""Writes MaterialX nodes and node graphs as prims."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from wavecomb.usd.materialx.files import Document
 from wavecomb.usd.materialx.prims import TERMINALS, Prims, child, connect, valid
 
 GRAPHS = Sdf.Path("/MaterialX/NodeGraphs")
-"""Where node graphs are, and nodes of the document that are in no graph."""
+"""Parent of node graphs, and of nodes of the document that are not in a graph."""
 
 MAX_EXPANDED = 4096
-"""Nodes of a graph with all graphs in it, above which nodes of a document that are graphs are
-instances: a document of some lines may nest graphs into billions of nodes."""
+"""Number of expanded nodes of a graph above which nested graphs become USD instances.
+
+A short document may nest graphs into billions of nodes.
+"""
 
 _SMALL = 32
-"""Nodes of graphs that are no instances even then."""
+"""Graphs with at most this many nodes are never instanced."""
 
 
 def definition(node: Any) -> Any:
-    """The definition of a node, None where it has none: the one that fits best."""
+    """Returns the best matching definition of a node, or None."""
     found = node.getNodeDef()
     return found if found is not None else node.getNodeDef("", True)
 
 
 def implementation(document: Document, nodedef: Any) -> Any:
-    """The node graph that a definition of the document's own stands for, else None."""
+    """Returns the node graph that implements a definition of the document itself, else None."""
     import MaterialX as mx
 
     if nodedef is None or nodedef.getName() not in document.definitions:
@@ -38,14 +40,14 @@ def implementation(document: Document, nodedef: Any) -> Any:
 
 
 def output_name(node: Any, wanted: str) -> str:
-    """The output of a node that a connection means."""
+    """Returns the name of the node output that a connection refers to."""
     nodedef = definition(node)
     names = [] if nodedef is None else [output.getName() for output in nodedef.getActiveOutputs()]
     return wanted if wanted and (wanted in names or not names) else next(iter(names), "out")
 
 
 def output_path(graph: Sdf.Path, node: Any, wanted: str) -> Sdf.Path:
-    """The output of a node in a graph that a connection means."""
+    """Returns the path of the node output that a connection refers to."""
     return _port(child(graph, node.getName()), "outputs", output_name(node, wanted))
 
 
@@ -54,12 +56,12 @@ def _port(prim: Sdf.Path, kind: str, name: str) -> Sdf.Path:
 
 
 def is_closed(graph: Any) -> bool:
-    """Whether no input of a node graph comes from a node outside."""
+    """Returns whether no input of a node graph is connected to a node outside."""
     return not any(item.getNodeName() or item.getNodeGraphString() for item in graph.getInputs())
 
 
 class Graphs:
-    """Writes node graphs, each once."""
+    """Writer of node graphs; each is written once."""
 
     def __init__(self, document: Document, prims: Prims) -> None:
         self._document = document
@@ -68,14 +70,14 @@ class Graphs:
         self._sizes: dict[str, int] = {}
 
     def all(self) -> None:
-        """All node graphs of the document, and the nodes beside them where there are any."""
+        """Writes all node graphs of the document, and its nodes outside of graphs."""
         for graph in self._document.graphs:
             self.graph(graph)
         if self._loose():
             self.loose()
 
     def graph(self, graph: Any) -> Sdf.Path:
-        """The prim of a node graph: named by the definition that it implements, if any."""
+        """Writes a node graph, named after the definition that it implements if there is one."""
         nodedef = graph.getNodeDef()
         path = child(GRAPHS, (graph if nodedef is None else nodedef).getName())
         if path in self._written:
@@ -85,7 +87,7 @@ class Graphs:
         for owner in (nodedef, graph):
             for item in [] if owner is None else owner.getActiveInputs():
                 self._give(self._prims.port(prim, "inputs", item.getName(), item.getType()), item)
-                # What feeds a graph is beside it.
+                # Sources of a graph's inputs are its siblings.
                 self._join(prim, item, GRAPHS, self._document.root)
         for node in graph.getNodes():
             self._node(node, path, graph)
@@ -95,7 +97,7 @@ class Graphs:
         return path
 
     def loose(self) -> Sdf.Path:
-        """The prim above all nodes of the document that are in no graph."""
+        """Writes the parent of all nodes of the document that are not in a graph."""
         if GRAPHS not in self._written:
             self._written.add(GRAPHS)
             self._prims.define(GRAPHS)
@@ -104,7 +106,7 @@ class Graphs:
         return GRAPHS
 
     def _loose(self) -> list[Any]:
-        """Nodes of the document but for materials, and for shaders that only these use."""
+        """Returns nodes outside of graphs, except materials and shaders that only materials use."""
         nodes = self._document.root.getNodes()
         used = {
             item.getNodeName()
@@ -130,7 +132,7 @@ class Graphs:
             self._prims.port(prim, "outputs", output.getName(), output.getType())
 
     def instance(self, node: Any, path: Sdf.Path) -> Sdf.PrimSpec:
-        """The prim of a node: a shader, or the node graph that its definition stands for."""
+        """Writes the prim of a node: a shader, or an instance of its node graph."""
         nodedef = definition(node)
         inside = implementation(self._document, nodedef)
         if inside is not None:
@@ -146,14 +148,15 @@ class Graphs:
         return prim
 
     def _is_deep(self) -> bool:
-        """Whether a graph of the document has too many nodes to be a prim for each."""
+        """Returns whether a graph of the document has too many nodes to write a prim for each."""
         return any(self._nodes_in(graph) > MAX_EXPANDED for graph in self._document.graphs)
 
     def _nodes_in(self, graph: Any) -> int:
-        """Nodes of a graph with all that the graphs of its nodes hold."""
+        """Returns the number of nodes of a graph, including nested graphs."""
         name = graph.getName()
         if name not in self._sizes:
-            self._sizes[name] = 0  # of a graph that holds itself
+            # This ends the recursion for a graph that contains itself.
+            self._sizes[name] = 0
             total = 0
             for node in graph.getNodes():
                 inside = implementation(self._document, definition(node))
@@ -162,7 +165,7 @@ class Graphs:
         return self._sizes[name]
 
     def graph_of(self, nodedef: Any, inside: Any) -> Sdf.Path:
-        """The prim of the node graph that implements a definition."""
+        """Writes the node graph that implements a definition."""
         path = self.graph(inside)
         prim = self._prims.define(path)
         for item in nodedef.getActiveInputs():
@@ -187,13 +190,13 @@ class Graphs:
             self._connect(port, item, graph, container)
 
     def _connect(self, port: Sdf.AttributeSpec, item: Any, graph: Sdf.Path, container: Any) -> None:
-        """Connects an input or output to what its element names in a container."""
+        """Connects an input or output to the source that its element names."""
         source = self.source(item, graph, container)
         if source is not None:
             connect(port, source)
 
     def source(self, item: Any, graph: Sdf.Path, container: Any) -> Sdf.Path | None:
-        """The output that an element of a container is fed by; ``graph``: the container's prim."""
+        """Returns the source path of an element; ``graph`` is the prim of its container."""
         wanted = item.getOutputString()
         if item.getNodeName():
             node = container.getNode(item.getNodeName())
@@ -216,7 +219,7 @@ class Graphs:
 
 
 def _outputs_of(element: Any) -> list[Any]:
-    """The outputs of a node, a definition or a graph."""
+    """Returns the outputs of a node, a definition or a graph."""
     import MaterialX as mx
 
     if element.isA(mx.Node):

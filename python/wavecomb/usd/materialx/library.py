@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The definitions that come with MaterialX, and its node graphs made flat.
+"""MaterialX's standard definitions, with their node graphs flattened.
 
-The library is read once for the process, when something first asks for it; a definition is made
-flat once.
+The library is read once per process on first use; each definition is flattened once.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ WIDTHS = {
     "float": 1, "integer": 1, "boolean": 1, "vector2": 2, "vector3": 3, "color3": 3, "vector4": 4,
     "color4": 4, "matrix33": 9, "matrix44": 16,
 }  # fmt: skip
-"""Components of a value by its MaterialX type."""
+"""Number of components of a value by its MaterialX type."""
 
 _reading = threading.RLock()
 
@@ -32,24 +31,24 @@ def _read() -> Any:
 
 
 def library() -> Any:
-    """The document of the node definitions that come with MaterialX."""
+    """Returns the document of MaterialX's standard node definitions."""
     with _reading:
         return _read()
 
 
 @dataclass(frozen=True)
 class Feed:
-    """What feeds an input of a node, or an output of a graph: one of three.
+    """Source of a node input or graph output: a value, an interface input or a node output.
 
     Attributes:
-        type: MaterialX's name of its type.
-        value: As the library writes it; "" where there is none.
-        interface: An input of the graph.
-        node: A node of the graph.
-        output: Of that node; "" where it has one only.
-        place: Where no other is given: position, normal, tangent, bitangent, viewdirection or
+        type: Name of its MaterialX type.
+        value: Text of the value; "" if there is none.
+        interface: Name of an input of the graph.
+        node: Name of a node of the graph.
+        output: Output of that node; "" if it has only one.
+        place: Default geometric property: position, normal, tangent, bitangent, viewdirection or
             texcoord.
-        space: Of that place: object or world.
+        space: Space of that property: object or world.
     """
 
     type: str
@@ -66,10 +65,10 @@ class Inner:
     """A node of a flat graph.
 
     Attributes:
-        category: Without types.
+        category: Category without types.
         identifier: Name of its definition.
-        inputs: What feeds those that the graph gives something.
-        outputs: Their types by name.
+        inputs: Sources of the inputs that the graph sets.
+        outputs: Types of outputs by name.
     """
 
     category: str
@@ -80,13 +79,13 @@ class Inner:
 
 @dataclass(frozen=True)
 class Definition:
-    """A node of the library.
+    """A node definition of the library.
 
     Attributes:
-        identifier: Its name, ``ND_...``.
-        category: Of its nodes, without types.
-        inputs: What its inputs are where nobody gives them a value.
-        outputs: Their types by name.
+        identifier: Name, such as ``ND_mix_color3``.
+        category: Category of its nodes, without types.
+        inputs: Default sources of inputs.
+        outputs: Types of outputs by name.
     """
 
     identifier: str
@@ -97,12 +96,12 @@ class Definition:
 
 @dataclass(frozen=True)
 class FlatGraph:
-    """A node graph without node graphs in it.
+    """A node graph without nested graphs.
 
     Attributes:
-        definition: Which it implements.
-        nodes: By name, each after those that feed it.
-        results: What feeds the outputs, by name.
+        definition: Definition that it implements.
+        nodes: Nodes by name in evaluation order.
+        results: Sources of the outputs by name.
     """
 
     definition: Definition
@@ -112,7 +111,7 @@ class FlatGraph:
 
 @functools.cache
 def definition_of(identifier: str) -> Definition | None:
-    """The definition of that name; None where the library has none."""
+    """Returns the definition with this name; None if the library has none."""
     with _reading:
         nodedef = library().getNodeDef(identifier)
         if nodedef is None:
@@ -123,14 +122,14 @@ def definition_of(identifier: str) -> Definition | None:
 
 @functools.cache
 def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None:
-    """The node graph that a definition stands for, made flat by MaterialX.
+    """Returns the flattened node graph that implements a definition.
 
     Args:
         identifier: Name of the definition.
-        primitives: Categories of nodes that are left as they are, frozen.
+        primitives: Frozen set of node categories that are not expanded.
 
     Returns:
-        None where the library implements the node in code, or has none of that name.
+        The graph; None if the library implements the node in code or does not know it.
     """
     import MaterialX as mx
 
@@ -142,8 +141,8 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
         found = nodedef.getImplementation()
         if found is None or not found.isA(mx.NodeGraph):
             return None
-        # The graph's own content, in a document that may be changed. A graph in it that stands
-        # for no definition keeps what its nodes read of its interface.
+        # Copy the graph to a document that may be modified. Nested graphs that do not implement a
+        # definition keep their references to interface inputs.
         document = mx.createDocument()
         document.setDataLibrary(library())
         graph = document.addNodeGraph("flat")
@@ -156,7 +155,7 @@ def flat_graph(identifier: str, primitives: Collection[str]) -> FlatGraph | None
 
 
 def _ordered(nodes: dict[str, Inner]) -> dict[str, Inner]:
-    """Nodes, each after those that feed it."""
+    """Returns the nodes in evaluation order."""
     done: dict[str, Inner] = {}
     stack = [(name, False) for name in reversed(nodes)]
     while stack:

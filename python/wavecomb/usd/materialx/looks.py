@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX materials and looks as prims: shaders and what feeds them, who wears which material.
+"""Writes MaterialX materials and looks as prims, with their shaders and material assignments.
 
-Geometry is named below ``/MaterialX/Collections``: who references the look root in place of a model
-has these paths below that model's. Each look is a variant ``LookVariant`` of ``/ModelRoot``.
+Geometry paths are written below ``/MaterialX/Collections``; a reference to a look in place of a
+model maps them to paths below that model. Each look is a variant of ``LookVariant`` on
+``/ModelRoot``.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ MODEL = Sdf.Path("/ModelRoot")
 
 
 def write_looks(document: Document, layer: Sdf.Layer, tell: Tell) -> None:
-    """Adds the looks of a document to the layer that has its materials."""
+    """Adds the looks of a document to the layer that contains its materials."""
     looks = document.root.getLooks()
     if not looks:
         return
@@ -42,7 +43,7 @@ def write_looks(document: Document, layer: Sdf.Layer, tell: Tell) -> None:
 
 
 class _Looks:
-    """Writes collections and looks, each once."""
+    """Writer of collections and looks; each is written once."""
 
     def __init__(self, root: Any, stage: Usd.Stage, tell: Tell) -> None:
         self._root = root
@@ -54,7 +55,10 @@ class _Looks:
         self._variants = variants
 
     def collection(self, element: Any, above: tuple[str, ...]) -> str:
-        """The name of a collection's instance; ``above``: those that include it."""
+        """Writes a collection and returns its instance name.
+
+        ``above`` lists the including collections.
+        """
         name = element.getName()
         if name in self._collections:
             return self._collections[name]
@@ -77,7 +81,7 @@ class _Looks:
         return Usd.CollectionAPI.Apply(self._stage.DefinePrim(COLLECTIONS), name)
 
     def _geometry(self, element: Any, prefix: str, text: str) -> list[Sdf.Path]:
-        """The prims that a list of geometry names, without those that are patterns."""
+        """Returns the prim paths of a geometry list; reports and skips patterns."""
         found = []
         for word in (part.strip() for part in text.split(",")):
             name = prefix + word
@@ -90,7 +94,7 @@ class _Looks:
         return found
 
     def _assigned(self, assign: Any) -> str | None:
-        """The name of the collection that a material is assigned to; None: to all of the model."""
+        """Returns the collection that a material is assigned to; None means the whole model."""
         if assign.getCollectionString():
             collection = self._root.getCollection(assign.getCollectionString())
             if collection is not None:
@@ -111,7 +115,7 @@ class _Looks:
         return self._collections[key]
 
     def look(self, look: Any, above: tuple[str, ...]) -> Sdf.Path:
-        """The prim of a look; ``above``: those that inherit it."""
+        """Writes a look; ``above`` lists the looks that inherit it."""
         import MaterialX as mx
 
         name = look.getName()
@@ -144,7 +148,7 @@ class _Looks:
     def _bind(
         self, look: Any, item: Any, binding: UsdShade.MaterialBindingAPI, collection: str | None
     ) -> Usd.Relationship | None:
-        """Assigns a material to a collection of a look, or to all of it."""
+        """Binds a material to a collection of a look, or to the whole look."""
         material = child(MATERIALS, item.getMaterial())
         if not self._stage.GetPrimAtPath(material):
             self._tell(item, f"MaterialX material {item.getMaterial()} is not there (not assigned)")
@@ -171,7 +175,7 @@ class _Looks:
         return binding.GetCollectionBindingRel(name)
 
     def _variant(self, material: Sdf.Path, variant_set: str, variant: str) -> bool:
-        """Makes a variant of a material: other values of its inputs."""
+        """Writes a variant of a material with other input values; returns whether it exists."""
         found = self._root.getVariantSet(variant_set)
         element = None if found is None else found.getVariant(variant)
         if element is None:
@@ -201,10 +205,10 @@ SHADERS = Sdf.Path("/MaterialX/Shaders")
 
 
 class Materials:
-    """Writes materials.
+    """Writer of materials.
 
-    The inputs of its shaders are inputs of the material, so that layers above can change them; what
-    feeds a shader is referenced below the material. Shaders themselves are in ``SHADERS``.
+    Shader inputs become inputs of the material, so that stronger layers can change them. Sources of
+    a shader are referenced below the material. Shaders are in ``SHADERS``.
     """
 
     def __init__(self, document: Document, prims: Prims, graphs: Graphs) -> None:
@@ -213,7 +217,7 @@ class Materials:
         self._graphs = graphs
 
     def all(self) -> None:
-        """All materials of the document."""
+        """Writes all materials of the document."""
         import MaterialX as mx
 
         for material in self._document.root.getMaterialNodes():
@@ -232,7 +236,7 @@ class Materials:
                     connect(output, source)
 
     def _shader(self, material: Sdf.PrimSpec, shader: Any, kind: str) -> Sdf.Path:
-        """Writes a shader below a material; gives its output."""
+        """Writes a shader below a material; returns the path of its output."""
         import MaterialX as mx
 
         container = shader.getParent()
@@ -267,13 +271,13 @@ class Materials:
     def _interface(
         self, material: Sdf.PrimSpec, shader: Sdf.PrimSpec, item: Any
     ) -> Sdf.AttributeSpec:
-        """The input of a material that a shader's comes from."""
+        """Connects a shader input to an input of the material and returns the latter."""
         port = self._prims.port(material, "inputs", item.getName(), item.getType())
         connect(self._prims.port(shader, "inputs", item.getName(), item.getType()), port.path)
         return port
 
     def _source(self, material: Sdf.Path, item: Any) -> Sdf.Path | None:
-        """What feeds the input of a shader: of the graphs, as they are below the material."""
+        """Returns the source of a shader input, as a path below the material."""
         source = self._graphs.source(item, GRAPHS, self._document.root)
         if source is None:
             return None
@@ -286,7 +290,7 @@ class Materials:
         return source.ReplacePrefix(GRAPHS, below)
 
     def _below(self, material: Sdf.Path, graph: Any) -> Sdf.Path:
-        """A node graph below a material; with all the others where it is fed by one of them."""
+        """References a node graph below a material, with its siblings if they feed it."""
         path = self._graphs.graph(graph)
         if is_closed(graph):
             below = child(material, path.name)

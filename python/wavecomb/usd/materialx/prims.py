@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Specs of prims, inputs and outputs in a layer that stands for a MaterialX document."""
+"""Creates prim, input and output specs in the layer of a MaterialX document."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wavecomb.usd.materialx.files import image_file
 from wavecomb.usd.stage.report import LoadReport
 
 Tell = Callable[[Any, str], None]
-"""Takes an element of the document and what there is to say of it."""
+"""Callback that receives a document element and a message about it."""
 
 TERMINALS = {
     "surfaceshader": "surface",
@@ -21,30 +21,30 @@ TERMINALS = {
     "volumeshader": "volume",
     "lightshader": "light",
 }
-"""Outputs of materials by the type of shader that they are for."""
+"""Material outputs by MaterialX shader type."""
 
 _PLAIN_SPACES = ("", "none", "lin_rec709", "lin_rec709_scene")
-"""Colour spaces of values that need not be said."""
+"""Colour spaces that are not written, since they are the default."""
 
 
 def valid(name: str) -> str:
-    """A MaterialX name as USD can have it; namespaces are set off by two underscores."""
+    """Converts a MaterialX name to a valid USD name; replaces ``:`` by two underscores."""
     return str(Tf.MakeValidIdentifier(name.replace(":", "__")))
 
 
 def child(path: Sdf.Path, name: str) -> Sdf.Path:
-    """The path of a prim below another, by its MaterialX name."""
+    """Returns the path of a child prim with a MaterialX name."""
     return path.AppendChild(valid(name))
 
 
 class Prims:
-    """Writes into a layer.
+    """Writer of prims into a layer.
 
     Attributes:
-        layer: That is written.
-        file: The document's; names of images count from it.
-        tell: Is told what cannot be translated.
-        report: Is told what was chosen.
+        layer: The layer.
+        file: File of the document, to which image names are relative.
+        tell: Receives elements that cannot be translated.
+        report: Receives notes.
     """
 
     def __init__(self, layer: Sdf.Layer, file: str, tell: Tell, report: LoadReport) -> None:
@@ -54,7 +54,7 @@ class Prims:
         self.tell = tell
 
     def define(self, path: Sdf.Path, kind: str = "") -> Sdf.PrimSpec:
-        """A prim of that type, there or new, and all above it."""
+        """Defines a prim with a type, and its ancestors; returns it if it exists."""
         spec = Sdf.CreatePrimInLayer(self.layer, path)
         for prefix in path.GetPrefixes():
             self.layer.GetPrimAtPath(prefix).specifier = Sdf.SpecifierDef
@@ -63,7 +63,7 @@ class Prims:
         return spec
 
     def refer(self, path: Sdf.Path, target: Sdf.Path) -> Sdf.PrimSpec:
-        """A prim that is another one of this layer; once, however often asked."""
+        """Defines a prim that references another prim of the layer, at most once."""
         spec = self.define(path)
         reference = Sdf.Reference("", target)
         if reference not in list(spec.referenceList.prependedItems):
@@ -71,13 +71,13 @@ class Prims:
         return spec
 
     def port(self, prim: Sdf.PrimSpec, kind: str, name: str, type_name: str) -> Sdf.AttributeSpec:
-        """An input or output.
+        """Returns an input or output of a prim; creates it if it does not exist.
 
         Args:
-            prim: Which gets it, unless it has it.
+            prim: The prim.
             kind: "inputs" or "outputs".
-            name: Its MaterialX name.
-            type_name: Its MaterialX type.
+            name: MaterialX name.
+            type_name: MaterialX type.
         """
         full = f"{kind}:{valid(name)}"
         known = prim.attributes.get(full)
@@ -90,7 +90,7 @@ class Prims:
         return spec
 
     def identify(self, prim: Sdf.PrimSpec, identifier: str) -> None:
-        """Writes ``info:id``."""
+        """Writes ``info:id`` unless it exists."""
         if "info:id" not in prim.attributes:
             Sdf.AttributeSpec(
                 prim, "info:id", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform
@@ -102,7 +102,7 @@ class Prims:
         Args:
             port: The input.
             element: The MaterialX input.
-            makes_colour: Of filenames: whether colours are read from the file.
+            makes_colour: For filenames, whether colours are read from the file.
         """
         kind, text = element.getType(), element.getValueString()
         if not text:
@@ -115,7 +115,7 @@ class Prims:
             text, is_bare = image_file(element, self.file)
             if is_bare:
                 self.report.note("MaterialX fileprefix leads nowhere (left out)", self.file)
-            # Linear Rec. 709 of a whole document says nothing of its images, to OpenUSD either.
+            # Like OpenUSD, do not apply a document-wide linear Rec. 709 to images.
             is_said = space not in _PLAIN_SPACES or element.hasColorSpace()
             if makes_colour and is_said:
                 port.SetInfo("colorSpace", "raw" if space == "none" else space)
@@ -130,7 +130,7 @@ class Prims:
 
 
 def connect(port: Sdf.AttributeSpec, source: Sdf.Path) -> None:
-    """Connects an input or output to another one."""
+    """Connects an input or output to a source."""
     port.connectionPathList.explicitItems = [source]
 
 
@@ -206,16 +206,16 @@ _TYPES: dict[str, tuple[Sdf.ValueTypeName, Callable[[str], Any]]] = {
 
 
 def usd_type(name: str) -> Sdf.ValueTypeName | None:
-    """The USD type of a MaterialX type; None where it has none: tokens stand for such."""
+    """Returns the USD type of a MaterialX type; None if there is none, which becomes a token."""
     known = _TYPES.get(name)
     return None if known is None else known[0]
 
 
 def usd_value(text: str, name: str) -> Any:
-    """A value of a MaterialX type.
+    """Parses a value of a MaterialX type.
 
     Raises:
-        ValueError: The text is none.
+        ValueError: The text is invalid.
     """
     known = _TYPES.get(name)
     if known is None:

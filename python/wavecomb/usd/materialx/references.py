@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""References, payloads and sublayers to MaterialX files, which usd-core has no reader for.
+"""Supports references, payloads and sublayers to MaterialX files, which usd-core cannot read.
 
-USD opens no layer that is none of its own formats. So the layers that name a .mtlx file get another
-name for it, in memory only: that of a layer it was translated to. Why so is told in
-docs/decisions/materialx-layers.md.
+USD opens layers only in its built-in formats. Therefore layers that name a .mtlx file are changed
+in memory to name a translated layer instead. See docs/decisions/materialx-layers.md for the
+reasons.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.stage.unread import unread_mtlx
 
 MAX_ROUNDS = 16
-"""Times that a stage is looked through: what one file brings may ask for others."""
+"""Most passes over a stage, since a translated file may refer to further files."""
 
 
 @dataclass
 class _Translation:
-    """What a file was translated to.
+    """Result of translating a file.
 
     Attributes:
-        stamp: Of the file as it was.
-        layer: None where it cannot be read.
-        error: Why not.
-        report: What was left out or chosen.
+        stamp: Stamp of the file when it was read.
+        layer: The translated layer; None if the file is unreadable.
+        error: Reason why it is unreadable.
+        report: Warnings and notes of the translation.
     """
 
     stamp: object
@@ -46,13 +46,13 @@ class _Translation:
 
 
 _translations: dict[str, _Translation] = {}
-"""By file. Held as long as the process: layers of open stages name what is in it."""
+"""Translations by file. They are never released, since layers of open stages refer to them."""
 
 _lock = threading.Lock()
 
 
 def translated_files(stage: Usd.Stage) -> list[str]:
-    """Files that a stage sees translated, or that its layers name elsewhere (in other variants)."""
+    """Returns MaterialX files that a stage uses or that its layers name in any variant."""
     layers = stage.GetUsedLayers(True)
     named = {layer.identifier for layer in layers}
     for layer in layers:
@@ -65,15 +65,15 @@ def translated_files(stage: Usd.Stage) -> list[str]:
 
 
 def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
-    """Makes a stage see the MaterialX files that its layers name.
+    """Makes a stage use the MaterialX files that its layers name.
 
-    Those layers are changed in memory, and cannot be saved from then on. What cannot be read stays
-    missing; ``tell`` says so. Costs next to nothing where no such file is missing.
+    Changes the layers in memory, which then can no longer be saved. Unreadable files stay missing;
+    ``tell`` reports them. The call is fast if no such file is missing.
 
     Args:
         stage: The stage.
-        everywhere: Also where variants are not selected, so that selecting them later, on whatever
-            thread, changes no layer. Looks through all layers.
+        everywhere: Whether to include unselected variants, which takes a pass over all layers.
+            Selecting them later, on any thread, then changes no layer.
     """
     tried: set[tuple[str, str]] = set()
     for turn in range(MAX_ROUNDS):
@@ -90,10 +90,10 @@ def resolve(stage: Usd.Stage, *, everywhere: bool = False) -> None:
 
 
 def reload(stage: Usd.Stage) -> None:
-    """Reads the files of a stage again that changed, MaterialX files among them."""
+    """Reloads changed files of a stage, including MaterialX files."""
     with _lock:
         kept = [t.layer for t in _translations.values() if t.layer is not None]
-    # USD takes what has no file for empty.
+    # USD would reload layers without a file as empty layers.
     copies = [(layer, Sdf.Layer.CreateAnonymous("kept.usda")) for layer in kept]
     for layer, copy in copies:
         copy.TransferContent(layer)
@@ -105,7 +105,7 @@ def reload(stage: Usd.Stage) -> None:
 
 
 def tell(stage: Usd.Stage, report: LoadReport) -> None:
-    """Says which MaterialX files are missing from a stage, and what of others was left out."""
+    """Reports MaterialX files that are missing, and problems of translated ones."""
     for error, named in unread_mtlx(stage):
         known = next((t for file, t in _translations.items() if _same(file, named)), None)
         why = known.error if known is not None and known.error else _why(named)
@@ -130,7 +130,7 @@ def _why(named: str) -> str:
 
 
 def _changes(stage: Usd.Stage, tried: set[tuple[str, str]]) -> list[tuple[Sdf.Layer, str, str]]:
-    """What layers have to name in place of MaterialX files: (layer, name, other name)."""
+    """Returns the names to replace in layers: (layer, MaterialX name, translated layer)."""
     changes = []
     for layer in stage.GetUsedLayers(False):
         for name in layer.GetCompositionAssetDependencies():
@@ -149,7 +149,7 @@ def _changes(stage: Usd.Stage, tried: set[tuple[str, str]]) -> list[tuple[Sdf.La
 
 
 def _translated(file: str) -> _Translation:
-    """The layer of a file; the one there is, with new content where the file changed."""
+    """Returns the translation of a file; updates its layer if the file changed."""
     stamp = _stamp(file)
     known = _translations.get(file)
     if known is not None and known.stamp == stamp:
@@ -168,7 +168,7 @@ def _translated(file: str) -> _Translation:
 
 
 def _stamp(file: str) -> object:
-    """What changes with a file; of one that includes others, or is in a package, the time."""
+    """Returns modification time and size of a file, or of the package that contains it."""
     outer = Ar.SplitPackageRelativePathOuter(file)[0] or file
     try:
         status = os.stat(outer)
@@ -181,15 +181,15 @@ ROOT = Sdf.Path("/MaterialX")
 
 
 def translate(file: str) -> tuple[Sdf.Layer, LoadReport]:
-    """The layer of a file, and what could not be translated.
+    """Translates a file to a layer; returns it with a report of what was not translated.
 
-    Names of files in the layer are absolute, so that it can be anywhere.
+    File names in the layer are absolute, so that it can be used anywhere.
 
     Args:
-        file: As Ar resolved it.
+        file: Path as resolved by Ar.
 
     Raises:
-        MtlxError: It cannot be read.
+        MtlxError: The file cannot be read.
     """
     document = read_document(file)
     report = LoadReport()
@@ -207,6 +207,7 @@ def translate(file: str) -> tuple[Sdf.Layer, LoadReport]:
             Materials(document, prims, graphs).all()
             graphs.all()
         write_looks(document, layer, tell)
-    except Exception as error:  # MaterialX's bindings raise types of their own
+    # The MaterialX bindings raise library-specific exception types.
+    except Exception as error:
         raise MtlxError(" ".join(str(error).split())[:200]) from None
     return layer, report

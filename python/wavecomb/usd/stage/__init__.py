@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way in: a USD file to a scene."""
+"""Opens USD stages and reads them into scenes."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What render settings ask for, as plain data."""
+"""Values of render settings as plain data."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ CONFORMS = (
     "adjustApertureHeight",
     "adjustPixelAspectRatio",
 )
-"""UsdRender's aspectRatioConformPolicy."""
+"""Values of UsdRender's aspectRatioConformPolicy."""
 
 
 @dataclass(frozen=True)
 class RenderChoice:
-    """What render settings and one of their products ask for; None: nothing is authored.
+    """Values of render settings and one of their products; None means that nothing is authored.
 
     Attributes:
         settings: Path of the RenderSettings.
         product: Path of the RenderProduct.
         camera: Path of the camera.
-        resolution: Width and height.
-        pixel_aspect: Width of a pixel / its height.
+        resolution: Width and height in pixels.
+        pixel_aspect: Width of a pixel divided by its height.
         conform: One of ``CONFORMS``.
-        data_window: (xmin, ymin, xmax, ymax), 0 to 1 over the picture, y up.
-        purposes: Of the geometry.
-        material_purposes: Of material bindings, the first that a prim has counts.
-        motion_blur: False: none is wanted.
-        depth_of_field: Likewise.
-        aovs: Layers, as ``--aov`` takes them.
-        output: Name of the file.
+        data_window: (xmin, ymin, xmax, ymax) from 0 to 1 over the image, y up.
+        purposes: Purposes of the geometry that is rendered.
+        material_purposes: Purposes of material bindings in order of preference.
+        motion_blur: Whether motion blur is enabled.
+        depth_of_field: Whether depth of field is enabled.
+        aovs: Names of layers in the syntax of ``--aov``.
+        output: Name of the image file.
         start: Start time code of the stage.
     """
 
@@ -56,16 +56,16 @@ class RenderChoice:
 
     @property
     def first_frame(self) -> float:
-        """The frame that is rendered unless another is chosen; 1 where the stage names none."""
+        """Frame that is rendered by default; 1 if the stage has no start time code."""
         return 1.0 if self.start is None else self.start
 
     def region(self, width: int, height: int) -> tuple[int, int, int, int] | None:
-        """Pixels whose centres are in the data window: x0, y0, x1, y1, y down, the end excluded.
+        """Returns the pixels whose centres are in the data window as x0, y0, x1, y1.
 
-        None where that is all of them.
+        The y axis points down, and the end is excluded. Returns None if these are all pixels.
 
         Raises:
-            WavecombError: It holds no pixel.
+            WavecombError: The window contains no pixel.
         """
         if self.data_window is None:
             return None
@@ -76,6 +76,6 @@ class RenderChoice:
         if x0 >= x1 or y0 >= y1:
             raise WavecombError(
                 f"{self.product or self.settings}: dataWindowNDC holds no pixel of the picture; "
-                "mend it or give --region"
+                "fix it or give --region"
             )
         return None if (x0, y0, x1, y1) == (0, 0, width, height) else (x0, y0, x1, y1)

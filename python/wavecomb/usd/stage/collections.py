@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Membership of USD collections, whether by relationships or by a ``membershipExpression``."""
+"""Membership of USD collections, by relationships or by a ``membershipExpression``."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from wavecomb.usd.stage.diagnostics import commentary
 from wavecomb.usd.stage.report import LoadReport
 
 Rules = dict[str, str]
-"""A rule for each path: exclude, explicit (that path alone) or expand (and all below it)."""
+"""Rule for each path: exclude, explicit (only that path) or expand (the path and all below it)."""
 
 MOST_PRIMS = 1 << 20
-"""Prims that an expression is evaluated at: instances in instances may mean billions."""
+"""Most prims at which an expression is evaluated; nested instancing may create billions."""
 
 _RULES = {
     Usd.Tokens.exclude: "exclude",
@@ -23,25 +23,26 @@ _RULES = {
 
 
 class Collections:
-    """Reads collections of a stage as rules for paths."""
+    """Reader of a stage's collections as rules for paths."""
 
     def __init__(self, report: LoadReport) -> None:
         self._report = report
         self._by_expression: dict[str, Rules | None] = {}
 
     def rules(self, prim: Usd.Prim, name: str) -> Rules | None:
-        """The rules of a collection; None means that it has all prims.
+        """Returns the rules of a collection; None means that it includes all prims.
 
         Args:
-            prim: The prim that has the collection.
-            name: Its instance name, such as lightLink. Where it is not authored, it has all prims.
+            prim: The prim with the collection.
+            name: Instance name, such as lightLink. A collection that is not authored includes all
+                prims.
         """
         if not _is_authored(prim, name):
             return None
         collection = Usd.CollectionAPI(prim, name)
         try:
             query = collection.ComputeMembershipQuery()
-            # Of an expression the map is empty, and of relationships it holds all there is.
+            # The map is empty for an expression and complete for relationships.
             if _has_expression(collection) and not query.GetAsPathExpansionRuleMap():
                 return self._of_expression(collection, query)
         except Tf.ErrorException as error:
@@ -55,7 +56,7 @@ class Collections:
             if rule in _RULES
         }
         root = prim.GetAttribute(f"collection:{name}:includeRoot")
-        # Without the API applied there is no fallback: it is true for lights.
+        # Without the applied API schema, includeRoot has no fallback; for lights it is true.
         if not root or not root.HasAuthoredValue() or root.Get():
             found.setdefault("/", "expand")
         if all(rule != "exclude" for rule in found.values()) and found.get("/") == "expand":
@@ -77,7 +78,7 @@ class Collections:
     def _warn_of_ignored(
         self, collection: Usd.CollectionAPI, query: Usd.UsdCollectionMembershipQuery, name: str
     ) -> None:
-        """Warns of expressions that OpenUSD leaves out of a collection."""
+        """Warns of expressions that OpenUSD ignores in a collection."""
         prim = collection.GetPrim()
         if _has_expression(collection):
             what = f"{name}: its membershipExpression has no effect beside includes, excludes or "
@@ -106,11 +107,10 @@ def _is_authored(prim: Usd.Prim, name: str) -> bool:
 def _evaluated(
     stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery
 ) -> tuple[Rules | None, bool]:
-    """The members of a query by evaluation at each prim: a rule wherever membership changes.
+    """Evaluates a query at each prim and returns a rule for each change of membership.
 
-    Then whether all prims were asked.
-
-    A point instancer counts with all that it draws: its prototypes are not asked.
+    The second result says whether all prims were evaluated. A point instancer is a member with all
+    of its instances, so its prototypes are not evaluated.
     """
     rules: Rules = {}
     member: dict[Sdf.Path, bool] = {}
@@ -119,7 +119,8 @@ def _evaluated(
     for count, prim in enumerate(walk):
         if count >= MOST_PRIMS:
             return rules, False
-        if prim.IsA(UsdShade.NodeGraph):  # a material, which is nobody's member
+        # Materials are never members.
+        if prim.IsA(UsdShade.NodeGraph):
             walk.PruneChildren()
             continue
         path = prim.GetPath()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stage, frame, options and results that all readers of one load share."""
+"""Stage, frame, options and results that all readers of one load share."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 BINDING_PURPOSES = ("full", "preview")
-"""Purposes of material bindings where render settings name none, the preferred one first."""
+"""Default purposes of material bindings, in order of preference."""
 
 
 @dataclass
@@ -26,16 +26,16 @@ class LoadContext:
 
     Attributes:
         stage: The stage.
-        time: The frame.
-        builder: Receives the scene.
-        report: Receives notes, warnings and what is not supported.
+        time: Time code of the frame.
+        builder: Scene builder that receives the geometry, materials and lights.
+        report: Collects notes, warnings and unsupported features.
         options: Options of the load.
-        motion: Motion while the shutter is open; None means that nothing is blurred.
-        origin: World position that the scene is built around.
-        purposes: Purposes of the geometry that is drawn.
-        binding_purposes: Purposes of material bindings, the preferred one first.
-        framed: Directions (k, 3) in which a view asks how far the world reaches; None where a
-            camera prim gives the view.
+        motion: The shutter; None means no motion blur.
+        origin: World position that becomes the origin of the scene.
+        purposes: Purposes of the geometry that is rendered.
+        binding_purposes: Purposes of material bindings in order of preference.
+        framed: Directions (k, 3) in which the extent of the world is needed to frame it; None if a
+            camera prim defines the view.
     """
 
     stage: Usd.Stage
@@ -56,9 +56,9 @@ class LoadContext:
 
     @property
     def hides_lights(self) -> bool:
-        """Whether no ray hits the shapes of lights."""
+        """Whether the shapes of lights are invisible to all rays."""
         return self.options.lights == "hidden"
 
     def at(self, time: float) -> LoadContext:
-        """The same at another time code, without motion and with a report that nobody reads."""
+        """Returns the context at another time code, without motion and with a discarded report."""
         return replace(self, time=Usd.TimeCode(time), report=LoadReport(), motion=None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All files that a stage resolves to, and those that it names and that are not there."""
+"""Lists all files that a stage needs, and files that it names but that do not exist."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from wavecomb.usd.stage.report import LoadReport
 
 @dataclass(frozen=True)
 class Dependencies:
-    """What a stage needs.
+    """Files that a stage needs.
 
     Attributes:
-        files: Absolute names of files that are there: layers in any variant, textures and tiles of
-            them, profiles, images that MaterialX files name.
-        missing: Lines on what the composed stage names and is not there.
+        files: Absolute names of existing files: layers in all variants, textures and their tiles,
+            IES profiles, and images that MaterialX files name.
+        missing: Messages about files that the composed stage names but that do not exist.
     """
 
     files: tuple[str, ...]
@@ -34,10 +34,10 @@ class Dependencies:
 def dependencies(
     file: Path, variants: Mapping[str, str] | None = None, session_layer: Path | None = None
 ) -> Dependencies:
-    """What a stage needs, with these variants.
+    """Returns the dependencies of a stage with the given variants.
 
     Raises:
-        WavecombError: It cannot be opened.
+        WavecombError: The stage cannot be opened.
     """
     report = LoadReport()
     with captured(report):
@@ -60,7 +60,7 @@ def dependencies(
 
 
 def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """All prims that are drawn or used, those of prototypes once."""
+    """Yields all active and defined prims, and those of prototypes once."""
     predicate = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
     yield from Usd.PrimRange(stage.GetPseudoRoot(), predicate)
     for prototype in stage.GetPrototypes():
@@ -68,7 +68,7 @@ def _prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
 
 
 def _values(attribute: Usd.Attribute) -> Iterator[Sdf.AssetPath]:
-    """All files that an attribute ever names."""
+    """Yields all asset paths of an attribute over time."""
     kind = attribute.GetTypeName()
     if kind not in (Sdf.ValueTypeNames.Asset, Sdf.ValueTypeNames.AssetArray):
         return
@@ -86,7 +86,7 @@ def _add(
     value: Sdf.AssetPath,
     attribute: Usd.Attribute,
 ) -> None:
-    """Takes a file of an attribute into one of the lists."""
+    """Adds a file of an attribute to the found or to the missing files."""
     if UDIM in value.path:
         tiles = [path for _, path in tile_files(asset_file(value, attribute))]
         found.update(dict.fromkeys(tiles))
@@ -101,7 +101,7 @@ def _add(
 
 
 def _is_library(path: str) -> bool:
-    """Whether a name is of a shader's source, which nothing reads."""
+    """Returns whether a path is shader source code, which Wavecomb does not read."""
     return path.endswith((".osl", ".oso", ".glslfx", ".args"))
 
 
@@ -113,7 +113,7 @@ def _layers(stage: Usd.Stage) -> Iterator[str]:
 
 
 def _all(file: str) -> Iterator[str]:
-    """Files that layers name, in variants that are not selected, too."""
+    """Yields files that layers name, including those in unselected variants."""
     try:
         layers, assets, _ = UsdUtils.ComputeAllDependencies(file)
     except (Tf.ErrorException, RuntimeError):
@@ -123,5 +123,5 @@ def _all(file: str) -> Iterator[str]:
 
 
 def _outer(path: str) -> str:
-    """The file, of one in a package the package."""
+    """Returns the file itself, or the package that contains it."""
     return Ar.SplitPackageRelativePathOuter(path)[0] if Ar.IsPackageRelativePath(path) else path

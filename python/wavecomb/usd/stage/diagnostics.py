@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps USD's own diagnostics off the terminal and turns them into lines of the report."""
+"""Captures USD's diagnostics and converts them to warnings of the load report."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from wavecomb.usd.stage.report import LoadReport
 NOT_TEXT = "it holds text that is not UTF-8; the file is damaged"
 
 MAX_LINES = 12
-"""Diagnostics that are passed on; the rest is counted."""
+"""Diagnostics that are reported individually; further ones are only counted."""
 
 
 def plain(text: str) -> str:
-    """One short line of a USD diagnostic."""
+    """Shortens a USD diagnostic to one line."""
     text = re.sub(r"\((?:instantiating|recomposing|loading)[^()]*stage[^()]*\)", "", text)
     text = re.sub(r" <0x[0-9a-f]+>", "", " ".join(text.split()))
     return text if len(text) <= 300 else text[:297] + "..."
@@ -30,16 +30,16 @@ def plain(text: str) -> str:
 _FORMS = (
     (
         re.compile(r"Found material bindings on prim at path \((\S+)\) but MaterialBindingAPI"),
-        "material binding without MaterialBindingAPI applied (used all the same)",
+        "material binding without MaterialBindingAPI applied (used anyway)",
     ),
     (re.compile(r"Could not open asset @([^@]*)@"), "cannot open layer"),
     (re.compile(r"^In <([^>]*)>: (.*)$"), ""),
 )
-"""Diagnostics that are said in our words: the place is the first group."""
+"""Diagnostics that are reworded; the first group of the pattern is the prim or file."""
 
 
 _SAID = re.compile(r"Could not (open asset|load sublayer) @[^@]*\.mtlx\]*@", re.IGNORECASE)
-"""What ``usd.mtlx`` says better, where it comes to nothing."""
+"""Diagnostics that are dropped because ``usd.mtlx`` reports the same problem in more detail."""
 
 
 def _tell(report: LoadReport, text: str) -> None:
@@ -53,19 +53,20 @@ def _tell(report: LoadReport, text: str) -> None:
 
 
 def commentary(error: BaseException) -> str:
-    """What a ``Tf.ErrorException`` says, first message only."""
+    """Returns the first message of a ``Tf.ErrorException``."""
     try:
         for item in error.args:
             text = getattr(item, "commentary", None)
             if text:
                 return plain(text)
         return plain(str(error))
-    except UnicodeDecodeError:  # USD quotes the file, whatever is in it
+    # USD quotes bytes of the file that are not valid UTF-8.
+    except UnicodeDecodeError:
         return NOT_TEXT
 
 
 def _text(diagnostic: Any) -> str:
-    """What a diagnostic says."""
+    """Returns the text of a diagnostic."""
     try:
         return str(diagnostic.commentary)
     except UnicodeDecodeError:
@@ -74,7 +75,7 @@ def _text(diagnostic: Any) -> str:
 
 @contextlib.contextmanager
 def _muted_stderr() -> Iterator[None]:
-    """File descriptor 2 to nowhere, for USD versions without ``Tf.DiagnosticTrap``."""
+    """Redirects file descriptor 2 to /dev/null, for USD versions without ``Tf.DiagnosticTrap``."""
     sys.stderr.flush()
     saved = os.dup(2)
     null = os.open(os.devnull, os.O_WRONLY)
@@ -89,7 +90,7 @@ def _muted_stderr() -> Iterator[None]:
 
 @contextlib.contextmanager
 def captured(report: LoadReport) -> Iterator[None]:
-    """Collects what USD's C++ side reports inside the block as warnings of the report."""
+    """Adds messages that USD's C++ code emits inside the block to the report as warnings."""
     trap_type = getattr(Tf, "DiagnosticTrap", None)
     if trap_type is None:
         with _muted_stderr():
@@ -104,9 +105,9 @@ def captured(report: LoadReport) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _hooked(report: LoadReport) -> Iterator[None]:
-    """Collects exceptions that USD's C++ side meets in Python, and prints.
+    """Adds exceptions to the report that USD's C++ code catches from Python and prints.
 
-    They are of values that have no type in Python.
+    They are caused by values of types that Python does not know.
     """
     before = sys.excepthook
 
@@ -121,10 +122,10 @@ def _hooked(report: LoadReport) -> Iterator[None]:
 
 
 def _pass_on(trap: Any, report: LoadReport) -> None:
-    """Tells a report what a trap holds, and empties it."""
+    """Moves the messages of a trap to a report."""
     texts = [_text(item) for item in (*trap.GetErrors(), *trap.GetWarnings())]
     lines = sorted({plain(text) for text in texts if not _SAID.search(text)})
-    # What can be said in our words is grouped there, however often it comes.
+    # Reworded messages are grouped in the report, so they do not count towards the limit.
     known = [line for line in lines if any(f.search(line) for f, words in _FORMS if words)]
     for line in known:
         _tell(report, line)
@@ -137,9 +138,9 @@ def _pass_on(trap: Any, report: LoadReport) -> None:
 
 
 class Listening:
-    """Collects what USD's C++ side reports on this thread for as long as a program runs.
+    """Capture of messages that USD's C++ code emits on this thread while the program runs.
 
-    With USD versions that have no ``Tf.DiagnosticTrap`` it does nothing.
+    Does nothing with USD versions that have no ``Tf.DiagnosticTrap``.
     """
 
     def __init__(self) -> None:
@@ -148,7 +149,7 @@ class Listening:
         self._trap = None if kind is None else self._open.enter_context(kind())
 
     def take(self) -> LoadReport | None:
-        """What was said since the last call; None: nothing."""
+        """Returns messages since the last call; None if there are none."""
         if self._trap is None or self._trap.IsClean():
             return None
         report = LoadReport()
@@ -156,7 +157,7 @@ class Listening:
         return report if report.warnings else None
 
     def stop(self) -> None:
-        """Ends it, on the thread that began it."""
+        """Stops capturing; must be called on the thread that created the object."""
         if self._trap is not None:
             self._trap.Clear()
             self._trap = None

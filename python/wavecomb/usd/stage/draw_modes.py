@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw modes of models (UsdGeomModelAPI): what stands in for a model that is drawn as less.
+"""Draw modes of models (UsdGeomModelAPI): the simple geometry that replaces a model.
 
-Geometry and pictures are laid out as by OpenUSD's own imaging (drawModeStandin.cpp).
+Geometry and textures follow OpenUSD's imaging code (drawModeStandin.cpp).
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from wavecomb.usd.stage.report import LoadReport
 MODES = ("origin", "bounds", "cards")
 
 THICK = 0.004
-"""Width of lines, of the diagonal of what they are around; axes: 5 times that, of their length."""
+"""Width of lines as a fraction of the box diagonal; axes of unit length are 5 times as wide."""
 
 _GAP = 1e-5
-"""Between cards of a cross that lie back to back, of its diagonal."""
+"""Distance between back-to-back cards of a cross, as a fraction of the box diagonal."""
 
 _CARDS = ("XPos", "YPos", "ZPos", "XNeg", "YNeg", "ZNeg")
 _RIGHT = ((1, 1.0), (0, -1.0), (0, 1.0), (1, -1.0), (0, 1.0), (0, -1.0))
-"""Which axis, and which way of it, is on the right of the picture of each card."""
+"""Axis and sign of the direction to the right in the texture of each card."""
 
 _CORNERS = ((1.0, 1.0), (0.0, 1.0), (0.0, 0.0), (1.0, 0.0))
-"""Of a picture, from the upper right."""
+"""Corners of a texture, starting at the upper right."""
 
 _MODEL_PURPOSES = ["default", "proxy", "render"]
 
 
 @dataclass(frozen=True)
 class StandIn:
-    """What is drawn in place of a model.
+    """Geometry that replaces a model.
 
     Attributes:
-        prim: Of a stage of its own, at the path of the model; in the model's space.
+        prim: Prim at the model's path on a separate stage, in the model's space.
         kind: mesh or curves.
-        subsets: Of its faces.
-        materials: Of the subsets.
+        subsets: Subsets of its faces.
+        materials: Materials of the subsets.
     """
 
     prim: Usd.Prim
@@ -50,7 +50,7 @@ class StandIn:
 
 
 class DrawModes:
-    """Makes stand-ins for the models of one stage."""
+    """Factory of stand-ins for the models of one stage."""
 
     def __init__(self, time: Usd.TimeCode, report: LoadReport) -> None:
         self._time = time
@@ -59,7 +59,10 @@ class DrawModes:
         self._boxes: UsdGeom.BBoxCache | None = None
 
     def mode(self, prim: Usd.Prim, above: str) -> str:
-        """The draw mode that a prim with an opinion of it hands down; ``above``: its parent's."""
+        """Returns the draw mode that a prim passes to its children.
+
+        ``above`` is its parent's mode.
+        """
         mode = word(prim.GetAttribute("model:drawMode").Get(), "inherited")
         if mode in ("default", *MODES):
             return mode
@@ -68,7 +71,7 @@ class DrawModes:
         return above
 
     def applies(self, prim: Usd.Prim) -> bool:
-        """Whether a mode that is none of the whole model is applied to a prim."""
+        """Returns whether the inherited draw mode applies to a prim."""
         attribute = prim.GetAttribute("model:applyDrawMode")
         if attribute.HasAuthoredValue():
             return prim.IsModel() and bool(attribute.Get())
@@ -76,13 +79,14 @@ class DrawModes:
         return prim.IsModel() and Kind.Registry.IsA(kind, Kind.Tokens.component)
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> StandIn | None:
-        """What is drawn in place of a model in one of ``MODES``; None where it has no extent."""
+        """Returns the stand-in for a model in one of ``MODES``; None if it has no extent."""
         self._report.note(f"models drawn as {mode}", prim.GetPath())
         if self._stage is None:
             self._stage = Usd.Stage.CreateInMemory()
         made = self._made(prim, mode)
         if made is not None:
-            Usd.ModelAPI(made.prim).SetKind(Usd.ModelAPI(prim).GetKind())  # as assets have it
+            # The kind is needed to find the asset of the prim.
+            Usd.ModelAPI(made.prim).SetKind(Usd.ModelAPI(prim).GetKind())
         return made
 
     def _made(self, prim: Usd.Prim, mode: str) -> StandIn | None:
@@ -99,11 +103,11 @@ class DrawModes:
         return self._cards(prim, box)
 
     def _path(self, prim: Usd.Prim) -> Sdf.Path:
-        """Where a model's stand-in is; of one in a prototype, in the first instance of that."""
+        """Returns the path of a stand-in; a prototype's path becomes that of its first instance."""
         return Sdf.Path(self._report.place(prim.GetPath()))
 
     def _extent(self, prim: Usd.Prim) -> np.ndarray | None:
-        """(2, 3) of a model in its own space."""
+        """Returns the extent (2, 3) of a model in its own space."""
         hint = UsdGeom.ModelAPI(prim).GetExtentsHint(self._time)
         if hint is not None and len(hint) >= 2:
             box = np.array(hint[:2], np.float64)
@@ -139,7 +143,7 @@ class DrawModes:
         return StandIn(curves.GetPrim(), "curves")
 
     def _textures(self, prim: Usd.Prim) -> dict[int, str]:
-        """Files of cards, by the number of the card."""
+        """Returns the texture files of cards by card index."""
         found = {}
         for number, card in enumerate(_CARDS):
             attribute = prim.GetAttribute(f"model:cardTexture{card}")
@@ -193,7 +197,7 @@ class DrawModes:
         return StandIn(mesh.GetPrim(), "mesh", tuple(subsets), tuple(materials))
 
     def _look(self, path: Sdf.Path, texture: str | None, colour: Gf.Vec3f) -> UsdShade.Material:
-        """A diffuse material of a picture, cut out where that is clear, or of a colour."""
+        """Creates a diffuse material with a texture that has cut-out alpha, or with a colour."""
         kinds = Sdf.ValueTypeNames
         material = UsdShade.Material.Define(self._stage, path)
         surface = UsdShade.Shader.Define(self._stage, path.AppendChild("Surface"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layers that are FIFOs: USD would wait for ever to open one."""
+"""Detects layers that are FIFOs, which would block USD forever."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from wavecomb.run.isolate import patience, trail
 
 _TICK_S = 0.25
 _IDLE = 0.1
-"""A process that computes less than this fraction of a tick may be waiting for a FIFO."""
+"""CPU time as a fraction of wall time below which the process may be waiting for a FIFO."""
 
 
 @contextmanager
 def refused_fifos() -> Iterator[None]:
-    """Ends or fails a block that opens layers where USD waits for a FIFO.
+    """Aborts a block that opens layers if USD waits for a FIFO.
 
-    A thread looks at files that the layers name as soon as nothing is computed. A process that is
-    expendable ends with one line. In others the thread opens the FIFO for writing and closes it, so
-    that USD reads an empty layer; the block then raises.
+    While the process is idle, a thread checks the files that loaded layers name. An expendable
+    process ends with one message. In other processes the thread opens the FIFO for writing and
+    closes it, so that USD reads an empty layer; the block then raises.
 
     Raises:
         WavecombError: A layer names a FIFO that USD waited for.
@@ -52,7 +52,7 @@ class _Found:
     """The first FIFO that USD waited for.
 
     Attributes:
-        line: A message that names it.
+        line: Message that names it.
     """
 
     line: str | None = None
@@ -71,12 +71,13 @@ def _watch(done: threading.Event, found: _Found) -> None:
 
 
 def _fifos() -> Iterator[tuple[str, str]]:
-    """FIFOs that loaded layers name as layers, and the layer that does."""
+    """Yields FIFOs that loaded layers name as layers, with the layer that names each."""
     for layer in Sdf.Layer.GetLoadedLayers():
         try:
             named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
             name = layer.realPath or layer.identifier
-        except Exception:  # the thread that composes has let go of the layer
+        # The composing thread has released the layer.
+        except Exception:
             continue
         for path in named:
             if path and kind_of(path) == "a FIFO":
@@ -88,7 +89,7 @@ def _release(path: str, layer: str, found: _Found) -> None:
     if trail.is_expendable():
         patience.on_end(line)
         return
-    # Without a reader this fails: USD has not come to it, or never will.
+    # Opening fails if there is no reader, which means that USD is not waiting for this FIFO.
     with contextlib.suppress(OSError):
         os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK))
         found.line = found.line or line

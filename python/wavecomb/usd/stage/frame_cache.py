@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What does not change from frame to frame of an open stage, and is read once."""
+"""Caches of an open stage for values that do not change between frames."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 class MeshCache:
-    """Arrays of gprims that no frame changes, with what there was to say of them.
+    """Arrays of gprims that are not animated, with the messages of reading them.
 
-    Those that a frame does not ask for are forgotten at its end.
+    At the end of a frame, arrays that the frame did not use are removed.
     """
 
     def __init__(self, varying: Varying) -> None:
@@ -38,15 +38,15 @@ class MeshCache:
         inherited: Sequence[Any],
         report: LoadReport,
     ) -> MeshArrays | CurveArrays | None:
-        """The arrays of a gprim: those of the frame before where they are the same.
+        """Returns the arrays of a gprim, from the previous frame if they are the same.
 
         Args:
-            read: Makes them, and tells a report.
+            read: Reads the arrays and adds messages to a report.
             prim: The gprim.
-            matrix: From it to its group.
-            options: What else decides over the arrays; hashable.
-            inherited: Primvars of its ancestors.
-            report: Is told the same in every frame.
+            matrix: Transform from the gprim to its group.
+            options: Further values that the arrays depend on; hashable.
+            inherited: Constant primvars of its ancestors.
+            report: Receives the same messages in every frame.
         """
         if self._varying.of(prim, inherited):
             return read(report)
@@ -60,14 +60,14 @@ class MeshCache:
         return known[0]
 
     def end_frame(self) -> None:
-        """Forgets what the frame did not use."""
+        """Removes entries that the frame did not use."""
         self._kept, self._used = self._used, {}
 
 
 class RefinedCache:
-    """Refined surfaces whose cages and levels no frame changes.
+    """Refined meshes whose cages and levels are not animated.
 
-    Not of those that are displaced or that colour single triangles: materials have a say in them.
+    Excludes displaced meshes and meshes with per-face values, since materials affect them.
     """
 
     def __init__(self) -> None:
@@ -75,7 +75,7 @@ class RefinedCache:
         self._used: dict[int, tuple[Cage, int, dict[str, Any]]] = {}
 
     def get(self, cage: Cage, level: int) -> dict[str, Any] | None:
-        """What the frame before made of a cage; None where it did not."""
+        """Returns the refined mesh of a cage from the previous frame, or None."""
         known = self._kept.get(id(cage))
         if known is None or known[0] is not cage or known[1] != level:
             return None
@@ -83,25 +83,25 @@ class RefinedCache:
         return known[2]
 
     def put(self, cage: Cage, level: int, refined: dict[str, Any]) -> None:
-        """Keeps what was made for the frame after this."""
+        """Stores a refined mesh for the next frame."""
         self._used[id(cage)] = cage, level, refined
 
     def end_frame(self) -> None:
-        """Forgets what the frame did not use."""
+        """Removes entries that the frame did not use."""
         self._kept, self._used = self._used, {}
 
 
 class FrameCache:
-    """For ``load_stage``: what it may take from the frame before, and leaves for the next one.
+    """Data that ``load_stage`` reuses from the previous frame and stores for the next one.
 
-    ``has_same_levels`` says of another view, and the size of its picture (None: as it was), whether
-    subdivision surfaces would be refined as much.
+    ``has_same_levels`` returns whether another view, with another image size or None for the same
+    size, needs the same subdivision levels.
 
-    Contract: for one open stage, which does not change but in time.
+    Contract: serves one open stage, of which only the time changes.
     """
 
     def __init__(self, stage: Usd.Stage, opening: LoadReport) -> None:
-        """``opening``: what there was to say when the stage was opened."""
+        """``opening`` holds messages from opening the stage."""
         self.varying = Varying(stage)
         self.meshes = MeshCache(self.varying)
         self.refined = RefinedCache()
@@ -112,7 +112,7 @@ class FrameCache:
         self.opening = opening
 
     def end_frame(self) -> None:
-        """Forgets what the frame did not use."""
+        """Removes entries that the frame did not use."""
         self.meshes.end_frame()
         self.refined.end_frame()
 
@@ -122,22 +122,23 @@ _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
 _PROXIES = Usd.TraverseInstanceProxies(_ANY)
 
 _FRAMES = ("", "Xform", "Scope", "Camera")
-"""Types of prims that draw nothing and give nothing to what is drawn."""
+"""Types of prims that neither render nor affect rendered prims."""
 
 _UNREAD = ("RenderSettings", "RenderProduct", "RenderVar", "RenderPass")
-"""Types whose values at a time are never read."""
+"""Types whose time-varying values are never read."""
 
 
 class Varying:
-    """The attributes of a stage whose values may change with time, found once.
+    """Attributes of a stage whose values may change over time, found once.
 
-    By samples, splines and value clips, as USD says. The stage must not change meanwhile.
+    Includes time samples, splines and value clips, as USD reports them. The stage must not be
+    edited.
     """
 
     def __init__(self, stage: Usd.Stage) -> None:
         self._prims: dict[Sdf.Path, list[str]] = {}
         sources: set[Sdf.Path] = set()
-        # Clips may bring values to attributes that nothing else authors.
+        # Clips may provide values for attributes that are not authored otherwise.
         clipped = any(prim.HasAuthoredMetadata("clips") for prim in _everything(stage))
         for prim in _everything(stage):
             names = []
@@ -156,16 +157,16 @@ class Varying:
 
     @property
     def is_view_only(self) -> bool:
-        """Whether at most the views of cameras change: all that is drawn stays."""
+        """Whether only the views of cameras change, and no rendered geometry, material or light."""
         return self._is_view_only
 
     @property
     def paths(self) -> list[Sdf.Path]:
-        """Prims with attributes that change."""
+        """Paths of prims with animated attributes."""
         return list(self._prims)
 
     def of(self, prim: Usd.Prim, inherited: Sequence[Any] = ()) -> bool:
-        """Whether the attributes of a prim change, or the primvars that it inherits."""
+        """Returns whether attributes of a prim, or primvars that it inherits, are animated."""
         if not self._prims:
             return False
         path = prim.GetPath()
@@ -174,7 +175,7 @@ class Varying:
         )
 
     def _is_harmless(self, path: Sdf.Path, names: Sequence[str]) -> bool:
-        """Whether what changes on a prim acts on cameras only."""
+        """Returns whether the animation of a prim affects cameras only."""
         prim = self._stage.GetPrimAtPath(path)
         kind = prim.GetTypeName()
         if kind in _UNREAD:
@@ -190,12 +191,12 @@ class Varying:
 
 
 def _everything(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Every prim that may be read, those of instances once."""
+    """Yields every prim that may be read, those of prototypes once."""
     yield from Usd.PrimRange.Stage(stage, _ANY)
     for prototype in stage.GetPrototypes():
         yield from Usd.PrimRange(prototype, _ANY)
 
 
 def _carries(attribute: Usd.Attribute) -> bool:
-    """Whether a single sample of it moves points at other times."""
+    """Returns whether one sample of an attribute moves points at other times, as velocities do."""
     return attribute.GetName() == "velocities" and attribute.GetNumTimeSamples() > 0

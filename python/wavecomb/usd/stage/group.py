@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Groups of the scene while they are filled, what acts on them from outside, and their emitters."""
+"""Groups of the scene during construction, their bindings from outside, and their emitters."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ Matrices = NDArray[np.float64]
 T = TypeVar("T")
 
 MOST_STEPS = 64
-"""Steps of a place that moves within one that moves."""
+"""Most motion steps of an animated transform inside another animated one."""
 
 _MANY_BOXES = 1024
-"""More are made one before others are added."""
+"""Number of boxes above which they are merged."""
 
 _MOST_SHOWN = 2048
-"""Boxes that are kept apart."""
+"""Number of boxes that are kept separately."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A transform, which may change while the shutter is open.
+    """A transform that may be animated.
 
     Attributes:
-        middle: (4, 4), in mid-shutter.
-        steps: (s, 4, 4) at equal steps over the shutter; None: it stands still.
+        middle: (4, 4) transform at mid-shutter.
+        steps: (s, 4, 4) transforms at equal steps over the shutter; None if static.
     """
 
     middle: Matrices
     steps: Matrices | None = None
 
     def within(self, outer: Place) -> Place:
-        """The place in what the space of this one is placed in."""
+        """Returns the concatenation of this transform with an outer one."""
         inner, outside = self.steps, outer.steps
         middle = self.middle @ outer.middle
         if inner is None and outside is None:
@@ -61,11 +61,11 @@ class Place:
 
 @dataclass(frozen=True)
 class Emitter:
-    """An emissive mesh in its group's space.
+    """An emissive mesh in the space of its group.
 
     Attributes:
-        centre: (3,) middle of its bounds.
-        areas: By material id, the area of faces with it.
+        centre: (3,) centre of its bounds.
+        areas: Total area of faces by material id.
     """
 
     centre: NDArray[np.float64]
@@ -74,21 +74,21 @@ class Emitter:
 
 @dataclass
 class Group:
-    """Meshes, lights, volumes and instances that are placed together.
+    """Meshes, lights, volumes and instances that are instanced together.
 
     Attributes:
-        number: In the scene, once something is in it.
-        boxes: Bounds (2, 3) of what is in it, in its own space.
-        outlines: Where what is in it reaches farthest, in its own space; see ``framing``.
-        root: Prim path that the names of what is in it begin with.
-        lights: With their places in the group.
-        volumes: With their transforms (4, 4) in the group.
-        children: Groups that hold lights or volumes placed in it, and where.
-        surfaced: The same of groups that hold surfaces to be refined.
-        holds_placed: Whether lights or volumes are in it, or in what is placed in it.
-        sampled_lamp: A mesh light in it that cannot move.
-        emitters: Emissive meshes in it, of stages without lights.
-        shown: The first boxes, none of which are joined.
+        number: Id in the scene, assigned when the first object is added.
+        boxes: Bounds (2, 3) of its contents in group space.
+        outlines: Extreme points of its contents in group space; see ``framing``.
+        root: Prim path with which the names of its contents begin.
+        lights: Lights with their transforms in group space.
+        volumes: Volumes with their transforms (4, 4) in group space.
+        children: Instanced groups that contain lights, volumes or emitters, with their transforms.
+        surfaced: Instanced groups that contain meshes to be refined, with their transforms.
+        holds_placed: Whether it or its child groups contain lights, volumes or emitters.
+        sampled_lamp: Path of a mesh light in it that must not move.
+        emitters: Emissive meshes in it; only collected for stages without lights.
+        shown: The first boxes, which are never merged.
     """
 
     name: str
@@ -109,11 +109,11 @@ class Group:
 
     @property
     def empty(self) -> bool:
-        """Whether nothing is in it that is drawn."""
+        """Whether the group contains nothing to render."""
         return self.number is None
 
     def grow(self, bounds: NDArray[Any]) -> None:
-        """Makes the bounds hold others (2, 3) too."""
+        """Extends the bounds by a box (2, 3)."""
         self.boxes.append(bounds)
         if len(self.shown) < _MOST_SHOWN:
             self.shown.append(bounds)
@@ -123,14 +123,14 @@ class Group:
 
     @property
     def bounds(self) -> NDArray[np.float64] | None:
-        """(2, 3) Of all that is in it, in its own space."""
+        """(2, 3) bounds of its contents in group space."""
         if not self.boxes:
             return None
         boxes = np.array(self.boxes, np.float64)
         return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     def reach(self, points: NDArray[np.float64], more: NDArray[np.float64] | None) -> None:
-        """Adds points to the outlines; ``more``: directions in which these are exact."""
+        """Adds points to the outline, which is exact in the directions ``more``."""
         self.outlines.append(points)
         self.outlined += len(points)
         if self.outlined > framing.MANY_POINTS:
@@ -140,16 +140,15 @@ class Group:
 
 @dataclass(frozen=True)
 class Scope:
-    """What acts on a group from outside.
+    """State that a group inherits from its instances.
 
     Attributes:
-        inside: It is placed by instances, so a mesh may leave its material to them.
-        bound: The instance brings a bound material, which goes before display colours.
-        override: A binding above is stronger than all in the group.
-        alias: (prototype, instance): bindings are looked up on the instance's proxies.
+        inside: Whether it is instanced, so that a mesh may take the material of its instance.
+        bound: Whether the instance has a bound material, which precedes display colours.
+        override: Whether a binding above is stronger than all bindings in the group.
+        alias: (prototype, instance) paths if bindings are resolved on the instance's proxies.
         root: Path of the native prototype that the group comes from.
-        worn: The bound material, where what has none of its own wears it itself, as it reads
-            primvars there.
+        worn: Material for prims without a binding, if it reads primvars of these prims.
         brings: Constant primvars of the instances.
     """
 
@@ -163,20 +162,20 @@ class Scope:
 
 
 def middle_of(motion: Matrices) -> Matrices:
-    """(k, 4, 4) in the middle of steps (k, s, 4, 4)."""
+    """Returns (k, 4, 4) transforms at the middle of steps (k, s, 4, 4)."""
     last = motion.shape[1] - 1
     middle: Matrices = 0.5 * (motion[:, last // 2] + motion[:, (last + 1) // 2])
     return middle
 
 
 def changes_size(steps: Matrices) -> bool:
-    """Whether a transform (s, 4, 4) that moves stretches by another factor at another step."""
+    """Returns whether the scale of an animated transform (s, 4, 4) changes."""
     sizes = np.linalg.svd(steps[:, :3, :3], compute_uv=False)
     return bool((np.abs(sizes - sizes[:1]) > 1e-2 * sizes[:1].max()).any())
 
 
 def _resampled(steps: Matrices, count: int) -> Matrices:
-    """(s, 4, 4) at ``count`` equal steps, by straight lines."""
+    """Resamples transforms (s, 4, 4) to ``count`` equal steps by linear interpolation."""
     at = np.linspace(0.0, len(steps) - 1.0, count)
     before = np.minimum(at.astype(np.intp), len(steps) - 2)
     part = (at - before)[:, None, None]
@@ -185,18 +184,18 @@ def _resampled(steps: Matrices, count: int) -> Matrices:
 
 
 def placed_lights(group: Group, limit: int) -> list[tuple[Light, Place]]:
-    """All lights of a group and of what is placed in it, at most ``limit``."""
+    """Returns at most ``limit`` lights of a group and its child groups, with transforms."""
     return _placed(group, limit, lambda one: one.lights)
 
 
 def placed_volumes(group: Group, limit: int) -> list[tuple[Volume, Matrices]]:
-    """All volumes of a group and of what is placed in it, at most ``limit``."""
+    """Returns at most ``limit`` volumes of a group and its child groups, with transforms."""
     found = _placed(group, limit, lambda one: [(v, Place(m)) for v, m in one.volumes])
     return [(volume, place.middle) for volume, place in found]
 
 
 def placed_emitters(group: Group, limit: int) -> list[tuple[Emitter, Place]]:
-    """All emitters of a group and of what is placed in it, at most ``limit``."""
+    """Returns at most ``limit`` emitters of a group and its child groups, with transforms."""
     return _placed(group, limit, lambda one: [(e, Place(np.eye(4))) for e in one.emitters])
 
 
@@ -214,14 +213,17 @@ def _placed(
 
 
 LEAST = 0.02
-"""Irradiance on an object that counts as light, a hundredth of that of the default dome."""
+"""Irradiance from which an object counts as lit: a hundredth of that from the default dome."""
 
 MOST = 2048
-"""Objects, and emitters, that are looked at."""
+"""Most objects and most emitters that are considered."""
 
 
 def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | None) -> Emitter:
-    """The emitter that a mesh is; ``faces``: the material of each triangle where they differ."""
+    """Returns the emitter of a mesh.
+
+    ``faces`` holds the material of each triangle if they differ.
+    """
     positions = shape.positions.reshape(-1, *shape.positions.shape[-2:])[0].astype(np.float64)
     a, b, c = (positions[shape.triangles[:, corner]] for corner in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -233,11 +235,12 @@ def emitter_of(shape: MeshArrays, material: int, faces: NDArray[np.uint32] | Non
 
 
 def light_what_is_drawn(world: Group, materials: MaterialTable) -> bool:
-    """Whether half of the objects get as much light as ``LEAST`` from emitters, one for each box.
+    """Returns whether emitters light at least half of the objects with irradiance ``LEAST``.
 
-    The light of an emitter counts as that of a point in its middle, at the distance of an object's
-    middle and no nearer than its size. Shadows and bounces are left out. Neither the camera nor
-    the frame's samples matter, so that frames of a shot and tasks of a farm decide alike.
+    Treats an emitter as a point light at its centre, at the distance of the object's centre but no
+    closer than the object's radius. Ignores shadows and indirect light. The result does not depend
+    on the camera or on the frame's samples, so that all frames of a shot and all tasks of a farm
+    agree.
     """
     boxes = np.array(world.shown[:MOST], np.float64)
     powers, centres = _placed_powers(world, materials)
@@ -254,7 +257,7 @@ def light_what_is_drawn(world: Group, materials: MaterialTable) -> bool:
 def _placed_powers(
     world: Group, materials: MaterialTable
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Power of each emitter and its centre (n, 3) in the world."""
+    """Returns the power (n,) of each emitter and its centre (n, 3) in world space."""
     powers: list[float] = []
     centres: list[Any] = []
     for emitter, place in placed_emitters(world, MOST):
@@ -269,13 +272,13 @@ def _placed_powers(
 
 
 _MOST_PLACED = 1 << 20
-"""Placements of a group that are looked at."""
+"""Most transforms of a group that are considered."""
 
 
 def placements(world: Group) -> dict[int, Matrices]:
-    """Where the groups that hold surfaces are placed: id of a group -> (k, 4, 4).
+    """Returns world transforms of groups with meshes to refine: id of a group -> (k, 4, 4).
 
-    Of each group ``_MOST_PLACED`` count: instances in instances may multiply them.
+    Limits each group to ``_MOST_PLACED`` transforms, since nested instancing can multiply them.
     """
     order: list[Group] = []
     _after_its_users(world, set(), order)
@@ -292,7 +295,7 @@ def placements(world: Group) -> dict[int, Matrices]:
 
 
 def _after_its_users(group: Group, met: set[int], order: list[Group]) -> None:
-    """Groups that hold surfaces: each before those that it is placed in."""
+    """Appends groups in topological order, each one before the groups that instance it."""
     met.add(id(group))
     for child, _ in group.surfaced:
         if id(child) not in met:

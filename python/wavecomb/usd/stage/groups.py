@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts what a traversal finds into groups of the scene, and groups into groups."""
+"""Builds groups of the scene from traversed prims, and instances groups in other groups."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ from wavecomb.usd.stage.traverse import STRANDS, Gathered, Placed, Traversal
 from wavecomb.usd.stage.volumes import VolumePlacer
 
 LoadProgress = Callable[[int, int], None]
-"""Called as progress(prims drawn, prims found so far), now and then."""
+"""Progress callback: progress(prims drawn, prims found so far)."""
 STEP = 512
-"""Prims between calls."""
+"""Prims between two calls of the progress callback."""
 
 _ANY = Usd.PrimIsActive & Usd.PrimIsLoaded
-"""Prototypes of point instancers may be overs or classes, so that nothing else draws them."""
+"""Predicate for prototypes of point instancers, which may be overs or classes."""
 
 MAX_NESTING = 100
-"""Instances in instances, each a call of ``GroupBuilder`` within another."""
+"""Deepest nesting of instances; each level is a recursive call of ``GroupBuilder``."""
 
 
 class GroupBuilder:
-    """Turns prims into groups of the scene."""
+    """Builder of the scene's groups from prims."""
 
     def __init__(
         self,
@@ -63,12 +63,12 @@ class GroupBuilder:
         detail: StrandDetail | None = None,
         notes_emitters: bool = False,
     ) -> None:
-        """Makes one for a load.
+        """Creates a builder for one load.
 
-        ``cache``: arrays of meshes to take from and leave there; ``progress``: is told; ``detail``:
-        of curves that are in the world itself; ``notes_emitters``: groups keep their emissive
-        meshes. ``emits_otherwise`` says whether there is emission that is not among these: of
-        curves, points, splats, or of materials of instances.
+        ``cache`` stores mesh arrays between frames. ``progress`` is the progress callback.
+        ``detail`` simplifies curves that are in the world group. ``notes_emitters`` makes groups
+        collect their emissive meshes; ``emits_otherwise`` then says whether there is emission from
+        curves, points or materials of instances, which are not collected.
         """
         self.notes_emitters = notes_emitters
         self.emits_otherwise = False
@@ -110,7 +110,7 @@ class GroupBuilder:
         predicate: Any = None,
         base: Gf.Matrix4d = IDENTITY,
     ) -> None:
-        """Reads prims and all below them into a group, whose space ``base`` leads to."""
+        """Reads prims and their descendants into a group; ``base`` transforms to its space."""
         found = self.traversal.walk(roots, purpose, predicate, scope.brings, base)
         group.lights += found.lights
         self.room.check(found.draws)
@@ -138,13 +138,13 @@ class GroupBuilder:
             self._place_instancer(group, placed, scope)
 
     def _bind(self, found: Gathered, scope: Scope) -> None:
-        """Looks all bindings of a group up at once."""
+        """Resolves all material bindings of a group together."""
         if scope.override:
             return
         prims = found.binding_prims()
         if scope.alias is not None:
             prims = [self._proxy(prim, scope.alias) for prim in prims]
-        # One object for each material, by which tables find it quicker than by its path.
+        # Use one object per material, since tables find it faster by identity than by path.
         known = self._known
         bound = found.bind(
             None if material is None else known.setdefault(material.GetPath(), material)
@@ -247,10 +247,10 @@ class GroupBuilder:
         scope: Scope,
         steps: Matrices | None = None,
     ) -> None:
-        """Adds a gprim as an instance of its own, placed by ``matrix``.
+        """Adds a gprim as a separate instance with the transform ``matrix``.
 
-        For what moves as a whole, by ``steps`` (s, 4, 4), for curves or points that a transform
-        makes oval, and for splats that it turns: their colours turn with them.
+        Used for rigid motion with transforms ``steps`` (s, 4, 4), for curves or points under
+        non-uniform scale, and for rotated splats, whose colours depend on direction.
         """
         path = draw.prim.GetPath()
         child = Group(str(path), self.report.place(path))
@@ -277,7 +277,10 @@ class GroupBuilder:
         purpose: str,
         predicate: Any = None,
     ) -> Group | None:
-        """The group of some prims, made once; None, and a warning, where it contains itself."""
+        """Returns the group of some prims, built once.
+
+        Warns and returns None if it contains itself.
+        """
         known = self._groups.get(key)
         if known is not None:
             return known
@@ -298,7 +301,7 @@ class GroupBuilder:
         return group
 
     def _place_instances(self, parent: Group, instances: Sequence[Placed], scope: Scope) -> None:
-        """Adds native instances, all of one prototype at a time."""
+        """Adds native instances, grouped by prototype."""
         batches: dict[tuple[int, int], tuple[Group, list[tuple[Any, ...]]]] = {}
         for placed in instances:
             child = self._instance_group(placed, scope)
@@ -337,7 +340,7 @@ class GroupBuilder:
         return self._group(key, str(prim.GetPath()), path, roots, inner, placed.purpose)
 
     def _place_instancer(self, parent: Group, placed: Placed, scope: Scope) -> None:
-        """Adds a point instancer, all instances of one prototype at a time."""
+        """Adds a point instancer, grouped by prototype."""
         prim = placed.prim
         path = prim.GetPath()
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
@@ -380,7 +383,7 @@ class GroupBuilder:
     def _prototype_group(
         self, root: Usd.Prim, placed: Placed, scope: Scope, look: Look
     ) -> Group | None:
-        """The group of a point instancer's prototype, wherever it is."""
+        """Returns the group of a point instancer's prototype."""
         path = root.GetPath()
         within = path.HasPrefix(scope.root) and scope.inside
         inner = look.on(

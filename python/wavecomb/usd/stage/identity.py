@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What prims belong to: their asset, and their light group."""
+"""Finds the asset and the light group of a prim."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from wavecomb.usd.looks.assign import Parent
 from wavecomb.usd.stage.report import LoadReport
 
 OTHER = "other"
-"""The group of lights that have none."""
+"""Name of the group of lights without an authored group."""
 MAX_LIGHT_GROUPS = 63
-"""Beside that: what the core has room for."""
+"""Most further light groups that the core supports."""
 PRIMVAR = "wavecomb:lightGroup"
 _LIGHT_GROUPS = (
     "wavecomb:lightGroup",
@@ -26,18 +26,18 @@ _LIGHT_GROUPS = (
     "primvars:karma:object:lpetag",
     "primvars:arnold:aov",
 )
-"""Attributes that name a light's group, after the primvar: ours, RenderMan's, Karma's, Arnold's."""
+"""Light group attributes of Wavecomb, RenderMan, Karma and Arnold, tried after the primvar."""
 
 
 def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
-    """The light group of a light, or of a mesh that may shine; "" where it has none.
+    """Returns the light group of a light or emissive mesh; "" if it has none.
 
-    ``primvars:wavecomb:lightGroup`` counts on the prim and, like all primvars, on its ancestors;
-    of other renderers what they call so is read on the prim itself.
+    ``primvars:wavecomb:lightGroup`` is inherited from ancestors like all primvars. Attributes of
+    other renderers are read on the prim itself only.
 
     Args:
         prim: The light or mesh.
-        inherited: Primvars of its ancestors where they are known.
+        inherited: Primvars of its ancestors, if they are known.
     """
     if inherited is None:
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(PRIMVAR)
@@ -55,14 +55,14 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
 
 
 class LightGroups:
-    """The light groups of a stage by names that channels can have, and no more than fit."""
+    """Light groups of a stage, with names that are valid in channels and a limited number."""
 
     def __init__(self, report: LoadReport) -> None:
         self._report = report
         self._names: dict[str, str] = {}
 
     def of(self, prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
-        """``light_group``, with "_" for what a channel's name cannot hold; "" where it has none."""
+        """Returns ``light_group`` with invalid characters replaced by "_"; "" if it has none."""
         name = light_group(prim, inherited)
         channel = re.sub(r"[^A-Za-z0-9_]", "_", name)
         if channel in ("", OTHER):
@@ -79,19 +79,19 @@ class LightGroups:
 
 
 def _is_asset(prim: Usd.Prim) -> bool:
-    """Whether its kind is component, or derived from that."""
+    """Returns whether the kind of a prim is component or derived from it."""
     kind = prim.GetKind()
     return bool(kind) and Kind.Registry.IsA(kind, Kind.Tokens.component)
 
 
 class Assets:
-    """Finds the asset that a prim is part of: its nearest model of kind component."""
+    """The assets that contain prims: their nearest ancestors of kind component."""
 
     def __init__(self) -> None:
         self._known: dict[Sdf.Path, int] = {Sdf.Path.absoluteRootPath: 0}
 
     def length_below(self, prim: Usd.Prim, path: str, parent: Parent | None) -> int:
-        """As ``length``, of a prim with this path whose siblings were seen before."""
+        """Returns ``length`` of a prim with this path, using its parent's cached result."""
         if parent is None:
             return self.length(prim)
         if _is_asset(prim):
@@ -101,7 +101,7 @@ class Assets:
         return parent.asset
 
     def length(self, prim: Usd.Prim) -> int:
-        """How much of the prim's path names its asset; 0 where no ancestor is a component."""
+        """Returns the length of the asset's path within the prim's path; 0 if there is no asset."""
         above: list[Sdf.Path] = []
         length: int | None = 0
         while prim:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Instances that look different: primvars on them that materials read, of what is inside.
+"""Materials and primvars that differ between instances of a prototype.
 
-A prototype is there once for all instances that look alike. Where materials read primvars that
-instances bring, or those of the meshes inside read by a material that is bound to the instance, the
-prototype is read once for each of these looks.
+Instances with equal materials and primvars share a prototype. If materials read primvars of the
+instances, or if a material bound to the instance reads primvars of the meshes inside, the prototype
+is read once per distinct set of values.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from wavecomb.usd.stage.group import Scope
 from wavecomb.usd.stage.traverse import Placed, inherit
 
 MAX_COLOURS = 256
-"""Materials that one varying colour may turn into."""
+"""Most materials that a varying colour is quantised to."""
 
 
 def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Colours (m, 3) as a palette (k, 3), k <= ``MAX_COLOURS``, and an index (m,) into it.
+    """Quantises colours (m, 3) to a palette (k, 3), k <= ``MAX_COLOURS``, and an index (m,).
 
-    Steps are even in the square root, near to what the eye sees as even.
+    Quantisation steps are even in the square root, which is close to perceptually uniform.
     """
     colours = np.nan_to_num(np.asarray(colours, np.float64), nan=0.0, posinf=1.0, neginf=0.0)
     colours = np.maximum(colours, 0.0)
@@ -55,7 +55,7 @@ def quantise(colours: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int
 
 
 class InstanceMaterials:
-    """Finds the materials of native instances and of point instancers."""
+    """The materials of native instances and of point instancers."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
         self.time, self.report = context.time, context.report
@@ -63,7 +63,7 @@ class InstanceMaterials:
         self.materials = materials
 
     def of_proxies(self, instance: Usd.Prim) -> tuple[str, ...]:
-        """Material paths of all below an instance: tells which instances may share a group."""
+        """Returns material paths of all prims below an instance; equal ones may share a group."""
         prims = [
             prim
             for prim in Usd.PrimRange(instance, Usd.TraverseInstanceProxies())
@@ -73,7 +73,7 @@ class InstanceMaterials:
         return tuple(str(m.GetPath()) if m else "" for m in bound)
 
     def of_instance(self, placed: Placed, scope: Scope) -> int:
-        """The id for the meshes of an instance that have none of their own."""
+        """Returns the material id for meshes of an instance that have no binding."""
         surface = None if placed.material is None else self.materials.surface(placed.material)
         if surface is not None and not surface.stand_in:
             return self.materials.add(surface)
@@ -88,7 +88,7 @@ class InstanceMaterials:
         return INHERIT_MATERIAL if scope.inside else self.materials.plain()
 
     def of_instancer(self, placed: Placed, count: int, scope: Scope) -> NDArray[np.uint32]:
-        """(count,) ids for the instances of a point instancer: by its displayColor."""
+        """Returns material ids (count,) of a point instancer's instances from displayColor."""
         if scope.bound or scope.override:
             return np.full(count, INHERIT_MATERIAL, np.uint32)
         inherited = inherit(placed.prim, placed.inherited)
@@ -119,7 +119,7 @@ class InstanceMaterials:
 
 
 MOST_LOOKS = 256
-"""Of a prototype; of more instances primvars are not read."""
+"""Most variations of a prototype; primvars of further instances are ignored."""
 
 _ARRAYS = {
     1: (Sdf.ValueTypeNames.FloatArray, Vt.FloatArray),
@@ -132,12 +132,12 @@ _OF_INSTANCES = ("vertex", "varying", "uniform")
 
 @dataclass(frozen=True)
 class Look:
-    """What instances bring to a prototype.
+    """Material and primvars that instances pass to their prototype.
 
     Attributes:
-        key: Equal for those that look alike; None: nothing.
+        key: Equal for equal appearance; None if there are none.
         inherited: Constant primvars.
-        worn: A material for what has none of its own, which reads primvars of the meshes.
+        worn: Material for prims without a binding, which reads primvars of the meshes.
     """
 
     key: Hashable = None
@@ -145,7 +145,7 @@ class Look:
     worn: UsdShade.Material | None = None
 
     def on(self, scope: Scope) -> Scope:
-        """The scope of the prototype with this."""
+        """Returns the scope of the prototype with these values."""
         if self.key is None:
             return scope
         return replace(scope, worn=self.worn or scope.worn, brings=self.inherited)
@@ -155,7 +155,7 @@ PLAIN = Look()
 
 
 class InstanceLooks:
-    """Finds what instances bring."""
+    """The materials and primvars that instances pass to their prototypes."""
 
     def __init__(self, context: LoadContext, materials: MaterialTable) -> None:
         self._time, self._report = context.time, context.report
@@ -167,7 +167,10 @@ class InstanceLooks:
         self._values = Usd.Stage.CreateInMemory()
 
     def of_instance(self, placed: Placed, proxy: Usd.Prim, scope: Scope) -> Look:
-        """What a native instance brings; ``proxy``: where its bindings are looked up."""
+        """Returns the look of a native instance.
+
+        ``proxy`` is the prim on which bindings are resolved.
+        """
         worn = placed.material or (scope.worn if scope.bound or scope.override else None)
         if worn is not None and is_alike(self._materials.surface(worn)):
             worn = None
@@ -181,14 +184,14 @@ class InstanceLooks:
     def of_points(
         self, placed: Placed, root: Usd.Prim, chosen: NDArray[np.intp], count: int, predicate: Any
     ) -> Iterator[tuple[NDArray[np.bool_] | slice, Look]]:
-        """Which of the chosen instances of a prototype bring what.
+        """Yields groups of instances of a prototype, with the look of each group.
 
         Args:
             placed: The point instancer.
             root: The prototype.
-            chosen: (k,) its instances, by their place in the authored arrays.
-            count: Of authored instances.
-            predicate: Of prims in prototypes.
+            chosen: (k,) indices of its instances in the authored arrays.
+            count: Number of authored instances.
+            predicate: Predicate of prims in prototypes.
         """
         inherited = inherit(placed.prim, placed.inherited)
         varying = [
@@ -240,7 +243,7 @@ class InstanceLooks:
     def _read_by(
         self, key: Hashable, inside: Any, worn: UsdShade.Material | None
     ) -> frozenset[str]:
-        """Primvars that materials of prims read, and that the one worn by the rest does."""
+        """Returns names of primvars that materials of the prims and the material ``worn`` read."""
         known = self._reads.get(key)
         if known is None:
             prims = [p for p in inside if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)]
@@ -265,7 +268,10 @@ class InstanceLooks:
         return b"" if value is None else np.ascontiguousarray(value.values).tobytes()
 
     def _each(self, primvar: Any, name: str, count: int) -> NDArray[np.float32] | None:
-        """(count, c) A primvar's value for each instance; None, and told, where it does not fit."""
+        """Returns a primvar's values (count, c) per instance.
+
+        Warns and returns None if they do not fit.
+        """
         path = primvar.GetAttr().GetPrim().GetPath()
         try:
             found = from_attribute(primvar.GetAttr(), name, self._time)
@@ -280,7 +286,7 @@ class InstanceLooks:
         return np.asarray(in_linear(found, self._report, path).values, np.float32)
 
     def _constant(self, name: str, value: NDArray[np.float32]) -> Any:
-        """A primvar with one value, as a prim above would have it."""
+        """Creates a constant primvar, as if an ancestor prim had it."""
         key = (name, value.tobytes())
         if key not in self._made:
             prim = self._values.DefinePrim(f"/V{len(self._made)}")

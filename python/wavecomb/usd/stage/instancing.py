@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Point instancers: transforms of all instances at once."""
+"""Reads the transforms of all instances of a point instancer."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Matrices = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Instances:
-    """What a point instancer places.
+    """The instances of a point instancer.
 
     Attributes:
-        transforms: (k, 4, 4), row vectors, in the instancer's space.
-        prototypes: (k,) index into its prototypes.
-        kept: (k,) positions in the authored arrays.
+        transforms: (k, 4, 4) for row vectors, in the instancer's space.
+        prototypes: (k,) index of each instance's prototype.
+        kept: (k,) indices in the authored arrays.
         authored: Length of the authored arrays.
     """
 
@@ -37,7 +37,7 @@ class Instances:
 
 
 def rotations(quaternions: NDArray[Any]) -> Matrices:
-    """Rotation matrices (k, 3, 3) for row vectors of quaternions (k, 4), i, j, k, real."""
+    """Converts quaternions (k, 4) in i, j, k, real order to rotations (k, 3, 3) for row vectors."""
     q = np.asarray(quaternions, np.float64)
     length = np.sqrt(np.einsum("ij,ij->i", q, q))
     usable = (length > 0) & np.isfinite(length)
@@ -57,7 +57,7 @@ def rotations(quaternions: NDArray[Any]) -> Matrices:
 
 
 def sound(transforms: Matrices) -> NDArray[np.bool_]:
-    """Which of (k, 4, 4) are finite and can be inverted."""
+    """Returns a mask (k,) of the transforms (k, 4, 4) that are finite and invertible."""
     linear = transforms[:, :3, :3]
     finite: NDArray[np.bool_] = np.asarray((np.abs(transforms) < 1e18).all(axis=(1, 2)))
     a, b, c = np.where(finite[:, None, None], linear, 0.0).transpose(1, 0, 2)
@@ -69,7 +69,7 @@ def sound(transforms: Matrices) -> NDArray[np.bool_]:
 def read_instances(
     prim: Usd.Prim, time: Usd.TimeCode, prototype_count: int, report: LoadReport
 ) -> Instances | None:
-    """The visible instances of a point instancer; None where it cannot be used."""
+    """Reads the visible instances of a point instancer; returns None if it is invalid."""
     instancer = UsdGeom.PointInstancer(prim)
     path = prim.GetPath()
     index = as_integers(instancer.GetProtoIndicesAttr().Get(time), np.int64)
@@ -105,17 +105,17 @@ def moved_instances(
     instances: Instances,
     report: LoadReport,
 ) -> Matrices | None:
-    """Transforms (k, s, 4, 4) of instances over the shutter; None where they stand still.
+    """Returns transforms (k, s, 4, 4) of instances over the shutter; None if they are static.
 
-    Velocities, accelerations and angular velocities count as UsdGeomPointInstancer has it.
+    Uses velocities, accelerations and angular velocities as UsdGeomPointInstancer defines them.
 
     Args:
         prim: The point instancer.
-        motion: With the shutter.
-        track: Of the instancer; None: it stands still at ``outer``.
-        outer: (4, 4) from it to its group; None: the identity.
-        instances: Of it at the frame.
-        report: For what is odd.
+        motion: The shutter.
+        track: Animated transform of the instancer; None if it is static.
+        outer: (4, 4) static transform from the instancer to its group; None is the identity.
+        instances: Its instances at the frame.
+        report: Collects warnings.
     """
     instancer = UsdGeom.PointInstancer(prim)
     names = ("positions", "orientations", "orientationsf", "scales")
@@ -153,7 +153,7 @@ def moved_instances(
 def _mask(
     instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int, report: LoadReport
 ) -> NDArray[np.bool_]:
-    """(count,) which instances are neither invisible nor inactive."""
+    """Returns a mask (count,) of the instances that are visible and active."""
     keep = np.ones(count, bool)
     hidden: list[int] = []
     hidden += as_integers(instancer.GetInvisibleIdsAttr().Get(time), np.int64).tolist()
@@ -174,7 +174,7 @@ def _mask(
 def _linear(
     instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int, report: LoadReport
 ) -> Matrices:
-    """Scale then rotation of each instance, (count, 3, 3); (3, 3) where all are the identity."""
+    """Returns scale and rotation of each instance (count, 3, 3); (3, 3) if all are the identity."""
     path = instancer.GetPath()
     out: Matrices = np.eye(3)
     turns = None
@@ -190,7 +190,8 @@ def _linear(
     scales = as_array(instancer.GetScalesAttr().Get(time))
     if scales is not None and len(scales):
         if scales.shape == (count, 3):
-            with np.errstate(invalid="ignore"):  # ``sound`` leaves such instances out
+            # ``sound`` removes instances with invalid scales.
+            with np.errstate(invalid="ignore"):
                 out = out * scales.astype(np.float64)[:, :, None]
         else:
             report.warn("point instancer scales do not match: ignored", path)

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from wavecomb import _core
 
 MAX_LIGHTS = 4096
-"""Most lights in a scene; instances may multiply them."""
+"""Most lights in a scene, since instancing can multiply them."""
 
 
 def load_stage(
@@ -78,15 +78,15 @@ def load_stage(
 
     Args:
         source: A .usd, .usda, .usdc or .usdz file, or an open stage. An open stage stays open, is
-            changed only if ``variants`` are chosen, and must not change while it is read.
-        options: Options of the load. Mask, payloads and session layer are for files only.
-        editable: Keeps equal materials apart and keeps ``textures``, for programs that edit the
-            scene. Does not change the image.
-        reuse: ``textures`` of an earlier load; those whose files did not change are shared.
-        cache: Cache of an open stage that was read at another frame; what did not change is
-            shared. Does not change the image.
-        progress: Called with the number of prims read, and found, so far.
-        builder_factory: Makes another scene builder, without a texture store, for tests.
+            changed only if ``variants`` are given, and must not change during the call.
+        options: Options of the load. Mask, payloads and session layer require a file.
+        editable: Whether to keep equal materials separate and to keep ``textures``, for programs
+            that edit the scene. Does not change the image.
+        reuse: ``textures`` of an earlier load; textures of unchanged files are shared.
+        cache: Cache of an open stage that was read at another frame; unchanged data is shared. Does
+            not change the image.
+        progress: Called with the number of prims read and the number found so far.
+        builder_factory: Creates a scene builder without a texture store, for tests.
         **changes: Fields of ``LoadOptions`` that replace those of ``options``.
 
     Raises:
@@ -101,7 +101,7 @@ def load_stage(
     report, file = LoadReport(), _file_of(source)
     if cache is not None:
         reuse = cache.textures
-    # Readers find values that are not finite; NumPy need not warn about them.
+    # Readers handle values that are not finite, so NumPy's warnings are disabled.
     with captured(report), np.errstate(all="ignore"):
         store = None
         if builder_factory is None:
@@ -115,7 +115,8 @@ def load_stage(
             load = _Load(source, builder, chosen, report, reuse, store, editable)
             facts = load.run(cache, progress)
             textures = load.textures
-            del load  # closes a stage that was opened here
+            # This closes a stage that was opened here.
+            del load
         except UnicodeDecodeError:
             raise WavecombError(f"{file}: {NOT_TEXT}") from None
         except Tf.ErrorException as error:
@@ -144,7 +145,7 @@ def load_stage(
 
 
 def _file_of(source: str | Path | Usd.Stage) -> Path:
-    """The file of a stage, or the name of the layer of a stage in memory."""
+    """Returns the file of a stage, or the identifier of an in-memory stage's layer."""
     if not isinstance(source, Usd.Stage):
         return Path(source)
     layer = source.GetRootLayer()
@@ -152,7 +153,7 @@ def _file_of(source: str | Path | Usd.Stage) -> Path:
 
 
 def _opened(source: str | Path | Usd.Stage, options: LoadOptions) -> Usd.Stage:
-    """The open stage, with the variants of the options."""
+    """Returns the open stage with the variants of the options."""
     if isinstance(source, Usd.Stage):
         select_variants(source, options.variants or {})
         return source
@@ -164,7 +165,7 @@ def _opened(source: str | Path | Usd.Stage, options: LoadOptions) -> Usd.Stage:
 
 
 class _Load:
-    """Fills a scene builder from a stage.
+    """One load of a stage into a scene builder.
 
     Attributes:
         textures: Textures of the scene.
@@ -188,7 +189,7 @@ class _Load:
         self._surfaces = Surfaces(self._context, self._materials)
 
     def run(self, cache: FrameCache | None, progress: LoadProgress | None) -> dict[str, Any]:
-        """Fills the builder; gives fields of ``LoadedStage``."""
+        """Fills the builder; returns fields of ``LoadedStage``."""
         try:
             return self._run(cache, progress)
         finally:
@@ -245,7 +246,10 @@ class _Load:
         }  # fmt: skip
 
     def _camera_view(self, seen: Seen, origin: Origin, report: LoadReport) -> View | None:
-        """The view of the camera prim around a position; None where none can be used."""
+        """Returns the view of the camera prim relative to an origin.
+
+        Returns None if there is no valid camera.
+        """
         if seen.camera is None:
             return None
         c = self._context
@@ -256,7 +260,7 @@ class _Load:
     def _set_camera(
         self, seen: Seen, view: View | None, world: Group, planes: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
-        """Sets the camera and refines surfaces for it; gives the outline that was framed."""
+        """Sets the camera and refines meshes for it; returns the outline that was framed."""
         c, outline = self._context, None
         if view is None:
             c.report.note("no camera: framed what is drawn")
@@ -269,18 +273,18 @@ class _Load:
         return outline
 
     def _strand_detail(self, view: View | None) -> StrandDetail | None:
-        """Thins out strands for a view, if the options ask for that."""
+        """Returns the simplification of thin strands if the options enable it."""
         c = self._context
         if c.options.strand_pixels <= 0:
             return None
         if view is None:
-            what = "strands are not thinned out: there is no camera to say how thin they are"
+            what = "strands are not thinned out: their width in pixels is unknown without a camera"
             c.report.note(what)
             return None
         return StrandDetail(ViewSize(view, c.options.size), c.options.strand_pixels, c.report)
 
     def _limit_textures(self, seen: Seen) -> None:
-        """Chooses which mip levels the textures leave out."""
+        """Chooses the mip levels that textures leave out."""
         from wavecomb.usd.looks.texture_limit import plan_levels
 
         c = self._context
@@ -291,16 +295,16 @@ class _Load:
             bounds, points = box.ComputeAlignedRange(), None
             if not bounds.IsEmpty():
                 ends = np.array([bounds.GetMin(), bounds.GetMax()])
-                # The ball inside the box: the final view is no nearer than that of the ball.
+                # Frame the ball inside the box, since the final view is never closer than that.
                 points = ends.mean(axis=0) + (corners(ends) - ends.mean(axis=0)) / np.sqrt(3.0)
             view = frame_points(points, c.up_axis, seen.lens, c.options.size)
         limit = float(c.options.texture_limit or 0) * MEGABYTE
         self.textures.drops = plan_levels(c, ViewSize(view, c.options.size), limit)
 
     def _add_lights(self, world: Group, lit: bool) -> tuple[str, ...]:
-        """Adds all lights, or a soft dome where nothing gives light; gives their paths.
+        """Adds all lights, or a soft dome if nothing emits light; returns their paths.
 
-        ``lit``: whether the stage has lights, or emission that lights it.
+        ``lit`` says whether the stage has lights or sufficient emission.
         """
         c = self._context
         lights = placed_lights(world, MAX_LIGHTS + 1)
@@ -312,7 +316,7 @@ class _Load:
             if place.steps is not None:
                 options["motion"] = np.ascontiguousarray(place.steps)
                 if changes_size(place.steps):
-                    what = "lights that change their size: as large as in mid-shutter"
+                    what = "lights that change their size (constant, as at mid-shutter)"
                     c.report.missing(what, options["name"])
             if "portals" in options:
                 options["portals"] = options["portals"] @ transform
@@ -325,7 +329,7 @@ class _Load:
             c.report.note("no visible light; the scene is lit by emissive materials or not at all")
             return ()
         if self._materials.glows:
-            what = "no light but emissive materials that light too little: added a soft dome"
+            what = "no light except emissive materials that are too dim: added a soft dome"
             c.report.note(f"{what} (a light of intensity 0 keeps it off)")
         else:
             c.report.note("no light: added a soft dome")

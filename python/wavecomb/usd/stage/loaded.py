@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A stage that was read, whoever read it."""
+"""Result of loading a stage."""
 
 from __future__ import annotations
 
@@ -23,32 +23,33 @@ if TYPE_CHECKING:
 
 @dataclass
 class LoadedStage:
-    """A stage that was read.
+    """A loaded stage.
 
     Attributes:
-        scene: Ready to render.
-        report: What there is to say about it.
-        camera_path: Prim of the camera; None where the bounds were framed.
-        seconds: Time taken.
+        scene: The scene, ready to render.
+        report: Notes and warnings.
+        camera_path: Prim of the camera; None if the bounds were framed.
+        seconds: Time taken by the load.
         stage_path: The file.
-        cameras: Prims of all cameras that could be chosen.
-        lights: Prims of all lights that Wavecomb knows, invisible ones too.
-        material_paths: Prim of each material of the scene, by id; "" where the loader made it (of a
-            display colour). One prim has several where meshes bring values of their own.
-        light_paths: Prim of each light of the scene, by index; "" of the soft dome. In instances
-            both are named by the first instance.
-        frame: Time code that was read; None: default values.
-        shutter: When it opens and closes, time codes from the frame; None: no motion blur.
-        render: What the stage's render settings ask for.
-        working_space: What its colours are in: of ``WORKING_SPACES``.
-        textures: What the next read of the stage can share; None unless it was read ``editable``.
-        leaves_out_levels: Whether textures have only the mip levels that its view needs.
-        outline: Points (n, 3) of the scene where what is drawn reaches farthest; None unless a view
-            was framed for it.
-        volumes: What there is to say of each.
-        catchers: Prims of which only the shadows show.
-        origin: World position that the scene is built around: the scene's coordinates are the
-            world's less these. It is 0 unless the stage is seen from far away (docs/stages.md).
+        cameras: Prims of all selectable cameras.
+        lights: Prims of all supported lights, including invisible ones.
+        material_paths: Prim of each material of the scene by id; "" if the loader created it, for
+            example from a display colour. A prim has several ids if meshes provide different
+            primvars.
+        light_paths: Prim of each light of the scene by index; "" for the soft dome. Materials and
+            lights in instances are named after the first instance.
+        frame: Time code that was read; None for default values.
+        shutter: Opening and closing time relative to the frame, in time codes; None without motion
+            blur.
+        render: Values of the stage's render settings.
+        working_space: Working colour space, one of ``WORKING_SPACES``.
+        textures: Textures for the next load to share; None unless the load was ``editable``.
+        leaves_out_levels: Whether textures have only the mip levels that this view needs.
+        outline: Extreme points (n, 3) of the scene; None unless a view was framed from them.
+        volumes: Description of each volume.
+        catchers: Prims that are shadow catchers.
+        origin: World position of the scene's origin, which is subtracted from world coordinates. It
+            is 0 unless the camera is far from the world's origin (docs/stages.md).
     """
 
     scene: _core.Scene
@@ -74,17 +75,19 @@ class LoadedStage:
 
     @contextlib.contextmanager
     def renderer(self, threads: int = 0) -> Iterator[tuple[_core.Renderer, bool]]:
-        """A renderer of the scene, to be had by one caller at a time, and whether it was built now.
+        """Yields a renderer of the scene for exclusive use, and whether it was built now.
 
-        The last one that nobody has any more stays with the stage, with its hierarchy and what it
-        found out of the lights, for whoever renders it next; `threads` are for building one.
+        The most recently returned renderer is kept with its acceleration structures and light
+        statistics, for the next render. `threads` is the number of threads for building a renderer.
         """
         from wavecomb import _core
 
         kept = None
-        with contextlib.suppress(IndexError):  # other threads may have it
+        # Other threads may be using it.
+        with contextlib.suppress(IndexError):
             kept = self._kept.pop()
-        is_new = kept is None or kept.scene is not self.scene  # edited
+        # The scene may have been edited.
+        is_new = kept is None or kept.scene is not self.scene
         renderer = _core.Renderer(self.scene, threads) if kept is None or is_new else kept
         try:
             yield renderer, is_new

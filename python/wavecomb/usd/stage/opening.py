@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""USD files to open stages; what is chosen of a stage before it is read."""
+"""Opens USD files as stages, with variants, masks, payloads and session layers."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from wavecomb.usd.stage.population import every, load_payloads, populate
 from wavecomb.usd.stage.report import LoadReport
 
 MAX_SURVEYED = 4096
-"""Cameras and lights that are listed; instances may multiply them."""
+"""Most cameras and lights that are listed, since instancing can multiply them."""
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What a stage holds, seen or not, those inside instances too, in the stage's order.
+    """Cameras and lights of a stage in stage order, including invisible and instanced ones.
 
     Attributes:
         cameras: Prim paths of all cameras.
-        lights: Prim paths of all lights that Wavecomb knows; of both together ``MAX_SURVEYED``.
+        lights: Prim paths of all supported lights; the two together have at most ``MAX_SURVEYED``.
     """
 
     cameras: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ class Survey:
 
 
 def survey(stage: Usd.Stage) -> Survey:
-    """Looks for cameras and lights, in one pass over the stage."""
+    """Lists cameras and lights in one pass over the stage."""
     cameras: list[str] = []
     lights: list[str] = []
     kinds: dict[str, list[str] | None] = {}
@@ -65,25 +65,26 @@ _RENDER_RELATIONS = ("products", "orderedVars", "camera")
 def open_render_settings(
     file: Path, wanted: str | None = None, session_layer: Path | None = None
 ) -> Usd.Stage:
-    """The stage of a file with nothing but its render settings and the cameras they name.
+    """Opens only the render settings of a file and the cameras that they name.
 
-    Who holds it while the stage is opened whole saves reading the layers again.
+    Keeping the returned stage alive until the whole stage is opened avoids reading its layers
+    twice.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
         wanted: Path of settings that are not under /Render.
-        session_layer: As ``open_stage`` takes it.
+        session_layer: File with opinions that are stronger than the stage's.
 
     Raises:
-        WavecombError: A file is none, or cannot be read.
+        WavecombError: A file does not exist or cannot be read.
     """
     with refused_fifos(), _layers(file, session_layer) as (root, session):
         paths = {"/Render", wanted or "", _settings_path(root), _settings_path(session)}
         kept = {path for path in map(_prim_path, paths) if path is not None}
         mask = Usd.StagePopulationMask(sorted(kept))
         stage = Usd.Stage.OpenMasked(root, session, mask, Usd.Stage.LoadAll)
-        # Settings name products, these name vars, and both name cameras. (ExpandPopulationMask
-        # with predicates of Python's can wait for itself.)
+        # Settings name products, products name vars, and both name cameras. ExpandPopulationMask is
+        # not used, since it can deadlock with predicates written in Python.
         for _ in range(2):
             named = {path for path in _named_by(stage) if not mask.Includes(path)}
             if not named:
@@ -98,9 +99,9 @@ def open_render_settings(
 def _layers(
     file: Path, session_layer: Path | None, overrides: Sdf.Layer | None = None
 ) -> Iterator[tuple[Sdf.Layer, Sdf.Layer]]:
-    """Root and session layer of a stage, to be composed within the time that it may take.
+    """Yields the root and session layer of a stage, within the time limit for opening.
 
-    Arguments are those of ``open_stage``; errors of USD become WavecombError.
+    Arguments are the same as for ``open_stage``. Converts USD errors to WavecombError.
     """
     _check_file(file)
     if session_layer is not None:
@@ -123,7 +124,7 @@ def _layers(
 
 
 def _named_by(stage: Usd.Stage) -> set[Sdf.Path]:
-    """Prims that render settings and products point to."""
+    """Returns the prims that render settings and products refer to."""
     return {
         target.GetPrimPath()
         for prim in stage.Traverse()
@@ -140,7 +141,7 @@ def _settings_path(layer: Sdf.Layer) -> str:
 
 
 def _prim_path(text: str) -> Sdf.Path | None:
-    """The path of a prim in the world; None for any other text."""
+    """Returns the absolute prim path that a text holds; None for any other text."""
     if not text.startswith("/") or not Sdf.Path.IsValidPathString(text):
         return None
     path = Sdf.Path(text)
@@ -155,20 +156,20 @@ def open_stage(
     session_layer: Path | None = None,
     payloads: Sequence[str] = (),
 ) -> Usd.Stage:
-    """The stage of a file.
+    """Opens the stage of a file.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
-        variants: Selections, as ``select_variants`` makes them.
-        overrides: Such as another stage's session layer; copied into this one's.
-        mask: Paths of prims to keep, with what they need; none: all (``populate``).
-        session_layer: File with opinions that are stronger than the stage's; variants that are
-            selected here are stronger still.
-        payloads: Patterns of prims whose payloads are loaded (``load_payloads``); none: all.
+        variants: Variant selections (``select_variants``).
+        overrides: Layer, such as another stage's session layer, that is copied into the session
+            layer.
+        mask: Paths of prims to keep with everything that they need (``populate``); empty means all.
+        session_layer: File with opinions that are stronger than the stage's; ``variants`` are
+            stronger still.
+        payloads: Patterns of prims whose payloads are loaded (``load_payloads``); empty means all.
 
     Raises:
-        WavecombError: A file is none, or cannot be read; there are no such variants, prims or
-            payloads.
+        WavecombError: A file cannot be read, or a variant, prim or payload does not exist.
     """
     rule = Usd.Stage.LoadNone if payloads else Usd.Stage.LoadAll
     with refused_fifos():
@@ -191,15 +192,15 @@ def open_stage(
 def open_editable(
     file: Path, variants: Mapping[str, str] | None = None, report: LoadReport | None = None
 ) -> Usd.Stage:
-    """The stage of a file, to be looked at and edited while another one of it is loaded.
+    """Opens a stage that can be inspected and edited while another copy of it is loaded.
 
-    It is the stage that ``open_stage`` opens. MaterialX files are resolved in variants that are not
-    selected, too: selecting them later changes no layer, on whatever thread another stage reads.
+    Opens the stage like ``open_stage``, but also resolves MaterialX files in unselected variants.
+    So selecting them later changes no layer while another stage reads it on another thread.
 
     Args:
-        file: As ``open_stage`` takes it.
-        variants: Likewise.
-        report: Is told what USD says; None: nobody is.
+        file: .usd, .usda, .usdc or .usdz.
+        variants: Variant selections (``select_variants``).
+        report: Receives USD's messages; None discards them.
     """
     with captured(LoadReport() if report is None else report):
         stage = open_stage(file, variants)
@@ -222,7 +223,7 @@ def _check_file(file: Path) -> None:
 
 
 def _session(file: Path) -> Sdf.Layer:
-    """The layer of a file, which a stage that names it keeps open."""
+    """Returns the layer of a file; a stage that refers to it keeps it open."""
     try:
         layer = Sdf.Layer.FindOrOpen(str(file))
     except Tf.ErrorException as error:
@@ -233,10 +234,10 @@ def _session(file: Path) -> Sdf.Layer:
 
 
 def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
-    """Makes variant selections in the session layer: ``{"/World/Car{paint}": "red"}``.
+    """Selects variants in the session layer, such as ``{"/World/Car{paint}": "red"}``.
 
     Raises:
-        WavecombError: There is no such prim, set or variant.
+        WavecombError: The prim, variant set or variant does not exist.
     """
     if variants:
         stage.SetEditTarget(stage.GetSessionLayer())
@@ -260,14 +261,14 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
 
 
 _changed: dict[str, Sdf.Layer] = {}
-"""By identifier. Held as long as the process: a layer that is let go would be read anew."""
+"""Changed layers by identifier. They are never released, since USD would read them again."""
 
 
 def change_layers(layers: Iterable[Sdf.Layer]) -> None:
-    """Changes names in layers, and in all that they name, where this process has maps.
+    """Applies this process's path maps to layers and to all layers that they name.
 
-    Layers are changed in memory only, before they are composed: each absolute name in them, of
-    layers, textures and all other files. Names that are relative need nothing.
+    Changes layers in memory only, before they are composed: each absolute path of layers, textures
+    and other files. Relative paths remain valid.
     """
     pairs = own_maps()
     if not pairs:
@@ -282,7 +283,7 @@ def change_layers(layers: Iterable[Sdf.Layer]) -> None:
             UsdUtils.ModifyAssetPaths(layer, lambda path: mapped(path, pairs))
         for name in layer.GetCompositionAssetDependencies():
             if name and not name.lower().endswith(".mtlx"):
-                # Of one that cannot be read the stage tells when it is composed.
+                # USD reports unreadable layers when it composes them.
                 with suppress(Tf.ErrorException):
                     other = Sdf.Layer.FindOrOpenRelativeToLayer(layer, name)
                     if other:

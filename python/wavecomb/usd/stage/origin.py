@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The position that a scene is built around, and what single precision cannot hold even so.
+"""Chooses the origin of the scene and detects geometry that single precision cannot represent.
 
-The core computes in single precision: a million units from the origin coordinates have steps of
-1/16 unit. So the scene of a stage whose camera is far away is built around a point near the camera.
-Transforms are double precision until they have been moved there.
+The core computes in single precision: a million units from the origin, coordinates have steps of
+1/16 unit. Therefore the scene of a stage whose camera is far away is built around a point near the
+camera. Transforms are in double precision until this translation has been applied.
 """
 
 from __future__ import annotations
@@ -21,34 +21,34 @@ from wavecomb.usd.geometry.mesh_arrays import IDENTITY
 Origin = tuple[float, float, float]
 
 NEAR = 2.0**14
-"""Coordinates up to this have steps of 1/1024 unit or less in single precision."""
+"""Largest coordinate whose float32 step is at most 1/1024 unit."""
 
 CELL = 2.0**12
-"""Origins are multiples of it, so that most frames of a moving camera have the same one."""
+"""Origins are multiples of this, so that most frames of a moving camera share an origin."""
 
 MANY = 4096
-"""Prims that are looked at to find the middle of a stage without a camera."""
+"""Most prims that determine the centre of a stage without a camera."""
 
 DEEP = 256
-"""Prims that are nested deeper are not looked at: USD adds up their transforms recursively."""
+"""Deepest prims that are considered, since USD computes their transforms recursively."""
 
 WORLD: Origin = (0.0, 0.0, 0.0)
-"""The world's origin: of all stages that are seen from nearby."""
+"""The world's origin, which is used if the camera is close to it."""
 
 
 def find_origin(
     stage: Usd.Stage, time: Usd.TimeCode, camera: Usd.Prim | None, purposes: Sequence[str]
 ) -> Origin:
-    """The origin of a scene: near the camera, or in the middle of the drawn prims without one.
+    """Returns the origin of a scene: near the camera, or at the centre of drawn prims without one.
 
-    It depends on the stage, frame and camera alone, so that all regions, tiles and machines that
+    It depends only on the stage, frame and camera, so that all regions, tiles and machines that
     render one image agree.
 
     Args:
         stage: The stage.
-        time: Frame that is rendered.
-        camera: Camera prim; None: the bounds are framed.
-        purposes: Purposes of the geometry that is drawn.
+        time: Time code of the frame.
+        camera: Camera prim; None if the bounds are framed.
+        purposes: Purposes of the geometry that is rendered.
     """
     if camera is not None:
         matrix = UsdGeom.XformCache(time).GetLocalToWorldTransform(camera)
@@ -60,7 +60,7 @@ def find_origin(
 
 
 def _places(stage: Usd.Stage, time: Usd.TimeCode, purposes: frozenset[str]) -> NDArray[np.float64]:
-    """World positions (n, 3) of drawn prims: of the middle of their authored extents, or of theirs.
+    """Returns world positions (n, 3) of drawn prims: centres of authored extents, else the origins.
 
     USD's own bounds need every point, and crash on arrays that do not fit together.
     """
@@ -86,7 +86,7 @@ def _is_drawn(prim: Usd.Prim) -> bool:
 
 
 def _snapped(place: NDArray[np.float64]) -> Origin:
-    """The nearest origin to a position; the world's if the position is near it or not finite."""
+    """Rounds a position to an origin; returns ``WORLD`` if it is near or not finite."""
     if not np.isfinite(place).all() or np.abs(place).max() < NEAR:
         return WORLD
     x, y, z = np.round(place / CELL) * CELL + 0.0
@@ -94,14 +94,14 @@ def _snapped(place: NDArray[np.float64]) -> Origin:
 
 
 def around(origin: Origin) -> Gf.Matrix4d:
-    """The transform from the world to a scene with this origin; ``IDENTITY`` itself for WORLD."""
+    """Returns the transform from the world to the scene; ``IDENTITY`` itself for ``WORLD``."""
     if origin == WORLD:
         return IDENTITY
     return Gf.Matrix4d(1.0).SetTranslate(-Gf.Vec3d(*origin))
 
 
 def moved_to(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float64]:
-    """Transforms (..., 4, 4) to the world as transforms to a scene with this origin."""
+    """Converts transforms (..., 4, 4) to the world into transforms to the scene."""
     if origin == WORLD:
         return matrices
     out = np.array(matrices, np.float64)
@@ -110,17 +110,17 @@ def moved_to(matrices: NDArray[np.float64], origin: Origin) -> NDArray[np.float6
 
 
 _STEP = 2.0**-23
-"""Spacing of floats, as a share of their size."""
+"""Relative spacing of float32 numbers."""
 
 _COARSE = 1e-3
-"""Steps of more than this share of a shape show."""
+"""Rounding steps above this fraction of a shape's size are visible."""
 
 STORED = (
     "points are stored too far from the prim's own origin: their single precision is coarser than "
-    "a thousandth of what they make; store them nearer and move the prim by a transform"
+    "a thousandth of the shape; store them nearer and move the prim by a transform"
 )
 INSTANCED = (
-    "shapes are too far from the origin of what is instanced: single precision there is coarser "
+    "shapes are too far from the origin of their prototype: single precision there is coarser "
     "than a thousandth of them; move the instances instead"
 )
 POSITIONS = (
@@ -130,12 +130,12 @@ POSITIONS = (
 
 
 def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> str | None:
-    """What makes a shape too coarse; None: nothing.
+    """Returns a message if single precision is too coarse for a shape, else None.
 
     Args:
-        bounds: (2, 3), in its group's space.
-        matrix: From the prim to its group.
-        in_world: The group is the world, which is built around the camera.
+        bounds: (2, 3) in the space of its group.
+        matrix: Transform from the prim to its group.
+        in_world: Whether the group is the world, which is built around the camera.
     """
     (a, b, c), (x, y, z) = bounds.tolist()
     size = max(x - a, y - b, z - c)
@@ -144,8 +144,8 @@ def problem_of(bounds: NDArray[Any], matrix: Gf.Matrix4d, *, in_world: bool) -> 
         return INSTANCED
     move = matrix.GetRow3(3)
     p, q, r = 0.5 * (a + x) - move[0], 0.5 * (b + y) - move[1], 0.5 * (c + z) - move[2]
-    # Distances are in units of the group, and so is the size: their ratio is the prim's own.
-    # Chained comparisons, not calls: this is done for every prim.
+    # Distance and size are both in units of the group, so their ratio is valid in object space.
+    # Chained comparisons are used for speed, since this runs for every prim.
     far = size * (_COARSE / _STEP)
     if -far <= p <= far and -far <= q <= far and -far <= r <= far:
         return None
@@ -157,7 +157,7 @@ def _scale(matrix: Gf.Matrix4d) -> float:
 
 
 def positions_are_coarse(positions: NDArray[Any]) -> bool:
-    """Whether positions (n, 3) of instances, stored as floats, are too coarse for their extent."""
+    """Returns whether float32 positions (n, 3) of instances are too coarse for their extent."""
     if len(positions) < 2:
         return False
     reach = float(np.abs(positions).max())

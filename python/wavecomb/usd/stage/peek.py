@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A look at the render settings of a file before it is loaded."""
+"""Reads the render settings of a file before it is loaded."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def peek_products(
     product: str | None = None,
     session_layer: str | Path | None = None,
 ) -> tuple[list[RenderChoice], Usd.Stage]:
-    """What the render settings of a file ask for, a choice for each product; at least one.
+    """Reads the render settings of a file; returns one choice per product, at least one.
 
-    Nothing else of the stage is composed, and nothing is reported: loading it says all again. Who
-    keeps the stage that is given, too, until then, saves reading its layers twice.
+    Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
+    the returned stage alive until then avoids reading its layers twice.
 
     Args:
         file: .usd, .usda, .usdc or .usdz.
@@ -34,7 +34,7 @@ def peek_products(
         session_layer: File with opinions that are stronger than the stage's.
 
     Raises:
-        WavecombError: A file cannot be read; there are no such settings or no such product.
+        WavecombError: A file cannot be read, or the settings or product do not exist.
     """
     unread = LoadReport()
     with captured(unread):

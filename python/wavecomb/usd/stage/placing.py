@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts groups into groups: as instances of the scene, with names, materials and motion."""
+"""Adds groups to other groups as instances, with names, materials and motion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from wavecomb.usd.stage.instancing import sound
 
 
 class GroupPlacer:
-    """Gives groups numbers in the scene, and places them in one another."""
+    """Factory of the scene's groups that also instances them."""
 
     def __init__(self, context: LoadContext, mesh_lights: MeshLights) -> None:
         self.builder, self.report = context.builder, context.report
@@ -34,15 +34,15 @@ class GroupPlacer:
     def asset_length(
         self, prim: Usd.Prim, path: str, name: str, parent: Parent | None = None
     ) -> int:
-        """How much of the prim's name, as ``LoadReport.place`` gives it, names its asset.
+        """Returns the length of the asset part of a prim's name (``LoadReport.place``).
 
-        ``path``: its own; ``parent``: of it, where that is known.
+        ``path`` is the path of the prim, and ``parent`` its parent if known.
         """
         length = self.assets.length_below(prim, path, parent)
         return length and length + len(name) - len(path)
 
     def number(self, group: Group) -> int:
-        """A group's number in the scene; made when something comes into it."""
+        """Returns the id of a group in the scene; creates it on first use."""
         if group.number is None:
             group.number = self.builder.add_group(group.name, root=group.root)
             self.report.tally("groups")
@@ -58,9 +58,9 @@ class GroupPlacer:
         numbers: NDArray[np.uint32] | None = None,
         motion: Matrices | None = None,
     ) -> None:
-        """Places a group k times: as k prims, or as so numbered ones of one point instancer.
+        """Adds k instances of a group, from k prims or from numbered instances of one instancer.
 
-        ``motion``: (k, s, 4, 4) transforms at equal steps over the shutter.
+        ``motion`` holds (k, s, 4, 4) transforms at equal steps over the shutter.
         """
         usable = sound(transforms)
         if motion is not None:
@@ -120,7 +120,7 @@ class GroupPlacer:
         )
 
     def _grow(self, parent: Group, child: Group, transforms: Matrices) -> None:
-        """Makes the bounds and outlines of a group hold what is placed in it."""
+        """Extends the bounds and outline of a group by the instances of a child group."""
         if child.bounds is None:
             return
         if self.framed is not None and (inner := framing.joined(child.outlines)) is not None:
@@ -138,7 +138,7 @@ class GroupPlacer:
 def outline_of(
     shape: MeshArrays | CurveArrays, surfaces: Surfaces, more: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Where a shape reaches farthest, in its group."""
+    """Returns the extreme points of a shape in the space of its group."""
     points = shape.positions.reshape(-1, 3)
     if isinstance(shape, CurveArrays):
         radii = np.tile(shape.radii, len(points) // len(shape.radii))

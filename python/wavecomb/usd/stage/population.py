@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of a stage: population masks, payloads, and prims of a kind.
+"""Subsets of a stage: population masks, payloads, and prims of a kind.
 
-Patterns of prim paths are OpenUSD's path expressions, as ``/World/set/*`` or ``//lamp?``: ``*`` and
-``?`` stand for any letters and any one letter of a name, ``[ab]`` for one of those, and ``//`` for
-any number of names between.
+Patterns of prim paths are OpenUSD's path expressions, such as ``/World/set/*`` or ``//lamp?``:
+``*`` stands for any characters of a name, ``?`` for one character, ``[ab]`` for one of those
+characters, and ``//`` for any number of path elements.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from wavecomb.errors import WavecombError
 from wavecomb.usd.stage.report import LoadReport
 
 _FOLLOWED = ("material:binding", "prototypes", "skel:", "light:filters", "portals", "field:")
-"""What names of relationships begin with whose targets are needed to draw a prim."""
+"""Prefixes of relationships whose targets are needed to render a prim."""
 
 _PROXIES = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
-    """Leaves of a stage the prims at and below some paths, their ancestors, and what they need.
+    """Restricts a stage to the prims at and below some paths, their ancestors, and what they need.
 
-    That is: materials, prototypes of point instancers and what shaders connect to; all cameras,
-    lights and render settings, but for those inside of instances that are left out.
+    They need materials, prototypes of point instancers and sources of shader connections. All
+    cameras, lights and render settings are kept, except those inside instances that are left out.
 
-    ``paths`` may be patterns, of prims that are in no instance.
+    ``paths`` may be patterns for prims that are not inside instances.
 
     Raises:
-        WavecombError: A path or pattern names no prim.
+        WavecombError: A path or pattern matches no prim.
     """
     mask = Usd.StagePopulationMask()
     for text in paths:
@@ -55,7 +55,7 @@ def populate(stage: Usd.Stage, paths: Sequence[str]) -> None:
 
 
 def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
-    """Prims that a pattern is the path of, but those below others."""
+    """Returns the topmost prims whose paths match a pattern."""
     found = []
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot()))
     for prim in prims:
@@ -66,7 +66,7 @@ def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
 
 
 def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:
-    """The path, or that of the instance around it: masks know no prims inside of instances."""
+    """Returns a path, or that of the enclosing instance, inside which masks cannot name prims."""
     for prefix in path.GetPrefixes():
         if stage.GetPrimAtPath(prefix).IsInstance():
             return prefix
@@ -74,7 +74,7 @@ def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:
 
 
 def _always(stage: Usd.Stage) -> Iterator[Sdf.Path]:
-    """Cameras, lights and render settings that are in no instance."""
+    """Yields cameras, lights and render settings that are not inside instances."""
     kinds: dict[str, bool] = {}
     for prim in stage.Traverse():
         name = prim.GetTypeName()
@@ -93,7 +93,7 @@ def _always(stage: Usd.Stage) -> Iterator[Sdf.Path]:
 
 
 def _needed(prims: Iterable[Usd.Prim]) -> Iterator[Sdf.Path]:
-    """Prims that those at and below some prims, or above them, point to."""
+    """Yields prims that some prims, their descendants and their ancestors refer to."""
     for top in prims:
         if not top:
             continue
@@ -109,7 +109,7 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
     for relation in prim.GetAuthoredRelationships():
         if relation.GetName().startswith(_FOLLOWED):
             for target in relation.GetTargets():
-                # What a collection holds is there or is not; naming it asks for none of it.
+                # Collections are skipped: being a member does not make a prim necessary.
                 if target.IsPrimPath():
                     yield target
     for attribute in prim.GetAuthoredAttributes():
@@ -119,21 +119,21 @@ def _targets(prim: Usd.Prim) -> Iterator[Sdf.Path]:
 
 
 NONE = "none"
-"""In place of patterns: no payload."""
+"""Value in place of patterns that loads no payload."""
 
 
 def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:
     """Loads payloads of a stage that was opened without any.
 
-    Those of prims that a pattern is the path of, or that are below such prims, and those above that
-    the names of a pattern lead through.
+    Loads payloads of prims that match a pattern, of their descendants, and of ancestors that a
+    pattern's literal names pass through.
 
     Args:
-        stage: Opened with ``Usd.Stage.LoadNone``.
+        stage: A stage opened with ``Usd.Stage.LoadNone``.
         wanted: Patterns, or ``NONE``.
 
     Raises:
-        WavecombError: A pattern is none, or the stage has no such payload.
+        WavecombError: A pattern is invalid, or the stage has no matching payload.
     """
     if NONE in wanted:
         if len(wanted) > 1:
@@ -160,7 +160,7 @@ def load_payloads(stage: Usd.Stage, wanted: Sequence[str]) -> None:
 
 
 def tell_unloaded(stage: Usd.Stage, report: LoadReport) -> None:
-    """Notes payloads that the stage was opened without."""
+    """Reports payloads that are not loaded."""
     if stage.GetLoadRules() == Usd.StageLoadRules.LoadAll():
         return
     loaded = set(stage.GetLoadSet())
@@ -170,10 +170,10 @@ def tell_unloaded(stage: Usd.Stage, report: LoadReport) -> None:
 
 
 class PathPattern:
-    """A pattern, or the path of one prim."""
+    """A pattern of prim paths, or the path of one prim."""
 
     def __init__(self, text: str, what: str) -> None:
-        """``what``: The option, for errors. Raises WavecombError where it is no pattern."""
+        """``what`` is the option's name in errors. Raises WavecombError for an invalid pattern."""
         self.text = text
         self.is_pattern = any(mark in text for mark in ("*", "?", "[", "//"))
         plain = re.sub(r"\[[^]/]*\]|[*?]", "a", text).replace("//", "/")
@@ -193,19 +193,19 @@ class PathPattern:
             self._whole = re.compile(between.join(parts) + r"\Z")
 
     def matches(self, path: Sdf.Path) -> bool:
-        """Whether it is the path of a prim."""
+        """Returns whether the pattern matches the path of a prim."""
         if self._whole is not None:
             return self._whole.match(path.pathString) is not None
         names = _names(path)
         return len(names) == len(self._names) and self._fits(names)
 
     def may_be_below(self, path: Sdf.Path) -> bool:
-        """Whether names that it spells out, those before ``//``, lead through a prim."""
+        """Returns whether the pattern's names before ``//`` pass through a prim."""
         names = _names(path)
         return len(names) < len(self._names) and self._fits(names)
 
     def is_at_or_above(self, path: Sdf.Path) -> bool:
-        """Whether it is the path of a prim or of one of its ancestors."""
+        """Returns whether the pattern matches a prim or one of its ancestors."""
         return any(self.matches(prefix) for prefix in path.GetPrefixes())
 
     def _fits(self, names: list[str]) -> bool:
@@ -217,14 +217,17 @@ def _names(path: Sdf.Path) -> list[str]:
 
 
 def _of_name(pattern: str) -> str:
-    """A regular expression of what a pattern says of one name."""
+    """Converts the pattern of one path element to a regular expression."""
     marks = re.split(r"(\*|\?|\[[^]]*\])", pattern)
     words = {"*": "[^/]*", "?": "[^/]"}
     return "".join(words.get(mark) or _letters(mark) for mark in marks)
 
 
 def _letters(text: str) -> str:
-    """A regular expression of letters or of ``[these]``; ranges that are none match none."""
+    """Converts literal characters or ``[...]`` to a regular expression.
+
+    Invalid ranges match nothing.
+    """
     if not (text.startswith("[") and text.endswith("]")):
         return re.escape(text)
     found = "[^" + text[2:] if text.startswith("[!") else text
@@ -239,9 +242,9 @@ Test = Callable[[Usd.Prim], bool]
 
 
 def every(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
-    """Such prims in the stage's order; in instances as proxies, one for each instance.
+    """Yields matching prims in stage order, as proxies once per instance inside instances.
 
-    Instances that hold none are passed by: a few of them, nested, may mean billions of prims.
+    Skips instances that contain no match, since nested instancing may create billions of prims.
     """
     holding = holders(stage, wanted)
     walk = iter(Usd.PrimRange.Stage(stage, _PROXIES if holding else Usd.PrimDefaultPredicate))
@@ -253,7 +256,7 @@ def every(stage: Usd.Stage, wanted: Test) -> Iterator[Usd.Prim]:
 
 
 def holders(stage: Usd.Stage, wanted: Test) -> set[Sdf.Path]:
-    """Prototypes with such a prim in them, or in what they instance."""
+    """Returns prototypes that contain a matching prim, also in nested instances."""
     holding: set[Sdf.Path] = set()
     users: dict[Sdf.Path, list[Sdf.Path]] = {}
     for prototype in stage.GetPrototypes():

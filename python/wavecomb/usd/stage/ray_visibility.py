@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which kinds of rays see a prim, holdouts and shadow catchers (docs/visibility.md)."""
+"""Ray visibility of prims, holdouts and shadow catchers (docs/visibility.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FLAGS = {
     "primvars:ri:attributes:trace:holdout": "holdout",
     "primvars:ri:attributes:Ri:Matte": "holdout",
 }
-"""Attributes that say one thing: what is not 0 is true."""
+"""Attributes for a single kind of ray; any value other than 0 means visible (or holdout)."""
 _ARNOLD_BOUNCES = tuple(
     f"primvars:arnold:visibility:{kind}"
     for kind in ("diffuse_reflect", "specular_reflect", "diffuse_transmit", "specular_transmit")
@@ -43,24 +43,24 @@ _KARMA_KINDS = {
 }
 _CATCHER = "primvars:wavecomb:catcher"
 NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA, _CATCHER})
-"""All attributes that are read here."""
+"""Names of all attributes that this module reads."""
 
 
 class RayVisibility:
-    """Tells the scene which rays see which prims.
+    """The ray visibility of prims, which it passes to the scene.
 
     Attributes:
         catchers: Paths of prims that are shadow catchers.
     """
 
     def __init__(self, context: LoadContext, ignored: frozenset[str] = frozenset()) -> None:
-        """``ignored``: kinds of rays of which prims have no say."""
+        """``ignored`` lists kinds of visibility whose attributes are ignored."""
         self._builder, self._report = context.builder, context.report
         self._ignored = ignored
         self.catchers: list[str] = []
 
     def read(self, prim: Usd.Prim) -> None:
-        """Reads what a prim says; call it for prims that author one of ``NAMES``."""
+        """Reads the visibility of a prim that authors at least one of ``NAMES``."""
         rays = {
             kind: bool(value)
             for name, kind in _FLAGS.items()
@@ -86,7 +86,7 @@ class RayVisibility:
             self._builder.add_visibility(self._report.place(str(prim.GetPath())), rays)
 
     def _karma(self, mask: str, prim: Usd.Prim) -> dict[str, bool]:
-        """What a mask of Karma says: "primary|shadow", "-primary", "*"."""
+        """Parses a visibility mask of Karma, such as "primary|shadow", "-primary" or "*"."""
         words = [word for word in re.split(r"[|&,\s]+|(?=-)", mask) if word]
         left_out = bool(words) and all(word.startswith("-") for word in words)
         kinds = {word.removeprefix("-") for word in words}
@@ -107,11 +107,11 @@ IGNORED = {
     "lit": frozenset({"holdout"}),
     "bare": frozenset({"holdout", "shadow", "bounces"}),
 }
-"""Kinds of rays of which prims have no say, by ``LoadOptions.catch``."""
+"""Kinds of visibility whose attributes are ignored, by ``LoadOptions.catch``."""
 
 
 def check_there(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:
-    """Raises WavecombError for a path of an option that leads to no prim."""
+    """Raises WavecombError if a path that an option gives is not a prim."""
     for path in paths:
         if not Sdf.Path.IsValidPathString(path) or not stage.GetPrimAtPath(path):
             raise WavecombError(f"{option} {path}: there is no such prim")
@@ -120,16 +120,16 @@ def check_there(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:
 def set_catchers(
     stage: Usd.Stage, options: LoadOptions, authored: list[str], builder: _core.SceneBuilder
 ) -> tuple[str, ...]:
-    """Tells the scene which rays see what; gives the paths of catchers.
+    """Sets the visibility of shadow catchers and of all other prims; returns the catchers' paths.
 
     Args:
-        stage: That was read.
-        options: How.
-        authored: Paths that the stage names.
-        builder: Of the scene; it was told what prims say.
+        stage: The loaded stage.
+        options: Options of the load.
+        authored: Paths of catchers that the stage declares.
+        builder: Builder of the scene, which already has the prims' authored visibility.
 
     Raises:
-        WavecombError: A path that an option gives leads to no prim.
+        WavecombError: A path that an option gives is not a prim.
     """
     check_there(stage, "--catcher", options.catchers)
     paths = tuple(dict.fromkeys((*authored, *options.catchers)))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render settings of a stage, and its render vars as AOVs.
+"""Reads render settings of a stage and maps its render vars to AOVs.
 
-A var is known by a name that some renderer gives it, or by its light path expression.
+A var is recognised by the name that some renderer uses, or by its light path expression.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _PURPOSES = ("default", "render", "proxy", "guide")
 def find_settings(
     stage: Usd.Stage, wanted: str | None, report: LoadReport
 ) -> UsdRender.Settings | None:
-    """The settings asked for, else those that the stage names, else the only ones under /Render.
+    """Returns the settings ``wanted``, else those the stage names, else the only ones in /Render.
 
     Raises:
         WavecombError: There are none of that path or name.
@@ -55,7 +55,7 @@ def find_settings(
 
 
 def _all_settings(stage: Usd.Stage) -> list[UsdRender.Settings]:
-    """Settings under /Render, where they are to be."""
+    """Returns the settings under /Render, where OpenUSD requires them."""
     scope = stage.GetPrimAtPath("/Render")
     prims = Usd.PrimRange(scope) if scope else ()
     return [UsdRender.Settings(prim) for prim in prims if prim.IsA(UsdRender.Settings)]
@@ -64,7 +64,7 @@ def _all_settings(stage: Usd.Stage) -> list[UsdRender.Settings]:
 def find_products(
     stage: Usd.Stage, settings: UsdRender.Settings | None, report: LoadReport
 ) -> list[UsdRender.Product]:
-    """Products that are pictures, in the settings' order."""
+    """Returns the raster products of render settings, in their order."""
     found: list[UsdRender.Product] = []
     if settings is None:
         return found
@@ -84,16 +84,16 @@ def find_products(
 def read_choices(
     stage: Usd.Stage, wanted: str | None, product: str | None, report: LoadReport
 ) -> list[RenderChoice]:
-    """One for each product to render; at least one.
+    """Returns one choice per product to render, at least one.
 
     Args:
-        stage: That asks.
-        wanted: Path or name of render settings; None: as ``find_settings`` says.
-        product: Path or name of the only product to render; None: all.
-        report: For what is odd or not done.
+        stage: The stage.
+        wanted: Path or name of render settings; None uses the default of ``find_settings``.
+        product: Path or name of the only product to render; None renders all.
+        report: Collects warnings and unsupported features.
 
     Raises:
-        WavecombError: There are none of that path or name.
+        WavecombError: No settings or product have that path or name.
     """
     settings = find_settings(stage, wanted, report)
     products = find_products(stage, settings, report)
@@ -114,7 +114,7 @@ def _read(
     product: UsdRender.Product | None,
     report: LoadReport,
 ) -> RenderChoice:
-    """The settings' values under those that the product authors."""
+    """Returns the values of a product, or of the settings if the product does not author them."""
     prims = [p.GetPrim() for p in (product, settings) if p is not None]
 
     def value(name: str, good: Callable[[Any], bool]) -> Any:
@@ -125,7 +125,7 @@ def _read(
             got = attribute.Get()
             if good(got):
                 return got
-            report.warn(f"{name} of render settings is no good: left out", prim.GetPath())
+            report.warn(f"{name} of render settings is invalid: left out", prim.GetPath())
         return None
 
     resolution = value("resolution", _is_size)
@@ -176,7 +176,7 @@ def _is_switch(value: Any) -> bool:
 
 
 def _camera(stage: Usd.Stage, prims: Sequence[Usd.Prim], report: LoadReport) -> str | None:
-    """The camera that the first of some prims points to."""
+    """Returns the first camera that the prims name."""
     for prim in prims:
         for path in UsdRender.SettingsBase(prim).GetCameraRel().GetForwardedTargets():
             camera = stage.GetPrimAtPath(path)
@@ -202,7 +202,7 @@ def _tokens(
 def _vars(
     stage: Usd.Stage, product: UsdRender.Product, report: LoadReport
 ) -> tuple[str, ...] | None:
-    """AOVs of the product's vars, in order; None where it lists none."""
+    """Returns the AOVs of a product's vars in order; None if it lists no vars."""
     found: dict[str, None] = {}
     targets = product.GetOrderedVarsRel().GetForwardedTargets()
     for path in targets:
@@ -244,7 +244,7 @@ _EVENTS = {
     "indirect": ("..+", "...*", ".{2,}", "<..><..>+"),
 }
 _PARTS = {events: name for name, all_events in _EVENTS.items() for events in all_events}
-"""What lies between the camera and the light in an expression."""
+"""Light path events between the camera and the light -> AOV."""
 
 _LIGHT = r"(?:\[<L\.>O\]|\[LO\]|\[OL\]|\(L\|O\)|<L\.>|L)"
 _EXPRESSION = re.compile(rf"C(?P<events>.*?){_LIGHT}")
@@ -252,7 +252,7 @@ _GROUP = re.compile(r"C(?P<events>.*?)<L\.?'(?P<group>[^']+)'>")
 
 
 def aov_of(prim: UsdRender.Var) -> str | None:
-    """The AOV of a var, as ``--aov`` takes it; None where there is none such."""
+    """Returns the AOV of a render var in the syntax of ``--aov``; None if it is not supported."""
     name = word(prim.GetSourceNameAttr().Get())
     kind = word(prim.GetSourceTypeAttr().Get(), "raw")
     if kind == "lpe" or name.startswith(("lpe:", "color lpe:")):
@@ -267,9 +267,9 @@ def aov_of(prim: UsdRender.Var) -> str | None:
 
 
 def _of_expression(text: str, name: str) -> str | None:
-    """The AOV of a light path expression; None where it is none.
+    """Returns the AOV of a light path expression; None if it is invalid.
 
-    What is no other AOV is called by the name of its var.
+    An expression without a built-in AOV is named after its var.
 
     >>> [_of_expression(text, "a") for text in ("C.*", "C<..>[<L.>O]", "C.*<L.'key'>", "C<RD>L")]
     ['beauty', 'direct', 'light_key', 'lpe:a=C<RD>L']

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What loading a stage found: said once each, with how often and where."""
+"""Messages from loading a stage, each reported once with its number and locations."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import dataclass, field
 from typing import Any
 
 MAX_PLACES = 3
-"""Prims named for each finding in a line; the rest is counted."""
+"""Locations in the text of a message; further ones are counted."""
 
 LEVELS = ("warning", "not supported", "note")
-"""Kinds of findings, in the order of a log."""
+"""Kinds of messages, in the order of a log."""
 
 MAX_KEPT = 500
-"""Prims kept for each finding, for who lists them all."""
+"""Most locations that are stored per message."""
 
 
 @dataclass
 class Finding:
-    """Something worth saying.
+    """A message with its locations.
 
     Attributes:
-        what: One line, lower case, no full stop.
-        count: How often it came up.
-        all_places: Prims or files it concerns, up to ``MAX_KEPT``.
+        what: One line in lower case, without a full stop.
+        count: Number of occurrences.
+        all_places: Prims or files that it concerns, up to ``MAX_KEPT``.
     """
 
     what: str
@@ -32,7 +32,7 @@ class Finding:
     _known: set[str] = field(default_factory=set, repr=False, compare=False)
 
     def add(self, place: str, count: int = 1) -> None:
-        """Counts it once more."""
+        """Adds an occurrence."""
         self.count += count
         if place and len(self._known) < MAX_KEPT and place not in self._known:
             self._known.add(place)
@@ -40,11 +40,11 @@ class Finding:
 
     @property
     def places(self) -> list[str]:
-        """The first of ``all_places``."""
+        """The first ``MAX_PLACES`` locations."""
         return self.all_places[:MAX_PLACES]
 
     def line(self) -> str:
-        """The finding as one line."""
+        """Returns the message with its locations as one line."""
         if not self.places:
             return self.what
         places = self.places
@@ -52,18 +52,18 @@ class Finding:
         return f"{self.what}: {', '.join(places)}" + (f" and {more} more" if more > 0 else "")
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Returns plain data for JSON."""
         return {"what": self.what, "count": self.count, "places": self.places}
 
 
 class LoadReport:
-    """Notes, warnings and what is not supported, in the order they came up.
+    """Notes, warnings and unsupported features, in order of occurrence.
 
     Attributes:
-        notes: What was chosen or approximated ("no camera: framed what is drawn").
-        warnings: What is wrong in the stage and what was done about it.
-        unsupported: What the stage asks for and Wavecomb does not do.
-        counts: Prims by kind, as read.
+        notes: Choices and approximations, such as "no camera: framed what is drawn".
+        warnings: Errors in the stage and how they were handled.
+        unsupported: Features of the stage that Wavecomb does not support.
+        counts: Number of prims read, by kind.
     """
 
     def __init__(self) -> None:
@@ -72,11 +72,11 @@ class LoadReport:
         self._aliases: dict[str, str] = {}
 
     def alias(self, prototype: object, instance: object) -> None:
-        """Makes places in a prototype of USD's own be named by the first instance of it."""
+        """Makes paths in one of USD's prototypes appear as paths in its first instance."""
         self._aliases.setdefault(str(prototype), self.place(instance))
 
     def place(self, place: object) -> str:
-        """A prim's path as the user knows it."""
+        """Returns the path of a prim as the user knows it."""
         path = str(place)
         if not path.startswith("/__Prototype_"):
             return path
@@ -95,11 +95,11 @@ class LoadReport:
         self._add("warning", what, place, count)
 
     def missing(self, what: str, place: object = "", count: int = 1) -> None:
-        """Adds something that is not supported."""
+        """Adds an unsupported feature."""
         self._add("not supported", what, place, count)
 
     def absorb(self, other: LoadReport) -> None:
-        """Adds all that another report was told, its prototypes named as here."""
+        """Adds all messages and counts of another report, with this report's prototype names."""
         for level, findings in other._found.items():
             for finding in findings.values():
                 first, *others = finding.all_places or [""]
@@ -110,7 +110,7 @@ class LoadReport:
             self.tally(kind, count)
 
     def absorb_new(self, other: LoadReport) -> None:
-        """Adds what another report was told, of places where this one was not told the same."""
+        """Adds messages of another report for locations that do not have the same message yet."""
         for level, findings in other._found.items():
             for what, finding in findings.items():
                 known = self._found[level].get(what)
@@ -126,21 +126,21 @@ class LoadReport:
 
     @property
     def notes(self) -> list[Finding]:
-        """What was chosen or approximated."""
+        """Choices and approximations."""
         return list(self._found["note"].values())
 
     @property
     def warnings(self) -> list[Finding]:
-        """What is wrong in the stage."""
+        """Errors in the stage."""
         return list(self._found["warning"].values())
 
     @property
     def unsupported(self) -> list[Finding]:
-        """What was asked for and is not done."""
+        """Unsupported features."""
         return list(self._found["not supported"].values())
 
     def lines(self) -> list[str]:
-        """All findings as lines for a log, warnings first."""
+        """Returns all messages as lines for a log, warnings first."""
         return [
             f"{level}: {finding.line()}"
             for level, findings in self._found.items()
@@ -148,7 +148,7 @@ class LoadReport:
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Returns plain data for JSON."""
         return {
             "notes": [finding.as_dict() for finding in self.notes],
             "warnings": [finding.as_dict() for finding in self.warnings],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Says of meshes that cannot fit that they do not, before they are read."""
+"""Checks before reading that the meshes of a stage fit into memory."""
 
 from __future__ import annotations
 
@@ -12,15 +12,20 @@ from wavecomb.run.isolate import memory, patience
 from wavecomb.usd.looks.assign import Draw
 
 LEAST_BYTES = 20
-"""That a mesh takes for each of its points at the least: half a triangle, of 12 bytes and some 32
-in the hierarchy."""
+"""Least memory per mesh point in bytes: half a triangle of 12 bytes plus about 32 bytes in the
+
+acceleration structure.
+"""
 
 _SHARE = 8
-"""Meshes are weighed where the stage's layers are larger than one part in so many of the room."""
+"""The check is skipped if layers are smaller than 1 / ``_SHARE`` of the available memory."""
 
 
 class Room:
-    """Weighs the meshes of one stage. Points of a .usdc lie in its file until they are read."""
+    """Memory check for the meshes of one stage.
+
+    Points of a .usdc file stay in it until they are read.
+    """
 
     def __init__(self, stage: Usd.Stage, time: Usd.TimeCode) -> None:
         layer = stage.GetRootLayer()
@@ -29,7 +34,7 @@ class Room:
         self.is_asked = patience.loaded_layers()[1] > memory.room() // _SHARE
 
     def check(self, draws: Iterable[Draw]) -> None:
-        """Raises WavecombError where meshes, which are not read yet, need more than there is."""
+        """Raises WavecombError if meshes that are not read yet need more memory than available."""
         if not self.is_asked:
             return
         points = 0

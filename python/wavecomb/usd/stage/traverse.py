@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walks down from some prims: what there is to draw, and where."""
+"""Traverses prims of a stage and collects what is to be rendered."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ DRAWN = frozenset(("mesh", "patch", "shape", "splats", *STRANDS.values()))
 
 @dataclass
 class Placed:
-    """A native instance or a point instancer, to be expanded once bindings are known."""
+    """A native instance or a point instancer, which is expanded after bindings are resolved."""
 
     prim: Usd.Prim
     matrix: Gf.Matrix4d
@@ -51,7 +51,7 @@ class Placed:
 
 @dataclass
 class Gathered:
-    """What a walk found in one group."""
+    """Prims that a traversal collected for one group."""
 
     draws: list[Draw] = field(default_factory=list)
     volumes: list[Draw] = field(default_factory=list)
@@ -61,13 +61,13 @@ class Gathered:
     stand_ins: list[Draw] = field(default_factory=list)
 
     def binding_prims(self) -> list[Usd.Prim]:
-        """All prims whose bindings count, in the order in which ``bind`` takes materials."""
+        """Returns all prims with material bindings, in the order that ``bind`` expects."""
         prims = [draw.prim for draw in (*self.draws, *self.volumes)]
         prims += [placed.prim for placed in self.instances]
         return prims + [subset for draw in self.draws for subset in draw.subsets]
 
     def bind(self, materials: Iterable[UsdShade.Material | None]) -> list[UsdShade.Material | None]:
-        """Gives all that was found the materials of ``binding_prims``; those of surfaces."""
+        """Assigns materials to ``binding_prims``; returns those that are used on surfaces."""
         materials = iter(materials)
         for draw in (*self.draws, *self.volumes):
             draw.material = next(materials)
@@ -75,17 +75,17 @@ class Gathered:
             placed.material = next(materials)
         for draw in self.draws:
             if draw.subsets:
-                # A subset without a binding of its own computes the mesh's.
+                # USD resolves a subset without a binding to the material of its mesh.
                 draw.subset_materials = [next(materials) for _ in draw.subsets]
         bound = [m for draw in self.draws for m in (draw.material, *draw.subset_materials)]
         return bound + [placed.material for placed in self.instances]
 
 
 class Traversal:
-    """Finds the prims to draw, one group at a time."""
+    """Traversal that collects the prims to render, one group at a time."""
 
     def __init__(self, context: LoadContext, lights: LightReader, rays: RayVisibility) -> None:
-        """``rays``: is told of prims that say which rays see them."""
+        """``rays`` reads prims that author ray visibility."""
         self.time, self.report, self.motion = context.time, context.report, context.motion
         self.purposes = frozenset(context.purposes)
         self.lights = lights
@@ -98,7 +98,7 @@ class Traversal:
         self._names: dict[tuple[str, ...], frozenset[str]] = {}
 
     def kind(self, prim: Usd.Prim) -> str:
-        """What a prim is to the walk; found once for each type."""
+        """Returns the kind of a prim, computed once per type name."""
         name = str(prim.GetTypeName())
         kind = self._kinds.get(name)
         if kind is None:
@@ -119,7 +119,8 @@ class Traversal:
             elif prim.IsA(UsdGeom.PointInstancer):
                 kind = "instancer"
             elif name == "PortalLight":
-                kind = "xform"  # the dome that names it reads it
+                # The dome light that refers to a portal reads it.
+                kind = "xform"
             elif prim.IsA(UsdLux.BoundableLightBase) or prim.IsA(UsdLux.NonboundableLightBase):
                 kind = "unsupported light"
             elif prim.IsA(UsdGeom.Gprim):
@@ -139,22 +140,23 @@ class Traversal:
         inherited: Sequence[Any] = (),
         base: Gf.Matrix4d = IDENTITY,
     ) -> Gathered:
-        """Finds what is at and below some prims, in stage order.
+        """Collects the prims at and below some roots, in stage order.
 
         Args:
-            roots: Their own transforms count, their parents' do not.
-            purpose: Of their parents.
-            predicate: Of the children to visit; None: USD's default.
-            inherited: Constant primvars that they inherit.
-            base: Transform of their parents, and of prims that reset their transform.
+            roots: Prims to start from; their transforms are included, those of their parents are
+                not.
+            purpose: Purpose of their parents.
+            predicate: Predicate of the children to visit; None is USD's default.
+            inherited: Constant primvars that the roots inherit.
+            base: Transform of their parents and of prims that reset the transform stack.
         """
         found = Gathered()
         time, local = self.time, self.xforms.GetLocalTransformation
         proxies = Usd.TraverseInstanceProxies(
             Usd.PrimDefaultPredicate if predicate is None else predicate
         )
-        # (prim, transform of its parent, its track, purpose, inherited primvars, predicate for its
-        # children, its parent, draw mode)
+        # Prim, transform and animated transform of its parent, purpose, inherited primvars,
+        # predicate for its children, its parent, draw mode.
         stack: list[
             tuple[Usd.Prim, Gf.Matrix4d, Track | None, str, Sequence[Any], Any, Parent | None, str]
         ]
@@ -174,7 +176,7 @@ class Traversal:
                 listed = tuple(prim.GetAuthoredPropertyNames())
                 names = self._names.get(listed) or self._names.setdefault(
                     listed, frozenset(listed)
-                )  # most prims share theirs
+                )  # most prims share a set of names
                 if (
                     "visibility" in names
                     and word(prim.GetAttribute("visibility").Get(time)) == "invisible"
@@ -258,7 +260,7 @@ class Traversal:
     def _stand_in(
         self, found: Gathered, prim: Usd.Prim, mode: str, matrix: Gf.Matrix4d, track: Track | None
     ) -> None:
-        """Adds what is drawn in place of a model."""
+        """Adds the stand-in geometry of a model with a draw mode."""
         made = self.modes.stand_in(prim, mode)
         if made is not None:
             names = authored_names(made.prim)
@@ -267,7 +269,10 @@ class Traversal:
             found.stand_ins.append(draw)
 
     def _shared(self, prototype: Usd.Prim) -> bool:
-        """Whether a prototype has several instances; one alone is drawn as if it were none."""
+        """Returns whether a prototype has several instances.
+
+        A single one is read without instancing.
+        """
         path = prototype.GetPath()
         known = self._counts.get(path)
         if known is None:
@@ -290,13 +295,13 @@ class Traversal:
 
 
 def inherit(prim: Usd.Prim, inherited: Sequence[Any]) -> Sequence[Any]:
-    """Primvars that the children of a prim inherit."""
+    """Returns the primvars that children of a prim inherit."""
     more = UsdGeom.PrimvarsAPI(prim).FindIncrementallyInheritablePrimvars(list(inherited))
     return more if more else inherited
 
 
 def _binds(prim: Usd.Prim) -> bool:
-    """Whether a child of a mesh is a face subset that binds a material."""
+    """Returns whether a child of a mesh is a face subset that binds a material."""
     return (
         prim.GetTypeName() == "GeomSubset"
         and word(prim.GetAttribute("familyName").Get()) == "materialBind"

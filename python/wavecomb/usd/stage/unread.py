@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX files that a stage names and USD did not open."""
+"""MaterialX files that a stage names but USD did not open."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from pxr import Usd
 
 _NAMED = re.compile(r"@([^@]*\.mtlx\]*)@", re.IGNORECASE)
-"""A MaterialX file in what USD says of a layer that it cannot open."""
+"""Name of a MaterialX file in USD's message about a layer that cannot be opened."""
 
 
 def unread_mtlx(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:
-    """Errors of composition that are about MaterialX files, and these files' names."""
+    """Yields composition errors about MaterialX files, with the files' names."""
     for error in stage.GetCompositionErrors():
         found = _NAMED.search(str(error))
         if found is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is seen and how: options, and under them what the stage's render settings say."""
+"""Combines load options with the stage's render settings."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from wavecomb.usd.stage.report import LoadReport
 
 @dataclass(frozen=True)
 class Seen:
-    """What ``LoadOptions`` come to on a stage.
+    """``LoadOptions`` combined with the render settings of a stage.
 
     Attributes:
-        choice: Of the render settings.
-        camera: Prim; None: there is none.
-        lens: For ``read_camera``.
-        blur: For ``find_motion``.
-        purposes: Of the geometry.
-        binding_purposes: Of material bindings.
+        choice: Values of the render settings.
+        camera: The camera prim, or None.
+        lens: Lens options for ``read_camera``.
+        blur: Motion blur options for ``find_motion``.
+        purposes: Purposes of the geometry that is rendered.
+        binding_purposes: Purposes of material bindings in order of preference.
     """
 
     choice: RenderChoice
@@ -39,17 +39,17 @@ class Seen:
 
 
 def check_view(options: LoadOptions) -> None:
-    """Raises WavecombError for what no stage can have."""
+    """Raises WavecombError for options that are invalid for every stage."""
     options.check()
     check_names(options.lens_settings or {})
     _blur(options, True)
 
 
 def seen_on(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> Seen:
-    """What options come to on a stage, with what its render settings say where they say nothing.
+    """Combines options with the stage's render settings; options take precedence.
 
     Raises:
-        WavecombError: It has not what is asked for.
+        WavecombError: The stage lacks something that the options name.
     """
     choices = read_choices(stage, options.render_settings, options.product, report)
     choice = choices[0]
@@ -71,7 +71,10 @@ def seen_on(stage: Usd.Stage, options: LoadOptions, report: LoadReport) -> Seen:
 
 
 def _blur(options: LoadOptions, wanted: bool) -> Blur:
-    """``wanted``: by the render settings; a shutter that is chosen says that it is."""
+    """Returns the motion blur options; a given shutter enables blur.
+
+    ``wanted`` says whether the render settings enable it.
+    """
     blurs = options.motion_blur
     if blurs is None:
         blurs = wanted or options.shutter is not None

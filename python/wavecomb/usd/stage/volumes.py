@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts the volumes of a stage into groups, and adds them to its scene wherever these are."""
+"""Adds the volumes of a stage to groups, and instances them in the scene."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from wavecomb.usd.volumes.info import GridFacts, VolumeFacts
 from wavecomb.usd.volumes.volume import VolumeReader
 
 MAX_VOLUMES = 4096
-"""Volumes that are placed; instances may multiply them."""
+"""Most volumes in a scene, since instancing can multiply them."""
 
 
 class VolumePlacer:
-    """Puts volumes into groups."""
+    """Reader of volumes that adds them to groups."""
 
     def __init__(self, context: LoadContext) -> None:
         self._reader = VolumeReader(context)
@@ -28,14 +28,14 @@ class VolumePlacer:
 
     @property
     def glow(self) -> bool:
-        """Whether one of them may light the scene."""
+        """Whether a volume may emit light."""
         return self._reader.glow
 
     def add(self, group: Group, draw: Draw, scope: Scope) -> None:
-        """Adds a prim's volume to a group; what keeps it out is said.
+        """Adds a prim's volume to a group; reports volumes that are left out.
 
         Raises:
-            WavecombError: A file is broken, or holds what no volume can have.
+            WavecombError: A file is corrupt or contains values that are invalid for a volume.
         """
         path = draw.prim.GetPath()
         if scope.override or (scope.bound and draw.material is None):
@@ -57,7 +57,7 @@ class VolumePlacer:
 
 
 def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
-    """Adds all volumes; says what each is, once for all its places."""
+    """Adds all volumes to the scene; returns one description per volume prim."""
     report = context.report
     volumes = placed_volumes(world, MAX_VOLUMES + 1)
     if len(volumes) > MAX_VOLUMES:
@@ -78,7 +78,7 @@ def add_volumes(world: Group, context: LoadContext) -> tuple[VolumeFacts, ...]:
 
 
 def say_room(volumes: tuple[VolumeFacts, ...], limit: float | None, report: LoadReport) -> None:
-    """Says where grids alone take more than ``--texture-limit``, of so many MB, leaves."""
+    """Reports if grids alone exceed ``--texture-limit`` (in MB)."""
     taken = sum(grid.bytes for grid in {grid for volume in volumes for grid in volume.grids})
     if limit is not None and taken > limit * MEGABYTE:
         report.warn(
@@ -88,7 +88,7 @@ def say_room(volumes: tuple[VolumeFacts, ...], limit: float | None, report: Load
 
 
 def say_cloudy(volumes: tuple[VolumeFacts, ...], cloudy: list[str], report: LoadReport) -> None:
-    """Says that light which scatters inside of these materials meets no volumes there."""
+    """Reports that light scattered inside these materials does not interact with volumes there."""
     for name in cloudy if volumes else ():
         what = (
             "volumes inside of what refracts and scatters: unseen by light that was scattered there"

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes of a stage: the prims, their fields in .vdb files, and what their materials say."""
+"""Reads volumes of a stage: prims, fields in .vdb files, and volume materials."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fields of volumes, and their grids as the core takes them: read and checked once each."""
+"""Reads and validates fields of volumes as grids for the core, each only once."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from wavecomb.usd.stage.report import LoadReport
 from wavecomb.usd.volumes.info import GridFacts
 
 _SLIGHTLY = 1e-3
-"""Share of its greatest value by which a grid may go below 0: what filters leave behind."""
+"""Tolerated negative values relative to a grid's maximum; resampling filters produce them."""
 
 _WARM = ("temperature", "heat", "flame", "flames", "fire", "fuel")
-"""Fields that are no densities where there is another one."""
+"""Names of fields that are not used as density if there is another field."""
 
 _CHUNK = 4096
-"""Bricks that are computed with at a time."""
+"""Bricks that are processed together."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A grid that the scene has.
+    """A grid of the scene.
 
     Attributes:
-        handle: What ``SceneBuilder.add_volume`` takes.
-        corners: (8, 3) Of what is active in it, in object space.
-        facts: For people.
+        handle: Grid object for ``SceneBuilder.add_volume``.
+        corners: (8, 3) corners of the bounds of its active voxels in object space.
+        facts: Description for users.
     """
 
     handle: Any
@@ -50,7 +50,7 @@ class Grid:
 
 
 class GridTable:
-    """Reads grids for one scene."""
+    """Reader of the volume grids of one scene."""
 
     def __init__(self, context: LoadContext) -> None:
         self._builder, self._report = context.builder, context.report
@@ -59,7 +59,7 @@ class GridTable:
         self._known: dict[tuple[Any, ...], Grid | None] = {}
 
     def find(self, fields: Mapping[str, Field], name: str) -> Field | None:
-        """The field of a name, or the one that leads to a grid of this name."""
+        """Returns the field with this name, or one whose grid has this name."""
         if name in fields:
             return fields[name]
         for field in fields.values():
@@ -69,7 +69,7 @@ class GridTable:
         return None
 
     def first_vector(self, fields: Mapping[str, Field], names: Sequence[str]) -> Field | None:
-        """The first field of vectors that has one of these names, or whose grid has it."""
+        """Returns the first vector field that has, or whose grid has, one of the names."""
         for name in names:
             for field in fields.values():
                 head = self._head(field)
@@ -79,7 +79,7 @@ class GridTable:
         return None
 
     def densest(self, fields: Mapping[str, Field]) -> Field | None:
-        """The first field of numbers, which is none of temperatures if there is another."""
+        """Returns the first scalar field, preferring fields that are not temperatures."""
         scalar = []
         for field in fields.values():
             head = self._head(field)
@@ -89,16 +89,16 @@ class GridTable:
         return next(iter(cold or scalar), None)
 
     def get(self, field: Field, use: str, kelvin: float = 0.0) -> Grid | None:
-        """A field as a grid of the scene; None, and said, where it cannot be.
+        """Reads a field as a grid of the scene; reports and returns None if that is not possible.
 
         Args:
-            field: Of a volume.
-            use: "density", "colour", "emission", "temperature", which becomes emission, or
+            field: Field of a volume.
+            use: "density", "colour", "emission", "temperature" (converted to emission) or
                 "velocity".
-            kelvin: What 1 in a grid of temperatures means.
+            kelvin: Temperature that corresponds to a value of 1 in a temperature grid.
 
         Raises:
-            WavecombError: The file is broken, or holds what no volume can have.
+            WavecombError: The file is corrupt or contains values that are invalid for a volume.
         """
         key = (field.file, field.grid or field.name, field.index, use, kelvin)
         if key not in self._known:
@@ -110,7 +110,10 @@ class GridTable:
         return self._known[key]
 
     def _table(self, field: Field) -> list[vdb.GridHead] | None:
-        """The grids of a field's file; None, and said, where there is no file."""
+        """Returns the grids in a field's file.
+
+        Reports and returns None if the file does not exist.
+        """
         if field.file not in self._tables:
             table = None
             if not os.path.isfile(field.file):
@@ -127,7 +130,7 @@ class GridTable:
         return self._tables[field.file]
 
     def _head(self, field: Field) -> vdb.GridHead | None:
-        """The grid that a field leads to; None, and said, where there is none."""
+        """Returns the grid of a field; reports and returns None if there is none."""
         table = self._table(field)
         if table is None:
             return None
@@ -153,7 +156,7 @@ class GridTable:
         found = vdb.read(field.file, head, background_is_zero=is_dark, whole=not is_dark)
         named = f"{field.file}: grid {head.name!r}"
         if found.not_finite:
-            numbers = f"{found.not_finite:,} numbers that are infinite or none"
+            numbers = f"{found.not_finite:,} values that are infinite or NaN"
             raise WavecombError(f"{named} has {numbers}: clean it where it was made")
         if found.box is None or not len(found.origins):
             self._report.note(f"empty grid {head.name!r}: left out", field.prim)
@@ -171,7 +174,7 @@ class GridTable:
             self._report.missing("numbers as velocity (left out)", field.prim)
             return None
         if use == "velocity" and found.kind == "staggered":
-            what = f"staggered grid {head.name!r}: taken for one of the middles of its voxels"
+            what = f"staggered grid {head.name!r}: treated as values at voxel centres"
             self._report.note(what, field.prim)
         self._check_sign(found, named, use, field)
         if use == "colour" and found.greatest > 1:
@@ -189,7 +192,7 @@ class GridTable:
         return Grid(handle, _corners(found.box, matrix), facts)
 
     def _check_sign(self, found: vdb.Bricks, named: str, use: str, field: Field) -> None:
-        """Refuses a grid of negative values, unless it is by next to nothing."""
+        """Rejects grids with negative values; sets slightly negative values to 0."""
         if not found.negative or use == "velocity":
             return
         if found.kind == "level set" and use == "density":
@@ -210,12 +213,12 @@ class GridTable:
             return min(max(found.background[0], 0.0), 1.0) if same else 0.0
         if any(found.background):
             values = " ".join(f"{value:g}" for value in found.background)
-            what = f"grid {head.name!r} of background {values}: 0 outside of what is active"
+            what = f"grid {head.name!r} of background {values}: 0 outside of active voxels"
             self._report.note(what, field.prim)
         return 0.0
 
     def _values(self, values: NDArray[Any], use: str, kelvin: float) -> NDArray[Any]:
-        """Values in the working space, of temperatures their light."""
+        """Converts values to the working space, and temperatures to emission."""
         if use == "temperature":
             made = np.empty((*values.shape, 3), np.float32)
             for at in range(0, len(values), _CHUNK):
@@ -237,7 +240,7 @@ class GridTable:
         name: str,
         **signs: bool,
     ) -> Any:
-        """The grid as the builder has it: in this process, or in the one that builds the scene."""
+        """Creates the grid in this process, or in the process that builds the scene."""
         make = getattr(self._builder, "make_volume_grid", None)
         if make is None:
             from wavecomb import _core
@@ -247,7 +250,7 @@ class GridTable:
 
 
 def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(8, 3) Corners of the voxels from the first to the last index, in object space."""
+    """Returns the corners (8, 3) of the voxels from the first to the last index in object space."""
     ends = np.array([box[0] - 0.5, box[1] + 0.5])
     index = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1)
                       for k in (0, 1)])  # fmt: skip
@@ -256,16 +259,17 @@ def _corners(box: NDArray[np.int32], matrix: NDArray[np.float64]) -> NDArray[np.
 
 
 STEFAN_BOLTZMANN = 5.670374e-8
-"""W m^-2 K^-4."""
+"""Stefan-Boltzmann constant in W m^-2 K^-4."""
 
 _HOTTEST = 1e5
 _FIRST, _LAST, _COUNT = 1000.0, 15000.0, 512
 
 
 def radiance(kelvin: NDArray[Any]) -> NDArray[np.float32]:
-    """Linear Rec.709 (..., 3): the colour of the black body, of luminance sigma T^4 / pi in MW.
+    """Returns black-body radiance in linear Rec.709 (..., 3), with luminance sigma T^4 / pi in MW.
 
-    That is Cycles' unit, 1 at 2729 K and 11.3 at 5000 K. Colours below 1000 K are that of 1000 K.
+    This is the unit of Cycles: 1 at 2729 K and 11.3 at 5000 K. Below 1000 K the chromaticity of
+    1000 K is used.
     """
     hot = np.clip(np.asarray(kelvin, np.float64), 0.0, _HOTTEST)
     strength = (STEFAN_BOLTZMANN * 1e-6 / np.pi) * hot**4
@@ -276,7 +280,7 @@ def radiance(kelvin: NDArray[Any]) -> NDArray[np.float32]:
 
 @functools.cache
 def _colours() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Temperatures, and the colours of luminance 1 of these."""
+    """Returns temperatures and the corresponding colours of luminance 1."""
     at = np.linspace(_FIRST, _LAST, _COUNT)
     return at, np.array([blackbody(float(kelvin)) for kelvin in at])
 
@@ -286,12 +290,12 @@ class Field:
     """A field of a volume.
 
     Attributes:
-        name: Of the relationship, without ``field:``.
-        file: A .vdb file.
-        grid: Its name in the file; "": that of the relationship, or the only one.
-        index: Among the grids of that name.
-        prim: Path of the asset.
-        changes: Whether the file changes over time.
+        name: Name of the relationship without ``field:``.
+        file: Path of a .vdb file.
+        grid: Name of the grid in the file; "" means the field's name, or the only grid.
+        index: Index among grids with the same name.
+        prim: Path of the field asset.
+        changes: Whether the file path changes over time.
     """
 
     name: str
@@ -303,7 +307,7 @@ class Field:
 
 
 def read_fields(volume: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> dict[str, Field]:
-    """The fields of a volume by name, in its order; those that cannot be read are said."""
+    """Returns the fields of a volume by name, sorted; reports those that cannot be read."""
     found: dict[str, Field] = {}
     stage = volume.GetStage()
     for name, path in sorted(UsdVol.Volume(volume).GetFieldPaths().items()):

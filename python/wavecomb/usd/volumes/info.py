@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What there is to say of a volume that was read: ``wavecomb info`` lists it."""
+"""Descriptions of volumes and their grids, which ``wavecomb info`` prints."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Any
 
 @dataclass(frozen=True)
 class GridFacts:
-    """A grid of a volume.
+    """Description of a grid.
 
     Attributes:
         use: "density", "colour", "emission", "temperature" or "velocity".
-        field: Name of the relationship.
-        file: Where it is read from.
-        grid: Its name there.
-        value: "float", "half", "vec3s" ... as OpenVDB calls it.
-        voxels: That are active.
-        bytes: That its bricks take in memory, with their borders.
+        field: Name of the volume's field.
+        file: File that holds the grid.
+        grid: Name of the grid in the file.
+        value: OpenVDB's name of the value type, such as "float", "half" or "vec3s".
+        voxels: Number of active voxels.
+        bytes: Memory of its bricks with their borders.
     """
 
     use: str
@@ -32,14 +32,14 @@ class GridFacts:
 
 @dataclass(frozen=True)
 class VolumeFacts:
-    """A volume.
+    """Description of a volume.
 
     Attributes:
         name: Prim path.
-        count: How often it is placed.
-        low: Least corner of all of it in the world.
-        high: Greatest corner.
-        grids: None of a homogeneous one.
+        count: Number of instances.
+        low: Lowest corner of the bounds of all instances in world space.
+        high: Highest corner.
+        grids: Its grids; empty for a homogeneous volume.
     """
 
     name: str
@@ -49,7 +49,7 @@ class VolumeFacts:
     grids: tuple[GridFacts, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Returns plain data for JSON."""
         return {
             "name": self.name,
             "count": self.count,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a volume looks like: coefficients, and the fields that they are multiplied by."""
+"""Optical properties of a volume: coefficients and the fields that multiply them."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ Colour = tuple[float, float, float]
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 DENSITY = "density"
-"""The field that a volume without a material is as dense as, where it has that."""
+"""Field that is the density of a volume without a material."""
 
 
 @dataclass(frozen=True)
 class Driven:
-    """A colour times a field.
+    """A colour that is multiplied by a field.
 
     Attributes:
-        colour: Linear, in Rec.709.
-        field: Name of a field; "": none.
+        colour: Linear Rec.709.
+        field: Name of the field, or "".
     """
 
     colour: Colour = BLACK
@@ -27,28 +27,28 @@ class Driven:
 
     @property
     def is_black(self) -> bool:
-        """Whether it is 0 whatever the field."""
+        """Whether the colour is 0, so that the field does not matter."""
         return not any(self.colour)
 
     def scaled(self, by: Colour) -> Driven:
-        """Times a colour."""
+        """Returns this value multiplied by a colour."""
         return replace(self, colour=product(self.colour, by))
 
 
 @dataclass(frozen=True)
 class VolumeLook:
-    """How a volume absorbs, scatters and emits.
+    """Absorption, scattering and emission of a volume.
 
     Attributes:
-        extinction: Per unit of length of the stage, times the field ``density``.
-        albedo: Share of it that is scattered, times the field ``colour``.
-        anisotropy: Mean cosine, in (-1, 1).
-        emission: Radiance per unit of length of the stage, times the field ``glow``.
-        density: Name of a field; "": the one named density, or the first of numbers.
-        colour: Name of a field; "": none.
-        glow: Name of a field; "": as the density.
-        kelvin: Unless 0, ``glow`` holds temperatures, and this is what 1 in it means.
-        name: For messages.
+        extinction: Extinction coefficient per stage unit, multiplied by the field ``density``.
+        albedo: Single-scattering albedo, multiplied by the field ``colour``.
+        anisotropy: Mean cosine of the phase function, in (-1, 1).
+        emission: Emitted radiance per stage unit, multiplied by the field ``glow``.
+        density: Name of a field; "" means the field named density, or the first scalar field.
+        colour: Name of a field, or "".
+        glow: Name of a field; "" means the density field.
+        kelvin: Temperature of value 1 in ``glow``; 0 if ``glow`` does not hold temperatures.
+        name: Name for messages.
     """
 
     extinction: Colour = WHITE
@@ -63,25 +63,25 @@ class VolumeLook:
 
 
 DEFAULT_LOOK = VolumeLook()
-"""Without a material: white smoke, whose density 1 is an extinction of 1 per unit of the stage."""
+"""Look of a volume without a material: white smoke, extinction 1 per unit at density 1."""
 
 
 def product(a: Colour, b: Colour) -> Colour:
-    """Of two colours."""
+    """Returns the product of two colours."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
 def total(a: Colour, b: Colour) -> Colour:
-    """Sum of two colours."""
+    """Returns the sum of two colours."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def share(part: Colour, whole: Colour) -> Colour:
-    """A colour divided by another; 0 where that is."""
+    """Divides two colours; division by 0 gives 0."""
     r, g, b = (p / w if w > 0 else 0.0 for p, w in zip(part, whole, strict=True))
     return (r, g, b)
 
 
 def grey(value: float) -> Colour:
-    """A number as a colour."""
+    """Returns a number as a grey colour."""
     return (value, value, value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The volume terminal of a material as a look, and meshes that bound what it says."""
+"""Reads the volume output of a material, for volumes and for meshes that bound a medium."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from wavecomb.usd.volumes.shaders import (
 )
 
 _CONTEXTS = ("mtlx", "", "arnold")
-"""Render contexts whose terminals are looked at, in this order."""
+"""Render contexts whose volume outputs are tried, in this order."""
 
 
 def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
-    """The shader of a material's volume terminal, where it is one that is known."""
+    """Returns the shader of a material's volume output if it is supported, else None."""
     known = STANDARD + CLOSURES
     for context in _CONTEXTS:
         shader = material.ComputeVolumeSource(context)[0]
@@ -34,17 +34,17 @@ def volume_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
 
 
 class VolumeLooks:
-    """Reads the looks of materials, each once."""
+    """The volume looks of materials; each is read once."""
 
     def __init__(self, time: Usd.TimeCode, metres_per_unit: float, report: LoadReport) -> None:
-        """``metres_per_unit``: of the stage; MaterialX's coefficients are per metre."""
+        """``metres_per_unit`` is the stage's scale; MaterialX's coefficients are per metre."""
         self._time = time
         self._metres = metres_per_unit
         self._report = report
         self._known: dict[Sdf.Path, VolumeLook] = {}
 
     def of(self, material: UsdShade.Material | None, volume: Usd.Prim) -> VolumeLook:
-        """The look of a volume that wears a material; the default where it says none."""
+        """Returns the look of a volume with a material; the default look if it is not supported."""
         if material is None:
             return DEFAULT_LOOK
         path = material.GetPath()
@@ -80,9 +80,9 @@ class VolumeLooks:
 
 
 def filling(material: UsdShade.Material, time: Usd.TimeCode, report: LoadReport) -> Surface | None:
-    """A surface that does nothing but bound the medium of a material's volume terminal.
+    """Returns an index-matched surface that bounds the medium of a material's volume output.
 
-    None where it has no such terminal that is known.
+    Returns None if the material has no supported volume output.
     """
     prim = material.GetPrim()
     if volume_shader(material) is None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volume shaders: MaterialX's ``volume``, whose coefficients are per metre, and Arnold's.
+"""Volume shaders: MaterialX's ``volume``, with coefficients per metre, and Arnold's.
 
-Their inputs are constants, fields that nodes read, and products of these.
+Inputs may be constants, fields that nodes read, and products of these.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from wavecomb.usd.volumes.look import (
 )
 
 CLOSURES = ("ND_volume", "ND_volume_volumeshader")
-"""Identifiers of shaders that mix distribution functions."""
+"""Identifiers of shaders that combine volume distribution functions (VDFs)."""
 
 _NOTHING = Driven()
 
 
 @dataclass(frozen=True)
 class Medium:
-    """What a distribution function says.
+    """Parameters of a volume distribution function.
 
     Attributes:
-        absorption: Coefficient, per metre.
-        scattering: Likewise.
-        anisotropy: Mean cosine.
+        absorption: Absorption coefficient per metre.
+        scattering: Scattering coefficient per metre.
+        anisotropy: Mean cosine of the phase function.
     """
 
     absorption: Driven = _NOTHING
@@ -58,14 +58,14 @@ class Medium:
 
 
 class ClosureReader:
-    """Reads the volume shader of one material."""
+    """Reader of the MaterialX volume shader of one material."""
 
     def __init__(self, inputs: Inputs, metres_per_unit: float) -> None:
         self._inputs = inputs
         self._metres = metres_per_unit
 
     def read(self, shader: UsdShade.Shader) -> VolumeLook:
-        """The look of ``volume``."""
+        """Returns the look of a ``volume`` shader."""
         medium = self._medium(shader, "vdf", 0)
         glow = self._glow(shader, "edf", 0)
         absorption = medium.absorption.scaled(grey(self._metres))
@@ -82,7 +82,10 @@ class ClosureReader:
         )
 
     def _sum(self, one: Driven, two: Driven) -> Driven:
-        """Of two that read one field; of others the second one's counts, and that is said."""
+        """Adds two values of the same field.
+
+        If the fields differ, reports it and uses the second.
+        """
         if one.is_black:
             return two
         if two.is_black:
@@ -97,7 +100,7 @@ class ClosureReader:
         return None if source is None else source.shader
 
     def _medium(self, shader: UsdShade.Shader, name: str, depth: int) -> Medium:
-        """The distribution function that feeds an input; nothing where nothing does."""
+        """Reads the distribution function that is connected to an input; empty if there is none."""
         node = self._closure(shader, name)
         if node is None:
             return Medium()
@@ -149,7 +152,7 @@ class ClosureReader:
         )
 
     def _glow(self, shader: UsdShade.Shader, name: str, depth: int) -> Driven:
-        """The radiance of the emission that feeds an input."""
+        """Returns the emitted radiance of the EDF that is connected to an input."""
         node = self._closure(shader, name)
         if node is None:
             return Driven(BLACK)
@@ -182,15 +185,15 @@ STANDARD = ("arnold:standard_volume", "standard_volume")
 
 _HALF = (0.5, 0.5, 0.5)
 _OPAQUE = 1e-4
-"""Transparency below which the coefficient is that of it: 9.2 per ``transparent_depth``."""
+"""Smallest transparency; it gives an extinction coefficient of 9.2 per ``transparent_depth``."""
 
 
 def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> VolumeLook:
-    """The look that ``standard_volume`` says.
+    """Returns the look of a ``standard_volume`` shader.
 
-    Of density 1 light passes a length of ``transparent_depth`` with the colour ``transparent``, so
-    the extinction coefficient is density * -ln(transparent) / transparent_depth, per unit of the
-    stage. Inputs and defaults are those that Arnold documents.
+    At density 1, the transmittance over the length ``transparent_depth`` is ``transparent``. So the
+    extinction coefficient is density * -ln(transparent) / transparent_depth per stage unit. Inputs
+    and defaults follow Arnold's documentation.
     """
     dense = inputs.driven(shader, "density", WHITE)
     transparent = inputs.driven(shader, "transparent", grey(math.exp(-1.0)))
@@ -224,7 +227,7 @@ def _clamped(colour: Colour) -> Colour:
 
 
 def _emission(shader: UsdShade.Shader, inputs: Inputs) -> tuple[Colour, str, float]:
-    """Colour, the field that it is times, and what 1 in that means in kelvin, unless 0."""
+    """Returns the emission colour, the field that multiplies it, and its kelvin scale (or 0)."""
     mode = inputs.text(shader, "emission_mode", "blackbody")
     tint = inputs.driven(shader, "emission_color", WHITE)
     strength = max(inputs.number(shader, "emission", 1.0), 0.0)
@@ -245,7 +248,7 @@ def _emission(shader: UsdShade.Shader, inputs: Inputs) -> tuple[Colour, str, flo
 
 
 def _say_others(shader: UsdShade.Shader, inputs: Inputs) -> None:
-    """What the shader asks for and does not get."""
+    """Reports authored inputs that are not supported."""
     for name in ("transparent_channel",):
         if inputs.text(shader, name):
             inputs.report.missing(f"{name} of standard_volume (left out)", shader.GetPath())
@@ -260,11 +263,11 @@ _READERS = {
     "arnold:volume_sample": "channel",
     "volume_sample": "channel",
 }
-"""What ids of nodes that read a field begin with, and the input that names it."""
+"""Prefixes of ids of nodes that read a field, with the input that names it."""
 
 
 class Inputs:
-    """Reads inputs of the shaders of one material."""
+    """Reader of the inputs of one material's shaders."""
 
     def __init__(self, material: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> None:
         self.material = material
@@ -272,7 +275,7 @@ class Inputs:
         self.report = report
 
     def number(self, shader: UsdShade.Shader, name: str, default: float) -> float:
-        """A constant number; what drives it otherwise is said, and the default taken."""
+        """Returns a constant number; reports connected nodes and returns the default for them."""
         source = source_of(shader, name, self.time)
         if source is not None and source.shader is not None:
             self._left_out(source.shader, name)
@@ -280,13 +283,13 @@ class Inputs:
         return default if source is None else number(source.value, default)
 
     def text(self, shader: UsdShade.Shader, name: str, default: str = "") -> str:
-        """A constant text."""
+        """Returns a constant string."""
         return word(value_of(shader, name, self.time), default)
 
     def driven(
         self, shader: UsdShade.Shader, name: str, default: Colour = BLACK, depth: int = 0
     ) -> Driven:
-        """A colour, a number as grey, a field, or a product of them; never below 0."""
+        """Returns a non-negative colour, grey number or field, or a product of these."""
         source = source_of(shader, name, self.time)
         if source is None:
             return Driven(default)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdVol volumes as the core takes them, and how they move while the shutter is open."""
+"""Reads UsdVol volumes for the core, with motion blur by velocity grids."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from wavecomb.usd.volumes.look import BLACK, Colour, VolumeLook
 from wavecomb.usd.volumes.material import VolumeLooks
 
 GLOW = 1e-4
-"""Emission times the size of a volume from which it is taken for a lamp."""
+"""Emission times size from which a volume counts as a light."""
 
 _MOST_ANISOTROPY = 0.999
 
 
 @dataclass(frozen=True)
 class Volume:
-    """A volume before it is placed.
+    """A volume without its world transform.
 
     Attributes:
-        options: Arguments of ``SceneBuilder.add_volume`` but ``to_world``.
-        corners: (8, 3) of it, in its own space.
-        grids: That it is made of.
-        glows: Whether it may light a scene.
+        options: Arguments of ``SceneBuilder.add_volume`` except ``to_world``.
+        corners: (8, 3) corners of its bounds in object space.
+        grids: Descriptions of its grids.
+        glows: Whether it may light a scene by its emission.
     """
 
     options: dict[str, Any]
@@ -45,10 +45,10 @@ class Volume:
 
 
 class VolumeReader:
-    """Reads the volumes of one stage.
+    """Reader of the volumes of one stage.
 
     Attributes:
-        glow: Whether one of them may light the scene.
+        glow: Whether a volume may light the scene by its emission.
     """
 
     def __init__(self, context: LoadContext) -> None:
@@ -61,15 +61,16 @@ class VolumeReader:
         self.glow = False
 
     def read(self, draw: Draw) -> Volume | None:
-        """The volume of a prim; None, and said, where there is none to draw.
+        """Reads the volume of a prim; reports and returns None if there is nothing to render.
 
         Raises:
-            WavecombError: A file is broken, or holds what no volume can have.
+            WavecombError: A file is corrupt or contains values that are invalid for a volume.
         """
         prim = draw.prim
         fields = read_fields(prim, self._time, self._report)
         if not fields and UsdVol.Volume(prim).GetFieldPaths():
-            return None  # which was said
+            # All of its fields are invalid, which has been reported.
+            return None
         look = self._looks.of(draw.material, prim)
         if fields and not vdb.is_there():
             self._report.missing(f"Volume without {vdb.ABSENT}: left out", prim.GetPath())
@@ -112,7 +113,7 @@ class VolumeReader:
         return Volume(options, corners, used, glows)
 
     def _density(self, prim: Usd.Prim, fields: dict[str, Field], look: VolumeLook) -> Grid | None:
-        """The grid that a volume is as dense as."""
+        """Returns the density grid of a volume."""
         field = self._grids.find(fields, look.density) if look.density else None
         if field is None:
             if look.density and look.density != "density":
@@ -154,11 +155,12 @@ _SCALES = ("primvars:arnold:velocity_scale", "arnold:velocity_scale")
 
 @dataclass(frozen=True)
 class Velocity:
-    """What moves a volume.
+    """Velocities of a volume.
 
     Attributes:
-        grid: Of vectors, in object space over a second.
-        seconds: When the shutter opens and closes, from the frame, times the volume's scale.
+        grid: Grid of vectors in object-space units per second.
+        seconds: Opening and closing time of the shutter relative to the frame, times the velocity
+            scale.
     """
 
     grid: Grid
@@ -166,7 +168,7 @@ class Velocity:
 
 
 class VelocityReader:
-    """Finds what moves the volumes of one stage."""
+    """Reader of the velocity grids of the volumes of one stage."""
 
     def __init__(self, context: LoadContext) -> None:
         per_second, motion = context.stage.GetTimeCodesPerSecond(), context.motion
@@ -180,10 +182,10 @@ class VelocityReader:
     def find(
         self, prim: Usd.Prim, fields: Mapping[str, Field], grids: GridTable, time: Usd.TimeCode
     ) -> Velocity | None:
-        """The velocities of a volume; None where it stands still. Says what cannot be blurred.
+        """Returns the velocities of a volume; None if it is static. Reports motion that is ignored.
 
         Raises:
-            WavecombError: The file is broken, or holds what no velocity can be.
+            WavecombError: The file is corrupt or contains values that are invalid as velocities.
         """
         if not self._is_blurred:
             return None

@@ -65,8 +65,7 @@ template <typename F>
 /// from `p` along d.
 template <typename Kind, typename F>
 inline F own_direction_density(const LightReader<F>& light, const Vec3<F>& p, const Vec3<F>& d) {
-  const F by_cosine =
-      max(dot(Kind::template emission_normal<F>(light, p), d), F(0.f)) * kInvPi;
+  const F by_cosine = max(dot(Kind::template emission_normal<F>(light, p), d), F(0.f)) * kInvPi;
   return select(Kind::template is_delta<F>(light), F(kInv4Pi), by_cosine);
 }
 

@@ -64,7 +64,8 @@ concept LightKindClass =
       { Kind::template emit<float>(emission) } -> std::same_as<detail::KindEmission<float>>;
       { Kind::template emission_density<float>(meeting) } -> std::same_as<float>;
       { Kind::template is_delta<float>(light) } -> std::same_as<Mask<float>>;
-    } && (Kind::kIsInfinite || detail::FiniteKindClass<Kind>);
+    } &&
+    (Kind::kIsInfinite || detail::FiniteKindClass<Kind>);
 
 #define WAVECOMB_LIGHT_KIND(name) \
   static_assert(LightKindClass<name##Kind>, "a kind of light lacks a member of LightKindClass");

@@ -89,7 +89,8 @@ class LightTracer {
             uint32_t material, const PathState<F>& path, const LightVertexResult<F>& out) {
     const ShadingRecord<F> record{hit.t,    hit.u, hit.v,    hit.prim,
                                   hit.inst, mesh,  hit.geom, kOnlySlot};
-    if (keep_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material, out.p, out.offered) &&
+    if (keep_light_vertex<F>(vertices_, depth, light_path_row<F>(path, key), record, material,
+                             out.p, out.offered) &&
         light_aovs_.wants_events())
       light_aovs_.keep<F>(kOnlySlot, true);
   }
@@ -100,8 +101,8 @@ class LightTracer {
     const SceneView& scene = context_.scene;
     counts_.add_records(depth, 1);
     const MeshHit<F> mesh_hit{hit.inst, mesh, hit.prim, hit.u, hit.v, rays_.time()};
-    const PathState<F> state = light_path_state<F>(
-        *context_.camera, light_path_row<F>(path, key), hit.t, rays_.time(), true);
+    const PathState<F> state = light_path_state<F>(*context_.camera, light_path_row<F>(path, key),
+                                                   hit.t, rays_.time(), true);
     return kShadeLightVertex<F>[scene.material_program[material]](
         {scene, settings_, key, depth, mesh_hit, hit.geom, hit.t, material, state, &aovs, true},
         setup_, nullptr);

@@ -50,16 +50,16 @@ inline constexpr uint32_t kSubsurface = 128;  ///< may have subsurface random wa
 /// (material/description/variants.h), and with X otherwise. CMake also reads this list, which
 /// requires two spaces and one row on each line. Add new programs at the end, since fingerprints
 /// contain the ids.
-#define WAVECOMB_PROGRAMS(X, P)                                                             \
-  X(diffuse, Diffuse, kNone, 60)                                                            \
-  X(metal, Metal, kGlossy, 75)                                                              \
-  X(dielectric, Dielectric, kGlossy | kGlass, 70)                                           \
-  X(plastic, Plastic, kGlossy, 85)                                                          \
-  X(emissive, Emissive, kEmits, 20)                                                         \
-  P(principled, Principled, kEmits | kGlossy | kTransmitsByOpacity, 110)                    \
-  P(openpbr, OpenPbr, kEmits | kGlossy | kLayered | kNests | kSubsurface, 300)              \
-  X(hair, Hair, kGlossy | kFibre, 350, {"azimuthal_roughness", 0.3f, 0, 1},                 \
-    {"scale_tt", 0.5f, 0, 10}, {"scale_trt", 2, 0, 10}, {"cuticle_tilt", 0, -90, 90},       \
+#define WAVECOMB_PROGRAMS(X, P)                                                       \
+  X(diffuse, Diffuse, kNone, 60)                                                      \
+  X(metal, Metal, kGlossy, 75)                                                        \
+  X(dielectric, Dielectric, kGlossy | kGlass, 70)                                     \
+  X(plastic, Plastic, kGlossy, 85)                                                    \
+  X(emissive, Emissive, kEmits, 20)                                                   \
+  P(principled, Principled, kEmits | kGlossy | kTransmitsByOpacity, 110)              \
+  P(openpbr, OpenPbr, kEmits | kGlossy | kLayered | kNests | kSubsurface, 300)        \
+  X(hair, Hair, kGlossy | kFibre, 350, {"azimuthal_roughness", 0.3f, 0, 1},           \
+    {"scale_tt", 0.5f, 0, 10}, {"scale_trt", 2, 0, 10}, {"cuticle_tilt", 0, -90, 90}, \
     {"tint_r", 1, 0, 1}, {"tint_tt", 1, 0, 1}, {"tint_trt", 1, 0, 1})
 
 /// Programs for collisions in media (path/media.h), in the same format. No mesh can use them,
@@ -75,7 +75,7 @@ enum class ProgramId : uint8_t {
 struct ProgramInfo {
   const char* name;
   uint32_t traits;  ///< bits of program_trait
-  float model_ns;  ///< estimated cost of each record
+  float model_ns;   ///< estimated cost of each record
   std::array<ProgramParameter, kMaxProgramParameters> own;
 
   constexpr size_t own_count() const {
@@ -90,7 +90,7 @@ inline constexpr auto kPrograms = [] {
   return std::to_array<ProgramInfo>({
 #define WAVECOMB_PROGRAM(name, Class, traits, ns, ...) {#name, traits, ns, {{__VA_ARGS__}}},
       WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM)
-      WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
+          WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
 #undef WAVECOMB_PROGRAM
   });
 }();

@@ -111,7 +111,7 @@ WAVECOMB_INLINE Color<F> emit(const Vertex<F, kFeatures>& v,
       if (v.joins_light() && v.depth > 0) [[unlikely]] {
         const Mask<F> known = emits & Mask<F>(base != U(kNoLight));
         others = v.path.ratio * emission_density<F>(scene.lights, base + v.hit.prim, v.path.o,
-                                                       v.path.dir, v.t, known);
+                                                    v.path.dir, v.t, known);
       }
   }
   F w = bounce_weight<F>(v.path.pdf, light_pdf);

@@ -76,10 +76,9 @@ template <typename Bsdf, typename F>
     specular = select(effect.applies, effect.specular, specular);
   }
   const F all(1.f);
-  aovs.lit = note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.to_light), diffuse,
-                                      specular);
-  aovs.bounce =
-      note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.bounce), all, all);
+  aovs.lit =
+      note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.to_light), diffuse, specular);
+  aovs.bounce = note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.bounce), all, all);
   aovs.bounce.is_delta = not_(Mask<F>(at.bounce_pdf > 0.f));
   if constexpr (Bsdf::kWalks) {
     using U = UInt<F>;

@@ -51,10 +51,12 @@ WAVECOMB_INLINE F joint_light_weight(const VertexContext<Bsdf, F, kFeatures>& c,
   const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
   const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
   if (!lights.sends_paths()) return 1.f / F(1.f + by_bounce);
-  const F density = emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
+  const F density =
+      emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
   const Mask<F> point = l.is_delta & (l.distance < kFarAway);
   const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
-  const F by_path = F(c.joint.template towards<Bsdf>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) * density) / nee;
+  const F by_path =
+      F(c.joint.template towards<Bsdf>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) * density) / nee;
   return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
 }
 
@@ -89,8 +91,8 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, k
   const LightSample<F>& l = to_light.light;
   const Vec3<F> wi = c.frame.to_local(l.wi);
   const BsdfEval<F> e = at.bsdf.eval(c.view, wi);
-  const F p_bounce = mixed_pdf<Bsdf, F>(v, c.guide, l.wi, wi, c.wo,
-                                        bounce_pdf(v, at.bsdf, c.wo, c.view, wi, e));
+  const F p_bounce =
+      mixed_pdf<Bsdf, F>(v, c.guide, l.wi, wi, c.wo, bounce_pdf(v, at.bsdf, c.wo, c.view, wi, e));
   F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
   const U& light = l.light;
@@ -118,7 +120,7 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, k
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks)
     valid = valid & not_(at.bsdf.enters(c.wo, wi));
   return {to_light.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
-          light,    set,  reach};
+          light,           set,  reach};
 }
 
 /// Number of light samples that a vertex on a fibre evaluates.

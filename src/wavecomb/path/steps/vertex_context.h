@@ -12,8 +12,8 @@ namespace wavecomb {
 template <typename F>
 struct JointVertex;
 
-/// Context of the steps after `interact`: references to values that take_steps() (path/vertex.h) has
-/// computed once for the vertex.
+/// Context of the steps after `interact`: references to values that take_steps() (path/vertex.h)
+/// has computed once for the vertex.
 ///
 /// Contract: valid only within take_steps(). Steps read it and write VertexResult and the outputs
 /// of Vertex. They are inlined, so that no reference costs a memory access.
@@ -24,8 +24,7 @@ struct VertexContext {
   using Interaction = decltype(interact<Bsdf, F>(std::declval<const Vertex<F, kFeatureSet>&>()));
   /// BSDF of the interaction. A program for volumes has a different type than its phase function.
   using Scattering = std::remove_cvref_t<decltype(std::declval<const Interaction&>().bsdf)>;
-  using View =
-      decltype(std::declval<const Scattering&>().view(std::declval<const Vec3<F>&>()));
+  using View = decltype(std::declval<const Scattering&>().view(std::declval<const Vec3<F>&>()));
   static constexpr uint32_t kFeatures = kFeatureSet;
 
   const Vertex<F, kFeatures>& vertex;

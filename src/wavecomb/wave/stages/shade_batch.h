@@ -114,9 +114,8 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
       if (pool.diffuse) [[unlikely]]
         store_row<RadianceRow, F>(pool.diffuse, slot, {v.next.diffuse}, v.alive);
     if (any(v.alive))
-      store_row<PathRow, F>(
-          pool.paths, slot,
-          path_row<(kFeatures & kBelow) != 0 && Bsdf::kWalks, F>(v.next, path.key), v.alive);
+      store_row<PathRow, F>(pool.paths, slot, path_row < (kFeatures & kBelow) != 0 && Bsdf::kWalks,
+                            F > (v.next, path.key), v.alive);
     if (joins) [[unlikely]]
       scatter<F>(pool.ratio, pack_ratio<F>(v.next), slot, v.alive);
     if (knows_inside) [[unlikely]]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's nodes as value graphs: primitives are written here, the rest is the library's."""
+"""Compiles MaterialX nodes to value graphs; nodes without a handler use the library's graphs."""

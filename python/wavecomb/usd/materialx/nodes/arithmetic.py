@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes of numbers, vectors and matrices, and nodes that choose.
+"""MaterialX nodes for numbers, vectors and matrices, and conditional nodes.
 
-Formulas and defaults are those of the MaterialX Specification 1.39; names of 1.38 are kept.
-Matrices are values of 9 or 16 parts, row by row.
+Formulas and defaults follow the MaterialX Specification 1.39; names of version 1.38 are accepted.
+Matrices are values of 9 or 16 components in row-major order.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ def _of(formula: Callable[[Expressions, Value], Value]) -> Handler:
 
 
 def fract(m: Expressions, x: Value) -> Value:
-    """X - floor(x)."""
+    """Returns x - floor(x)."""
     return m.sub(x, m.op("floor", x))
 
 
 def unit(m: Expressions, x: Value) -> Value:
-    """A vector of length 1 with the direction of x."""
+    """Returns x divided by its length."""
     return m.div(x, m.op("sqrt", m.op("dot", x, x)))
 
 
 def weighted_sum(m: Expressions, vectors: list[Value], weights: Value) -> Value:
-    """The sum of three vectors times a weight each."""
+    """Returns the weighted sum of three vectors."""
     a, b, c = (m.mul(v, (w,)) for v, w in zip(vectors, weights, strict=True))
     return m.add(m.add(a, b), c)
 
@@ -86,7 +86,7 @@ NODES |= {
 
 @_node("atan2")
 def _atan2(n: NodeCall) -> Value:
-    # 1.38 called the inputs in1 and in2.
+    # Version 1.38 names the inputs in1 and in2.
     y, x = n.given("iny") or n.given("in1"), n.given("inx") or n.given("in2")
     return n.make.op("atan2", y or 0.0, x or 1.0)
 
@@ -102,7 +102,7 @@ def _remap(n: NodeCall) -> Value:
 
 @_node("rotate2d")
 def _rotate2d(n: NodeCall) -> Value:
-    """Clockwise, as in MaterialX."""
+    """Rotates clockwise, as MaterialX does."""
     m, x, degrees = n.make, n.value("in", width=2), n.value("amount", width=1)
     angle = m.mul(degrees, math.pi / 180)
     c, s = m.op("cos", angle), m.op("sin", angle)
@@ -126,7 +126,7 @@ def _rotate3d(n: NodeCall) -> Value:
 @_node("ifgreater", "ifgreatereq", "ifequal")
 def _if(n: NodeCall) -> Value:
     m = n.make
-    # Variants with whole numbers have the default 1; only booleans have 0.
+    # The default is 1 for integer variants and 0 for booleans.
     first = 0.0 if n.category == "ifequal" and n.identifier.endswith("B") else 1.0
     a, b = n.value("value1", (first,)), n.value("value2", (0.0,))
     if n.category == "ifequal":
@@ -135,7 +135,8 @@ def _if(n: NodeCall) -> Value:
         condition = m.op("less", b, a)
     else:
         condition = m.sub(1.0, m.op("less", a, b))
-    if "_boolean" in n.identifier:  # the variant whose result is true or false
+    # In this variant the result is the condition itself.
+    if "_boolean" in n.identifier:
         return condition
     return m.op("select", condition, n.value("in1"), n.value("in2"))
 
@@ -151,13 +152,13 @@ def _same(n: NodeCall) -> Value:
 
 @_node("convert")
 def _convert(n: NodeCall) -> Value:
-    """New components are 0, or 1 for the fourth; a single number becomes all components."""
+    """Converts between types: new components are 0 (the fourth is 1), and a number is repeated."""
     words = n.identifier.split("_")  # ND_convert_color3_color4
     return n.value("in", 0.0, WIDTHS.get(words[2], 0) if len(words) > 3 else 0)
 
 
 _PARTS = {"CF": (3, 1), "VF": (3, 1), "CC": (2, 2), "VV": (2, 2)}
-"""Components of the inputs of combine nodes whose inputs are vectors."""
+"""Numbers of components of the inputs of combine nodes with vector inputs."""
 
 
 @_node("combine2", "combine3", "combine4")
@@ -196,15 +197,15 @@ def _swizzle(n: NodeCall) -> Value:
 
 
 def identity(size: int) -> tuple[float, ...]:
-    """The unit matrix, row by row."""
+    """Returns the identity matrix in row-major order."""
     return tuple(float(i % (size + 1) == 0) for i in range(size * size))
 
 
 @_node("transformmatrix")
 def _transform(n: NodeCall) -> Value:
-    """Row vector times matrix; a vector that is too short by one gets a 1.
+    """Multiplies a row vector by a matrix; appends a 1 to a vector that is one component short.
 
-    A result that is longer than the input is cut, not divided by its last component.
+    Cuts a longer result without dividing it by its last component.
     """
     size = 4 if n.identifier.endswith(("M4", "vector4")) else 3
     matrix = n.value("mat", identity(size), size * size)
@@ -230,6 +231,7 @@ def _create(n: NodeCall) -> Value:
     result: Value = ()
     for i in range(size):
         row = n.value(f"in{i + 1}", rows[i * size : (i + 1) * size])
-        # A row of three components in a 4 x 4 matrix is a direction; the last row is a point.
+        # In a 4 x 4 matrix, rows with three components are directions, except the last, which is a
+        # point.
         result += row if len(row) == size else (*row[: size - 1], float(i == size - 1))
     return result

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arnold's nodes that are much like MaterialX's: images, normal maps, arithmetic, primvars.
+"""Arnold nodes that resemble MaterialX nodes: images, normal maps, arithmetic and user data.
 
-Names and defaults are those of Arnold's reference; categories are ids with ``arnold_`` in front.
+Names and defaults follow Arnold's reference; categories are Arnold's ids with the prefix
+``arnold_``.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _WHITE, _BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 
 def category_of(identifier: str) -> str:
-    """The category of ``arnold:image``; "" of ids that are not Arnold's."""
+    """Returns the category of an id such as ``arnold:image``; "" for other ids."""
     return f"arnold_{identifier.removeprefix(PREFIX)}" if identifier.startswith(PREFIX) else ""
 
 
@@ -57,7 +58,7 @@ def _image(n: NodeCall) -> Value:
 
 
 def _of_output(n: NodeCall, texel: Value) -> Value:
-    """The component that an output names, else all."""
+    """Returns the component that the output names, else all components."""
     if n.output in ("r", "g", "b", "a"):
         n.width = 1
         return (texel["rgba".index(n.output)],)
@@ -112,7 +113,7 @@ def _flat(n: NodeCall) -> Value:
 
 @_node("arnold_color_correct")
 def _color_correct(n: NodeCall) -> Value:
-    """Gamma, exposure, multiply and add; what turns hues or contrasts is listed."""
+    """Applies gamma, exposure, multiply and add; reports hue, saturation and contrast."""
     m, x = n.make, n.value("input", _BLACK)
     rgb = fit(x, 3)
     neutral = (("hue_shift", 0.0), ("saturation", 1.0), ("contrast", 1.0), ("mask", 1.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes that are graphs of other nodes: the library's own graphs, compiled in place."""
+"""Compiles nodes that are graphs of other nodes, by expanding the library's graphs in place."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from wavecomb.usd.materialx.library import WIDTHS, Feed, FlatGraph, Inner
 from wavecomb.usd.materialx.nodes.call import NodeCall
 
 NOT_NUMBERS = ("string", "filename", "geomname")
-"""Types of inputs that are words."""
+"""Types of inputs that hold text."""
 
 
 _PLACES = ("texcoord", "st", "position", "normal", "index", "octaves", "style")
-"""Inputs that are numbers whatever the node's output is for."""
+"""Inputs that are read as numbers regardless of the use of the node's output."""
 
 
 def _kind(category: str, name: str, kind: str) -> str:
-    """What the input of a node is for."""
+    """Returns the use of a node input's value."""
     if category == "normalmap" and name == "in":
         return NORMAL
     return NUMBER if name in _PLACES else kind
 
 
 class Body:
-    """One node's graph."""
+    """The expanded graph of one node."""
 
     def __init__(self, call: NodeCall, graph: FlatGraph, spread: int = 0) -> None:
-        """``spread``: components that all numbers have: of one graph for each component alike."""
+        """``spread`` is the width given to numbers in graphs that act per component."""
         self.call = call
         self._graph = graph
         self._spread = spread
         self._done: dict[tuple[str, str, str], Value | None] = {}
 
     def output(self, name: str) -> Value | None:
-        """What an output gives."""
+        """Returns the value of an output."""
         result = self._graph.results.get(name) or next(iter(self._graph.results.values()))
         nodes, interfaces = self._needed(result)
-        # What comes from outside, and nodes in their order: so long graphs are no deep calls.
+        # Evaluate interface inputs and nodes in order, so that long graphs do not recurse deeply.
         for interface, kind in interfaces:
             self.call.inputs.find(interface, kind)
         for node, output, kind in nodes:
@@ -50,7 +50,7 @@ class Body:
         return self.fed(result, self.call.kind)
 
     def _needed(self, result: Feed) -> tuple[list[tuple[str, str, str]], list[tuple[str, str]]]:
-        """What an output is made of, and what it is for: nodes in their order, and interfaces."""
+        """Returns the nodes (in evaluation order) and interface inputs of an output."""
         nodes: dict[tuple[str, str, str], None] = {}
         interfaces: dict[tuple[str, str], None] = {}
         stack = [(result, self.call.kind)]
@@ -82,7 +82,7 @@ class Body:
         return self._done[key]
 
     def fed(self, feed: Feed, kind: str) -> Value | None:
-        """What comes in from a feed."""
+        """Returns the value of a source."""
         if feed.node:
             return self._node(feed.node, feed.output, kind)
         if feed.interface:
@@ -96,7 +96,7 @@ class Body:
         return literal(feed)
 
     def source(self, feed: Feed) -> Source | None:
-        """The same of words."""
+        """Returns the source of a text input."""
         if feed.interface:
             outside = self.call.inputs.source(feed.interface)
             default = self._graph.definition.inputs.get(feed.interface)
@@ -105,12 +105,12 @@ class Body:
         return None if value is None else Source(value=value)
 
     def is_given(self, feed: Feed) -> bool:
-        """Whether a feed is no default."""
+        """Returns whether a source is not a default."""
         return self.call.inputs.has(feed.interface) if feed.interface else True
 
 
 class _Inside:
-    """Inputs of a node in a graph, as ``call.Inputs``."""
+    """Inputs of a node inside a library graph; implements ``call.Inputs``."""
 
     def __init__(self, body: Body, node: Inner) -> None:
         self._body = body
@@ -118,31 +118,31 @@ class _Inside:
 
     @property
     def path(self) -> Sdf.Path:
-        """The prim of the node that the graph stands for."""
+        """Path of the prim whose graph contains the node."""
         return self._body.call.inputs.path
 
     def find(self, name: str, kind: str) -> Value | None:
-        """What feeds an input; None where nothing does."""
+        """Returns the value of an input; None if it is not set."""
         feed = self._node.inputs.get(name)
         return None if feed is None else self._body.fed(feed, kind)
 
     def source(self, name: str) -> Source | None:
-        """The same of what is no number."""
+        """Returns the source of a text input."""
         feed = self._node.inputs.get(name)
         return None if feed is None else self._body.source(feed)
 
     def has(self, name: str) -> bool:
-        """Whether an input is given."""
+        """Returns whether an input is set."""
         feed = self._node.inputs.get(name)
         return feed is not None and self._body.is_given(feed)
 
     def names(self) -> list[str]:
-        """Inputs that are given."""
+        """Returns the names of inputs that are set."""
         return list(self._node.inputs)
 
 
 def literal(feed: Feed) -> Value | None:
-    """The numbers that a feed is written as; None where it is none."""
+    """Parses the numbers of a source's value; returns None for text."""
     if not feed.value or feed.type in NOT_NUMBERS:
         return None
     if feed.type == "boolean":

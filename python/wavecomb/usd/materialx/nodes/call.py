@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One MaterialX node while it is compiled: what its inputs come to."""
+"""One MaterialX node during compilation, with access to its inputs."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from wavecomb.usd.looks.network import Source, word
 from wavecomb.usd.stage.report import LoadReport
 
 OF_MATRICES = ("transformmatrix", "transpose", "creatematrix", "constant", "dot")
-"""Categories whose inputs may be matrices: values of 9 or 16 components."""
+"""Categories whose inputs may be matrices, which are values of 9 or 16 components."""
 
 
 class Inputs(Protocol):
-    """The inputs of a node: of a stage, or of a node graph of the library."""
+    """Interface to the inputs of a node of a stage or of a library graph."""
 
     @property
     def path(self) -> Sdf.Path:
-        """The prim that messages name."""
+        """Path of the prim for messages."""
 
     def find(self, name: str, kind: str) -> Value | None:
-        """What feeds an input; None where nothing does."""
+        """Returns the value of an input; None if it is not set."""
 
     def source(self, name: str) -> Source | None:
-        """The same of what is no number: strings and files."""
+        """Returns the source of an input that holds a string or a file."""
 
     def has(self, name: str) -> bool:
-        """Whether an input is authored."""
+        """Returns whether an input is authored."""
 
     def names(self) -> list[str]:
-        """Inputs that are authored."""
+        """Returns the names of authored inputs."""
 
 
 class NodeHost(Protocol):
-    """What compiles the network that a node is in: ``network.Networks``."""
+    """Interface to the network that contains a node; implemented by ``network.Networks``."""
 
     material: Usd.Prim
     make: Expressions
@@ -49,23 +49,24 @@ class NodeHost(Protocol):
     textures: Any
 
     def primvar(self, name: str, otherwise: Value) -> Value:
-        """What each mesh gives for a primvar."""
+        """Returns the value of a primvar of the mesh."""
 
     def compiled(self, call: NodeCall) -> Value | None:
-        """What a node's output gives."""
+        """Returns the value of a node's output."""
 
 
 class NodeCall:
-    """One node that is being compiled.
+    """One node during compilation.
 
     Attributes:
-        networks: Compiles the network that it is in.
-        inputs: What feeds it.
-        category: Of the node, without types.
+        networks: Network that contains the node.
+        inputs: Inputs of the node.
+        category: Category without types.
         identifier: Name of its definition.
-        output: Name of the output that is asked for.
-        width: Components of that output; 0: as they come.
-        kind: What the value is for: ``graph_surface.BASE``, ``COLOUR``, ``NUMBER`` or ``NORMAL``.
+        output: Name of the requested output.
+        width: Number of components of that output; 0 accepts any number.
+        kind: Use of the value: ``BASE``, ``COLOUR``, ``NUMBER`` or ``NORMAL`` of
+            ``graphs.surface``.
     """
 
     def __init__(
@@ -88,11 +89,14 @@ class NodeCall:
 
     @property
     def make(self) -> Expressions:
-        """Makes operations."""
+        """Factory of operations."""
         return self.networks.make
 
     def given(self, name: str) -> Value | None:
-        """What feeds an input; None where nothing does. A matrix is cut where none can be."""
+        """Returns an input or None.
+
+        Cuts matrices to four components unless the node accepts them.
+        """
         found = self.inputs.find(name, self.kind)
         is_cut = found is not None and len(found) > 4 and self.category not in OF_MATRICES
         return found[:4] if found is not None and is_cut else found
@@ -100,7 +104,7 @@ class NodeCall:
     def value(
         self, name: str, default: float | Sequence[float] | None = 0.0, width: int = 0
     ) -> Value:
-        """An input; of its own width where none is given."""
+        """Returns an input, or its default; ``width`` 0 keeps the input's number of components."""
         found = self.given(name)
         if found is None:
             if isinstance(default, (int, float)):
@@ -110,7 +114,7 @@ class NodeCall:
         return fit(found, width) if width else found
 
     def number(self, name: str, default: float) -> float:
-        """An input that must be one number for all; told where it is not."""
+        """Returns an input that must be a constant number; reports it otherwise."""
         found = self.inputs.find(name, NUMBER)
         if found is None:
             return default
@@ -121,24 +125,25 @@ class NodeCall:
         return found[0]
 
     def text(self, name: str, default: str) -> str:
-        """A string or token."""
+        """Returns a string or token input."""
         source = self.inputs.source(name)
         return word(source.value, default) if source is not None and source.is_value else default
 
     def coordinates(self, name: str = "texcoord") -> Value:
-        """Texture coordinates: of an input, else of the mesh."""
+        """Returns texture coordinates from an input, else from the mesh."""
         found = self.inputs.find(name, NUMBER)
         return self.at_place("texcoord", "") if found is None else fit(found, 2)
 
     def place(self, kind: str, name: str, space: str) -> Value:
-        """position, normal ...: of an input where it is authored, else of the surface."""
+        """Returns a geometric property from an authored input, else from the shading point."""
         found = self.inputs.find(name, NUMBER) if name else None
         return self.at_place(kind, space) if found is None else fit(found, 3)
 
     def at_place(self, kind: str, space: str) -> Value:
-        """What the surface says: texcoord, position, normal, tangent, bitangent or viewdirection.
+        """Returns a geometric property of the shading point.
 
-        ``view`` is the way back, to the camera. ``space``: object or world.
+        ``kind`` is texcoord, position, normal, tangent, bitangent or viewdirection, and ``space``
+        is object or world. The graph input ``view`` points from the surface to the camera.
         """
         make = self.make
         if kind == "texcoord":
@@ -153,17 +158,17 @@ class NodeCall:
         return self.world_position() if kind == "position" else make.input(kind)
 
     def world_position(self) -> Value:
-        """The position of the surface in the world, which the scene's may differ from."""
+        """Returns the world position of the shading point, by adding the scene's origin."""
         position, origin = self.make.input("position"), self.networks.textures.origin
         return self.make.add(position, numbers(*origin)) if any(origin) else position
 
 
 Handler = Callable[[NodeCall], Value | None]
-"""Compiles a node. One that names no input of its own gives what the surface says."""
+"""Compiles a node to a value, or to None if it has none."""
 
 
 def adder(table: dict[str, Handler]) -> Callable[..., Callable[[Handler], Handler]]:
-    """What puts functions in a table: ``@node("tan")`` of a category, or of several."""
+    """Returns a decorator such as ``@node("tan")`` that registers handlers of node categories."""
 
     def node(*categories: str) -> Callable[[Handler], Handler]:
         def add(handler: Handler) -> Handler:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes of colours, of compositing, and of the absorption of hair."""
+"""MaterialX nodes for colours, compositing and hair absorption."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NODES: dict[str, Handler] = {}
 _node = adder(NODES)
 
 LUMA = (0.2722287, 0.6740818, 0.0536895)
-"""Default of ``lumacoeffs`` in MaterialX: those of AP1."""
+"""MaterialX's default of ``lumacoeffs``, which are the weights of AP1."""
 
 
 @_node("rgbtohsv", "hsvtorgb")
@@ -30,15 +30,15 @@ def _luminance(n: NodeCall) -> Value:
 
 
 _KELVIN = (800.0, 25000.0)
-"""Range of the fits below."""
+"""Temperature range of the fits below, in kelvin."""
 
 _CHROMATICITY = ((2222.0, (-1.1063814, -1.34811020, 2.18555832, -0.20219683)),
         (4000.0, (-0.9549476, -1.37418593, 2.09137015, -0.16748867)),
         (0.0, (3.0817580, -5.87338670, 3.75112997, -0.37001483)))  # fmt: skip
-"""y of a black body's chromaticity as a cubic of x, up to a temperature; the last for the rest."""
+"""Cubic fits of black-body chromaticity y(x) up to a temperature; the last covers the rest."""
 
 _TO_REC709 = ((3.2406, -0.9689, 0.0557), (-1.5372, 1.8758, -0.2040), (-0.4986, 0.0415, 1.0570))
-"""Red, green and blue of X, Y and Z."""
+"""Columns of the matrix from XYZ to linear Rec.709, for X, Y and Z."""
 
 
 def _cubic(m: Expressions, x: Value, factors: tuple[float, ...]) -> Value:
@@ -50,7 +50,10 @@ def _cubic(m: Expressions, x: Value, factors: tuple[float, ...]) -> Value:
 
 @_node("blackbody")
 def _blackbody(n: NodeCall) -> Value:
-    """Kang et al. 2002, "Design of Advanced Color Temperature Control System", at luminance 1."""
+    """Returns the colour of a black body at luminance 1.
+
+    Source: Kang et al. 2002, "Design of Advanced Color Temperature Control System".
+    """
     m = n.make
     kelvin = m.op("clamp", n.value("temperature", 5000.0, 1), *_KELVIN)
     t = m.div(1000.0, kelvin)
@@ -74,7 +77,7 @@ def _blackbody(n: NodeCall) -> Value:
 # ---- compositing ---------------------------------------------------------------------------------
 
 Formula = Callable[[Expressions, Value, Value], Value]
-"""The result of a foreground over a background."""
+"""Combines a foreground and a background."""
 
 
 def _blend(formula: Formula, width: int = 0) -> Handler:
@@ -86,7 +89,7 @@ def _blend(formula: Formula, width: int = 0) -> Handler:
 
 
 def _layered(formula: Formula) -> Handler:
-    """Porter and Duff 1984, of colours that are multiplied by their alpha."""
+    """Returns a handler that composites premultiplied colours (Porter and Duff 1984)."""
     return _blend(formula, 4)
 
 
@@ -143,9 +146,9 @@ _PHEOMELANIN = (0.829443, 0.670320, 0.349937)
 
 
 def color_divisor(azimuthal: float) -> float:
-    """Divisor of a colour's logarithm that gives the square root of the absorption.
+    """Returns the divisor of a colour's logarithm that gives the square root of the absorption.
 
-    Chiang et al. 2016, eq. 9; ``fibre_color_divisor`` of the core.
+    Chiang et al. 2016, eq. 9; equals ``fibre_color_divisor`` of the core.
     """
     p = azimuthal
     return 5.969 + p * (-0.215 + p * (2.532 + p * (-10.73 + p * (5.574 + p * 0.245))))
@@ -162,7 +165,10 @@ def _from_color(n: NodeCall) -> Value:
 
 @_node("deon_hair_absorption_from_melanin")
 def _from_melanin(n: NodeCall) -> Value:
-    """E. d'Eon et al., "An Energy-Conserving Hair Reflectance Model", 2011."""
+    """Computes hair absorption from melanin.
+
+    Source: E. d'Eon et al., "An Energy-Conserving Hair Reflectance Model", 2011.
+    """
     m = n.make
     left = m.sub(1.0, n.value("melanin_concentration", 0.25, 1))
     amount = m.mul(m.op("log", m.op("max", left, 1e-4)), -1.0)

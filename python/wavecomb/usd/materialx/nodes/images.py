@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes that read images, and those that scatter copies of one over a hexagonal grid.
+"""MaterialX image nodes, including hex-tiled images and normal maps.
 
-The grid: M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the weights and the
-hash of MaterialX's own code: at each place three copies, turned, scaled and shifted at random, are
-mixed.
+Hex tiling follows M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the
+weights and the hash of MaterialX's own code: it blends three copies of the image at each point,
+which are randomly rotated, scaled and shifted.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _WRAPS = {
 
 
 def stretch_of(uv: Value) -> float:
-    """Lengths in texture coordinates for one in those of the mesh; 1 where that is not constant."""
+    """Returns the scale from mesh to texture coordinates; 1 if it is not constant."""
     m = uv_matrix(uv)
     if m is None:
         return 1.0
@@ -45,17 +45,17 @@ def read_image(
     name: str = "file",
     space: str = "",
 ) -> Value:
-    """r, g, b, alpha of the node's file; its default where there is none that can be read.
+    """Returns r, g, b and alpha of the node's image file, or the fallback if it is unreadable.
 
     Args:
         n: The node.
         uv: Texture coordinates.
         wraps: Wrap modes in u and v.
-        fallback: Input that stands for a missing file.
-        is_raw: Whether the file holds no colours.
-        stretch: Lengths in ``uv`` for one in the mesh's coordinates, where it is known better.
+        fallback: Input with the value for a missing file.
+        is_raw: Whether the file holds data rather than colours.
+        stretch: Scale from mesh coordinates to ``uv``; None computes it from ``uv``.
         name: Input that names the file.
-        space: Colour space that the node itself says, "": none.
+        space: Colour space that the node itself specifies, or "".
     """
     networks = n.networks
     stretch = stretch_of(uv) if stretch is None else stretch
@@ -87,7 +87,7 @@ def _image(n: NodeCall) -> Value:
 
 @_node("UsdUVTexture")
 def _uv_texture(n: NodeCall) -> Value:
-    """MaterialX's graph of it has no sourceColorSpace, which 1.38 had and stages say."""
+    """Reads sourceColorSpace as in MaterialX 1.38; MaterialX's graph of this node lacks it."""
     m = n.make
     uv = n.coordinates("st")
     wraps = [n.text(name, "periodic").replace("periodic", "repeat") for name in ("wrapS", "wrapT")]
@@ -102,17 +102,17 @@ def _uv_texture(n: NodeCall) -> Value:
 
 
 _GRID = 2.0 * math.sqrt(3.0)
-"""Scale of the grid, by which a copy fits what it covers."""
+"""Scale of the grid; a copy then fits its hexagon."""
 _SKEW = (-0.57735027, 1.15470054)
-"""What v gives the skewed coordinates: -tan 30 degrees, twice its opposite."""
+"""Contributions of v to the skewed coordinates: -tan 30 degrees, and -2 times that."""
 _SEED = 0.12345
-"""Added to the numbers of a copy before they are hashed."""
+"""Offset that is added to cell indices before they are hashed."""
 _PERIODIC = ["repeat", "repeat"]
 
 
 @dataclass(frozen=True)
 class _Copy:
-    """One of the three at a place: where it is read, how far it is turned, how near it is."""
+    """One of the three image copies at a point: its coordinates, rotation and blend weight."""
 
     uv: Value
     turn: Value
@@ -120,7 +120,7 @@ class _Copy:
 
 
 def _hash(m: Expressions, p: Value) -> Value:
-    """Two numbers of two, in [0, 1)."""
+    """Hashes two numbers to two pseudo-random numbers in [0, 1)."""
     a = fract(m, m.mul((p[0], p[1], p[0]), numbers(0.1031, 0.1030, 0.0973)))
     turned = m.add((a[1], a[2], a[0]), 33.33)
     a = m.add(a, m.op("dot", a, turned))
@@ -138,7 +138,7 @@ def _turned(m: Expressions, v: Value, sin: Value, cos: Value) -> Value:
 
 
 class _Grid:
-    """The copies at a place of a node."""
+    """The hexagonal grid of a node, which computes the image copies at a point."""
 
     def __init__(self, n: NodeCall) -> None:
         m = self.make = n.make
@@ -160,7 +160,7 @@ class _Grid:
         base = m.op("floor", skewed)
         x, y = ((part,) for part in m.sub(skewed, base))
         z = m.sub(m.sub(1.0, x), y)
-        # 1 in the upper triangle of a cell: where z is 0 or less.
+        # 1 in the upper triangle of a cell, where z is 0 or less.
         upper = m.op("select", m.op("less", 0.0, z), 0.0, 1.0)
         lower = m.sub(1.0, upper)
         sign = m.sub(m.mul(upper, 2.0), 1.0)
@@ -190,7 +190,7 @@ class _Grid:
         return _Copy(uv, turn, weight)
 
     def shares(self, copies: list[_Copy], bright: list[Value] | None = None) -> Value:
-        """How much of each copy there is; ``bright``: by which they are weighed, too."""
+        """Returns the blend weights of the copies; ``bright`` adds luminance weights."""
         m = self.make
         grid = tuple(copy.weight[0] for copy in copies)
         w = m.op("power", m.op("max", grid, 0.0), 7.0)
@@ -204,7 +204,10 @@ class _Grid:
         return self.make.div(w, self.make.op("dot", w, numbers(1.0, 1.0, 1.0)))
 
     def _gain(self, x: Value, r: Value) -> Value:
-        """C. Schlick, "Fast Alternatives to Perlin's Bias and Gain Functions", Gems IV, 1994."""
+        """Applies Schlick's gain curve.
+
+        Source: "Fast Alternatives to Perlin's Bias and Gain Functions", Graphics Gems IV, 1994.
+        """
         m = self.make
         steep = m.sub(m.div(1.0, r), 2.0)
         twice = m.mul(x, 2.0)
@@ -224,7 +227,8 @@ def _hextiled_image(n: NodeCall) -> Value:
     m, grid = n.make, _Grid(n)
     copies = grid.copies()
     texels = _texels(n, grid, copies, is_raw=False)
-    if is_constant(texels[0]):  # no file
+    # This is the fallback of a missing file.
+    if is_constant(texels[0]):
         return texels[0]
     luma, contrast = n.value("lumacoeffs", LUMA, 3), n.value("falloffcontrast", 0.5, 1)
     bright = [m.op("mix", 1.0, m.op("dot", t[:3], luma), contrast) for t in texels]
@@ -236,7 +240,7 @@ def _hextiled_image(n: NodeCall) -> Value:
 
 @_node("hextilednormalmap")
 def _hextiled_normal_map(n: NodeCall) -> Value:
-    """In tangent space; gradients are mixed (M. Mikkelsen, JCGT 9(3), 2020)."""
+    """Blends tangent-space normals by their gradients (M. Mikkelsen, JCGT 9(3), 2020)."""
     m, grid, n.width = n.make, _Grid(n), 3
     kind, n.kind = n.kind, NORMAL
     copies = grid.copies()
@@ -250,7 +254,7 @@ def _hextiled_normal_map(n: NodeCall) -> Value:
         v = m.sub(m.mul(fit(texel, 3), 2.0), 1.0)
         if flips:
             v = v[:1] + m.sub(0.0, v[1:2]) + v[2:]
-        # The frame turns by -turn, so that its vectors keep to the copy.
+        # The frame is rotated by -turn, so that its vectors stay fixed to the copy.
         back = m.sub(0.0, copy.turn)
         across = _turned(m, m.mul(v[:2], strength), m.op("sin", back), m.op("cos", back))
         steep = m.op("max", m.op("abs", v[2:]), 1e-3)

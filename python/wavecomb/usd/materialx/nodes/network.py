@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles networks of MaterialX nodes in a stage to expressions."""
+"""Compiles networks of MaterialX nodes in a stage to value graphs."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ if TYPE_CHECKING:
     from wavecomb.usd.looks.texture import TextureTable
 
 MAX_DEPTH = 100
-"""Nodes in a row."""
+"""Longest chain of connected nodes."""
 
 MAX_NODES = 10_000
-"""Nodes of the networks of a material; a tenth of these in instances of node graphs, whose paths
-are long."""
+"""Most nodes in the networks of a material.
+
+The limit is a tenth of this in instanced node graphs, whose paths are long.
+"""
 
 PER_COMPONENT = {"overlay": "ND_overlay_float"}
-"""Graphs that do the same to each component: the one for numbers does it to all at once."""
+"""Nodes that act per component; the graph of the float variant is applied to all components."""
 
 _WIDTH_OF_TYPE = {
     "float": 1, "half": 1, "double": 1, "int": 1, "bool": 1, "float2": 2, "texCoord2f": 2,
@@ -54,7 +56,10 @@ _FIRST_CHOICES = (
 
 
 def category_of(identifier: str) -> tuple[str, int]:
-    """Category and output width of ``ND_mix_color3``: ("mix", 3); the width is 0 if not said."""
+    """Returns category and output width of an identifier, such as ("mix", 3) for ``ND_mix_color3``.
+
+    The width is 0 if the identifier does not determine it.
+    """
     words = identifier.removeprefix("ND_").split("_")
     at = next((n for n in range(len(words), 0, -1) if "_".join(words[:n]) in CATEGORIES), 0)
     if not at and (definition := definition_of(identifier)) is not None:
@@ -64,21 +69,21 @@ def category_of(identifier: str) -> tuple[str, int]:
         width
         for w in words[at:]
         for name, width in WIDTHS.items()
-        # Variants end in FA, I, B, FC ...: of the same output.
+        # Variant suffixes such as FA, I, B or FC do not change the output type.
         if w.startswith(name) and (w == name or w[len(name) :].isupper())
     ]
     return "_".join(words[:at]), widths[-1] if widths else 0
 
 
 def primitive(category: str, identifier: str) -> Handler | None:
-    """What compiles a node that is written here; None where none does."""
+    """Returns the handler that compiles a node; None if there is none."""
     if "_matrix" in identifier and category not in OF_MATRICES:
         return None
     return PRIMITIVES.get(category)
 
 
 def support_of(identifier: str) -> str:
-    """How a node of the library is read: "primitive", "graph", or "" where it is only named."""
+    """Returns how a library node is compiled: "primitive", "graph", or "" if it is not."""
     definition = definition_of(identifier)
     if definition is None:
         return ""
@@ -92,11 +97,11 @@ def support_of(identifier: str) -> str:
 
 
 class _TooManyNodes(Exception):
-    """A material has more nodes than are read."""
+    """A material has more than the supported number of nodes."""
 
 
 class Networks:
-    """Expressions of the networks of one material; each node once."""
+    """Compiler of the networks of one material to values; each node is compiled once."""
 
     def __init__(
         self, material: Usd.Prim, time: Usd.TimeCode, textures: TextureTable, report: LoadReport
@@ -114,14 +119,17 @@ class Networks:
         self._instances = InstancedGraphs(material, self.node)
 
     def in_working_space(self) -> Networks:
-        """The same networks with constant colours of the working space; tells nothing."""
+        """Returns these networks with constants in the working space.
+
+        The result reports nothing.
+        """
         other = Networks(self.material, self.time, self.textures, LoadReport())
         other.make, other.converts, other.uv_names = self.make, True, self.uv_names
         other.primvars = self.primvars
         return other
 
     def input(self, shader: UsdShade.Shader, name: str, kind: str) -> Value | None:
-        """What feeds an input; None where nothing does, or nothing that can be read."""
+        """Returns the value of an input; None if nothing valid is connected or authored."""
         source = self.source(shader, name)
         if source is None:
             return None
@@ -130,13 +138,16 @@ class Networks:
         return None if source.shader is None else self.node(source.shader, source.output, kind)
 
     def source(self, shader: UsdShade.Shader, name: str) -> Source | None:
-        """What feeds an input, as ``source_of``; the shader may be an instanced node graph."""
+        """Returns the source of an input like ``source_of``.
+
+        Its shader may be an instanced node graph.
+        """
         if self._instances.are_there:
             return self._instances.source(shader.GetInput(name), self.time)
         return source_of(shader, name, self.time)
 
     def node(self, shader: UsdShade.Shader, output: str, kind: str) -> Value | None:
-        """What an output of a node gives."""
+        """Returns the value of a node's output."""
         prim = shader.GetPrim()
         if prim.IsInstance() and prim.IsA(UsdShade.NodeGraph):
             return self._instances.value(prim, output, kind)
@@ -144,7 +155,7 @@ class Networks:
         if key in self._done:
             return self._done[key]
         if key in self._path or len(self._path) > MAX_DEPTH:
-            what = "shading network that runs in a circle or is too deep (cut there)"
+            what = "shading network that is cyclic or too deep (cut there)"
             self.report.warn(what, shader.GetPath())
             return None
         most = MAX_NODES // 10 if self._instances.are_there else MAX_NODES
@@ -165,7 +176,7 @@ class Networks:
         return value
 
     def primvar(self, name: str, otherwise: Value) -> Value:
-        """What each mesh gives for a primvar."""
+        """Returns a placeholder for the primvar's value on each mesh."""
         if name not in self.primvars:
             self.primvars.append(name)
         return self.make.primvar(self.primvars.index(name), otherwise)
@@ -181,7 +192,7 @@ class Networks:
         return NodeCall(self, _Authored(self, shader), category, identifier, output, width, kind)
 
     def compiled(self, call: NodeCall) -> Value | None:
-        """What a node's output gives, of the stage or in a graph of the library."""
+        """Compiles a node's output, of the stage or of a library graph."""
         handler = primitive(call.category, call.identifier)
         if handler is not None:
             value = handler(call)
@@ -193,7 +204,7 @@ class Networks:
         return None if value is None else fit(value, call.width or len(value))
 
     def _nearest(self, call: NodeCall) -> Value | None:
-        """What stands for a node that is not known: the first of its inputs that gives a value."""
+        """Returns a substitute for an unknown node: the first of its inputs with a value."""
         given = call.inputs.names()
         first = [name for name in _FIRST_CHOICES if name in given]
         for name in (*first, *(name for name in given if name not in first)):
@@ -234,7 +245,7 @@ class Networks:
 
 
 def _graph_of(call: NodeCall) -> FlatGraph | None:
-    """The library's graph for a node whose output is numbers."""
+    """Returns the library's graph for a node with a numeric output."""
     if not call.identifier.startswith("ND_"):
         return None
     definition = definition_of(call.identifier)
@@ -251,7 +262,7 @@ def _graph_of(call: NodeCall) -> FlatGraph | None:
 
 
 class _Authored:
-    """Inputs of a shader of a stage, as ``call.Inputs``."""
+    """Inputs of a shader of a stage; implements ``call.Inputs``."""
 
     def __init__(self, networks: Networks, shader: UsdShade.Shader) -> None:
         self._networks = networks
@@ -259,38 +270,38 @@ class _Authored:
 
     @property
     def path(self) -> Sdf.Path:
-        """The shader's."""
+        """Path of the shader."""
         return self._shader.GetPath()
 
     def find(self, name: str, kind: str) -> Value | None:
-        """What feeds an input; None where nothing does."""
+        """Returns the value of an input; None if it is not set."""
         return self._networks.input(self._shader, name, kind)
 
     def source(self, name: str) -> Source | None:
-        """The same of what is no number."""
+        """Returns the source of a text input."""
         return self._networks.source(self._shader, name)
 
     def has(self, name: str) -> bool:
-        """Whether an input is authored."""
+        """Returns whether an input is authored."""
         return self.source(name) is not None
 
     def names(self) -> list[str]:
-        """Inputs that are there."""
+        """Returns the names of the shader's inputs."""
         return [item.GetBaseName() for item in self._shader.GetInputs()]
 
 
 Compile = Callable[[UsdShade.Shader, str, str], Value | None]
-"""What an output of a shader gives, for a kind of value."""
+"""Callback that compiles a shader output for a use of the value."""
 
 
 class InstancedGraphs:
-    """Sources of inputs in a material that holds instances of node graphs.
+    """Resolver of connections in a material that contains instanced node graphs.
 
-    A short document nests graphs to any depth: there are many more paths than graphs. Instances of
-    one prototype whose inputs come from the same places have the same value, compiled once.
+    A short document can nest graphs so deeply that there are many more paths than graphs. Instances
+    of a prototype whose inputs have the same sources have the same value, which is compiled once.
 
     Attributes:
-        are_there: Whether the material holds any.
+        are_there: Whether the material contains instances.
     """
 
     def __init__(self, material: Usd.Prim, compile_node: Compile) -> None:
@@ -301,7 +312,10 @@ class InstancedGraphs:
         self._values: dict[tuple[Any, ...], Value | None] = {}
 
     def source(self, shader_input: UsdShade.Input, time: Usd.TimeCode) -> Source | None:
-        """What feeds an input, as ``network.source_of``; the shader may be an instanced graph."""
+        """Returns the source of an input like ``source_of``.
+
+        Its shader may be an instanced graph.
+        """
         if not shader_input:
             return None
         end = self._end(shader_input.GetAttr())
@@ -311,7 +325,7 @@ class InstancedGraphs:
         return None if value is None else Source(value=value, attribute=end)
 
     def value(self, graph: Usd.Prim, output: str, kind: str) -> Value | None:
-        """What an output of an instanced graph gives."""
+        """Returns the value of an output of an instanced graph."""
         node = UsdShade.NodeGraph(graph)
         fed_by = tuple((str(i.GetBaseName()), self._origin(i)) for i in node.GetInputs())
         key = (graph.GetPrototype().GetPath(), output, kind, fed_by)
@@ -328,7 +342,7 @@ class InstancedGraphs:
         return self._compile(shader, UsdShade.Output(end).GetBaseName(), kind)
 
     def _end(self, attribute: Usd.Attribute) -> Usd.Attribute:
-        """Where connections lead: to an output of a shader or of an instance, or to a value."""
+        """Follows connections to an output of a shader or instance, or to a value."""
         passed: list[Sdf.Path] = []
         seen: set[Sdf.Path] = set()
         while (path := attribute.GetPath()) not in self._ends and path not in seen:
@@ -352,10 +366,10 @@ class InstancedGraphs:
         return found or None
 
     def _origin(self, graph_input: UsdShade.Input) -> str:
-        """What an input of a graph is fed by: equal for inputs that have the same value."""
+        """Returns a key of an input's source, equal for inputs with the same value."""
         end = self._end(graph_input.GetAttr())
         prim = end.GetPrim()
         if UsdShade.Output.IsOutput(end) or not prim.IsInstanceProxy():
             return str(end.GetPath())
-        # A value that the prototype has is the same in all instances.
+        # A value in the prototype is the same for all instances.
         return str(prim.GetPrimInPrototype().GetPath().AppendProperty(end.GetName()))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes of the hit point: positions, primvars, normal maps, spaces, time, patterns.
+"""MaterialX nodes for geometry: positions, primvars, normal maps, spaces, time and patterns.
 
-With M the linear part of the transform from the object to the world, a hit gives the rows of the
-inverse of M (``normal_x`` ...) and its position in both spaces, and no more. The columns of M are
-the cross products of these rows over their determinant.
+With M the linear part of the object-to-world transform, graphs can read the rows of the inverse of
+M (``normal_x`` ...) and the position in both spaces. The columns of M are the cross products of
+these rows divided by their determinant.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _texcoord(n: NodeCall) -> Value:
 
 
 def _named(name_input: str, fallback: str, usual: str = "") -> Handler:
-    """A handler of nodes that read the primvar that an input names, or ``usual``."""
+    """Returns a handler that reads the primvar named by an input, or ``usual``."""
 
     def compiled(n: NodeCall) -> Value:
         name = n.text(name_input, usual)
@@ -66,7 +66,7 @@ NODES |= {
 
 
 def _texture_coordinates(n: NodeCall, name: str) -> Value:
-    """The mesh's texture coordinates for the first set that a material reads, else a primvar."""
+    """Returns the mesh's UVs for the first set that a material reads, else a primvar."""
     names = n.networks.uv_names
     if names and names[0] != name:
         return n.networks.primvar(name, numbers(0.0, 0.0))
@@ -75,7 +75,7 @@ def _texture_coordinates(n: NodeCall, name: str) -> Value:
 
 
 def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
-    """A primvar of the mesh; displayOpacity is the alpha of ``geomcolor``."""
+    """Returns a primvar of the mesh; displayOpacity is the alpha of ``geomcolor``."""
     networks = n.networks
     converts, networks.converts = networks.converts, False
     otherwise = n.value(fallback, width=n.width)
@@ -95,7 +95,7 @@ def _primvar(n: NodeCall, name: str, fallback: str) -> Value:
 
 @_node("normalmap")
 def _normal_map(n: NodeCall) -> Value:
-    """A normal in tangent space; without a map that of the surface."""
+    """Returns a normal in tangent space; without a map, the unperturbed normal."""
     m, n.width = n.make, 3
     texel = n.inputs.find("in", NORMAL)
     if texel is None:
@@ -107,12 +107,12 @@ def _normal_map(n: NodeCall) -> Value:
 
 
 def _rows(m: Expressions) -> list[Value]:
-    """Rows of the inverse of M, in the world."""
+    """Returns the rows of the inverse of M in world space."""
     return [m.input(f"normal_{axis}") for axis in "xyz"]
 
 
 def _columns(m: Expressions) -> list[Value]:
-    """Columns of M, in the world."""
+    """Returns the columns of M in world space."""
     a, b, c = _rows(m)
     across = m.op("cross", b, c)
     size = m.op("dot", a, across)
@@ -124,9 +124,9 @@ def _dots(m: Expressions, vectors: list[Value], v: Value) -> Value:
 
 
 def _tangent_of_object(m: Expressions, normal: Value) -> Value:
-    """A normal of object space in tangent space, on the side of the surface's normal.
+    """Converts an object-space normal to tangent space.
 
-    The surface's normal faces the viewer, so the map's normal is turned over with it.
+    The shading normal faces the viewer, so the map's normal is flipped together with it.
     """
     there = unit(m, weighted_sum(m, _rows(m), fit(normal, 3)))
     frame = [m.input(name) for name in ("tangent", "bitangent", "normal")]
@@ -135,13 +135,13 @@ def _tangent_of_object(m: Expressions, normal: Value) -> Value:
 
 
 def _spaces(n: NodeCall) -> tuple[bool, bool]:
-    """Whether a transform starts, and ends, in object space, which is the default."""
+    """Returns whether a transform starts and ends in object space, which is the default."""
     start, end = (n.text(name, "") or "object" for name in ("fromspace", "tospace"))
     return start != "world", end != "world"
 
 
 def _transformed(n: NodeCall, default: tuple[float, ...]) -> Value:
-    """The input of a transform. Its kind is a number even if the result is a shading normal."""
+    """Returns the input of a transform, read as a number even if the result is a shading normal."""
     found = n.inputs.find("in", NUMBER)
     return fit(numbers(*default) if found is None else found, 3)
 
@@ -154,7 +154,8 @@ def _transform(n: NodeCall) -> Value:
         return n.value("in", (0.0, 0.0, 1.0), 3)
     v = _transformed(n, (0.0, 0.0, 1.0 if is_normal else 0.0))
     if n.kind == NORMAL:
-        if not is_normal:  # the normal that becomes this vector
+        # Find the normal that the transform maps to this vector.
+        if not is_normal:
             v = _dots(m, _columns(m), weighted_sum(m, _columns(m), v))
         return _tangent_of_object(m, v)
     if starts == ends:
@@ -166,7 +167,7 @@ def _transform(n: NodeCall) -> Value:
 
 @_node("transformpoint")
 def _transform_point(n: NodeCall) -> Value:
-    """Relative to the hit point, whose position is known in both spaces."""
+    """Transforms relative to the shading point, whose position is known in both spaces."""
     m = n.make
     starts, ends = _spaces(n)
     p = _transformed(n, (0.0, 0.0, 0.0))
@@ -182,7 +183,7 @@ def _transform_point(n: NodeCall) -> Value:
 
 
 def _point(n: NodeCall) -> Value:
-    """Texture coordinates of a node whose category ends in 2d, else the position."""
+    """Returns texture coordinates for categories that end in 2d, else the position."""
     if n.category.endswith("2d"):
         return n.coordinates()
     return n.place("position", "position", "object")
@@ -224,7 +225,7 @@ def _worley(n: NodeCall) -> Value:
 
 @_node("ramplr", "ramptb", "splitlr", "splittb")
 def _ramp(n: NodeCall) -> Value:
-    """A ramp or split along u, or along v, whose top is at v = 1."""
+    """Interpolates or splits along u, or along v with the top at v = 1."""
     m, (u, v) = n.make, n.coordinates()
     names, at = (("valuel", "valuer"), (u,)) if n.category[-2:] == "lr" else (
         ("valueb", "valuet"), (v,)

@@ -13,4 +13,4 @@ PRIMITIVES: dict[str, Handler] = {
 }
 
 CATEGORIES = frozenset(PRIMITIVES)
-"""Categories of nodes that flat graphs of the library keep."""
+"""Node categories that are not expanded when library graphs are flattened."""

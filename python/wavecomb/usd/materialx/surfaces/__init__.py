@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's surface shaders as the program "openpbr"."""
+"""Converts MaterialX surface shaders to the programs "openpbr" and "hair"."""

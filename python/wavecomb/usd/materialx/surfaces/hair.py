@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's ``chiang_hair_bsdf``, as the program "hair".
+"""Converts MaterialX's ``chiang_hair_bsdf`` to the program "hair".
 
-The program takes a colour and roughnesses (docs/hair.md); the node takes absorption, and variances
-and scales of its lobes. What a node drives is turned round by a graph.
+The program takes a colour and roughnesses (docs/hair.md); the node takes absorption and, per lobe,
+variance and scale. If a node drives the absorption, a graph computes the inverse mapping.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from wavecomb.usd.materialx.nodes.colours import color_divisor
 from wavecomb.usd.materialx.surfaces.openpbr import SurfaceReader
 
 _LOBES = {"R": (0.1, 0.1), "TT": (0.05, 0.05), "TRT": (0.2, 0.2)}
-"""Lobes, with the defaults of their roughnesses."""
+"""Lobes and their default roughnesses."""
 
 
 def variance(roughness: float) -> float:
-    """Of a lobe along the fibre, by longitudinal roughness (Chiang et al. 2016, eq. 7)."""
+    """Returns the longitudinal variance of a lobe for a roughness (Chiang et al. 2016, eq. 7)."""
     r = roughness
     return float((0.726 * r + 0.812 * r**2 + 3.7 * r**20) ** 2)
 
 
 def scale(roughness: float) -> float:
-    """Of a lobe about the fibre, by azimuthal roughness, as MaterialX has it (eq. 8)."""
+    """Returns the azimuthal scale of a lobe for a roughness, as in MaterialX (eq. 8)."""
     r = roughness
     return float(0.265 * r + 1.194 * r**2 + 5.372 * r**22)
 
 
 def _inverse(function: Any, wanted: float) -> float:
-    """The roughness in [0.001, 1] at which a rising function comes nearest to a value."""
+    """Inverts an increasing function of roughness on [0.001, 1] by bisection."""
     low, high = 0.001, 1.0
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -45,10 +45,10 @@ def _inverse(function: Any, wanted: float) -> float:
 
 
 class HairReader(SurfaceReader):
-    """Reads a ``chiang_hair_bsdf``."""
+    """Reader of ``chiang_hair_bsdf`` shaders."""
 
     def read(self, shader: UsdShade.Shader) -> Surface:
-        """The surface; what it cannot show is said."""
+        """Returns the surface; reports unsupported inputs."""
         parameters = self.parameters
         self.put("ior", self.drivers.value(shader, "ior", "ior") or (1.55,))
         if parameters.get("ior", 1.55) < 1.0:
@@ -56,7 +56,7 @@ class HairReader(SurfaceReader):
             parameters["ior"] = 1.55
         self._roughness(shader)
         self._colour(shader)
-        # MaterialX's angle turns the other way, and 0.5 of it is no tilt.
+        # MaterialX's angle has the opposite sign, and 0.5 means no tilt.
         angle = self._number(shader, "cuticle_angle", 0.5)
         parameters["cuticle_tilt"] = min(max(90.0 - 180.0 * angle, -90.0), 90.0)
         for lobe in _LOBES:
@@ -67,7 +67,7 @@ class HairReader(SurfaceReader):
         return self.drivers.surface("hair", parameters)
 
     def _roughness(self, shader: UsdShade.Shader) -> None:
-        """Roughnesses: those of one helper as they are, else from variances and scales."""
+        """Reads roughnesses from a common helper node, else from the lobes' variances."""
         helper, parameters = self._helper(shader), self.parameters
         if helper is not None:
             along = self.drivers.value(helper, "longitudinal", "roughness") or (0.1,)
@@ -96,7 +96,10 @@ class HairReader(SurfaceReader):
             parameters[name] = min(max(parameters[name], 0.0), 10.0)
 
     def _helper(self, shader: UsdShade.Shader) -> UsdShade.Shader | None:
-        """The ``chiang_hair_roughness`` that all lobes come from; None where there is none."""
+        """Returns the ``chiang_hair_roughness`` node that feeds all lobes.
+
+        Returns None if there is none.
+        """
         found = []
         for lobe in _LOBES:
             source = source_of(shader, f"roughness_{lobe}", self.time)
@@ -107,7 +110,7 @@ class HairReader(SurfaceReader):
         return found[0] if len({node.GetPath() for node in found}) == 1 else None
 
     def _pair(self, shader: UsdShade.Shader, lobe: str) -> tuple[float, float]:
-        """Variance and scale of a lobe; MaterialX's clamps."""
+        """Returns variance and scale of a lobe, clamped as in MaterialX."""
         source = source_of(shader, f"roughness_{lobe}", self.time)
         given = None if source is None else source.value
         if source is not None and source.shader is not None:
@@ -125,7 +128,7 @@ class HairReader(SurfaceReader):
         return min(max(v, 0.001), 1.0), min(max(s, 0.001), 1.0)
 
     def _colour(self, shader: UsdShade.Shader) -> None:
-        """The colour whose absorption, at the roughness of the hair, is what is asked for."""
+        """Sets the colour whose absorption at the hair's roughness equals the requested one."""
         about = self.parameters["azimuthal_roughness"]
         name = "absorption_coefficient"
         source = source_of(shader, name, self.time)
@@ -143,7 +146,7 @@ class HairReader(SurfaceReader):
         self.put("base_color", value)
 
     def _number(self, shader: UsdShade.Shader, name: str, default: float) -> float:
-        """An input that is one number for all."""
+        """Returns an input that must be a constant number."""
         value = self.drivers.value(shader, name, "roughness")
         if value is None:
             return default
@@ -154,7 +157,7 @@ class HairReader(SurfaceReader):
         return float(value[0])  # type: ignore[arg-type]
 
     def _tint(self, shader: UsdShade.Shader, name: str) -> float:
-        """A tint, which has no colour here."""
+        """Returns the luminance of a tint, since the program has no coloured tints."""
         source = source_of(shader, name, self.time)
         if source is None:
             return 1.0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of MaterialX's surface shaders, for people: groups, names, defaults and ranges.
+"""Inputs of MaterialX surface shaders for user interfaces: groups, names, defaults and ranges.
 
-The one table of them is MaterialX's own: the node definitions that come with it.
+All values come from MaterialX's standard node definitions.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from wavecomb.usd.materialx.surfaces.openpbr import MODELS, LayerInputs, layers_
 
 _KINDS = {"float": NUMBER, "color3": COLOUR, "boolean": SWITCH}
 _MOST = 1e6
-"""The most that an input may be where MaterialX does not say."""
+"""Maximum of an input if MaterialX does not specify one."""
 
 _SHORT = (("index of refraction", "ior"), ("diffuse roughness", "roughness"))
 _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness": 1.0}
-"""Right ends of sliders where MaterialX says nothing."""
+"""Upper ends of sliders if MaterialX does not specify them."""
 
 
 class _ReadInputs(LayerInputs):
-    """Records which inputs are read; the value 1 makes ``layers_of`` read all of them."""
+    """Record of the inputs that are read; the value 1 makes ``layers_of`` read all of them."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
@@ -41,7 +41,7 @@ class _ReadInputs(LayerInputs):
 
 @functools.cache
 def read_inputs(model: str) -> frozenset[str]:
-    """Inputs of a shading model that have an effect here, without normals."""
+    """Returns the inputs of a shading model that Wavecomb uses, except normals."""
     names = _ReadInputs()
     layers_of(model, names)
     for row in MODELS[model].textured.values():
@@ -51,11 +51,11 @@ def read_inputs(model: str) -> frozenset[str]:
 
 @functools.cache
 def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
-    """Inputs of a shading model that Wavecomb reads, by name, in MaterialX's order.
+    """Returns the inputs of a shading model that Wavecomb reads, by name, in MaterialX's order.
 
     Args:
         model: A key of ``MODELS``.
-        identifier: The shader's, which may name an older version.
+        identifier: Id of the shader, which may refer to an older version.
     """
     found = _documented(model)
     definition = found.getNodeDef(identifier) or found.getNodeDef(f"ND_{model}_surfaceshader")
@@ -68,7 +68,7 @@ def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
 
 @functools.cache
 def _documented(model: str) -> Any:
-    """MaterialX's document of a shading model."""
+    """Returns MaterialX's document of a shading model."""
     import MaterialX as mx
 
     document = mx.createDocument()
@@ -100,7 +100,8 @@ def _definition(one: Any, model: str) -> InputDefinition:
     soft_low = limit("uisoftmin", low)
     soft_high = limit("uisoftmax", high if one.getAttribute("uimax") else shown)
     if name.startswith("emiss") and kind == COLOUR:
-        high = _MOST  # colours of light are often brighter than the interface would have them
+        # Emission colours often exceed the maximum that MaterialX suggests for its user interface.
+        high = _MOST
     return InputDefinition(
         name, group, _label(one.getAttribute("uiname") or name, group), kind, one.getType(),
         default, low, high, soft_low, soft_high,
@@ -108,12 +109,12 @@ def _definition(one: Any, model: str) -> InputDefinition:
 
 
 def _is_number(model: str, name: str) -> bool:
-    """Whether one number is read of a colour: opacity."""
+    """Returns whether Wavecomb reads a colour input as one number, as it does for opacity."""
     return MODELS[model].textured["opacity"].input == name
 
 
 def _label(name: str, group: str) -> str:
-    """A name without that of its group, in small letters.
+    """Returns the name of an input in lower case without the name of its group.
 
     >>> _label("Coat Index of Refraction", "Coat"), _label("Base", "Base"), _label("Sheen", "Sheen")
     ('ior', 'weight', 'weight')

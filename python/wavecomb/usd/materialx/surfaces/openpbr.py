@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's surface shaders as parameters of the program "openpbr".
+"""Converts MaterialX surface shaders to parameters of the program "openpbr".
 
-These are standard_surface, open_pbr_surface and gltf_pbr. A parameter is an input times a number;
+Supports standard_surface, open_pbr_surface and gltf_pbr. A parameter is an input times a number;
 the input is a constant, a plain texture, or driven by a value graph. ``layers_of`` computes the
-other parameters. docs/decisions/materialx-graphs.md says why Standard Surface is not converted by
-MaterialX's graph ``standard_surface_to_open_pbr_surface``.
+other parameters. docs/decisions/materialx-graphs.md explains why Standard Surface is not converted
+by MaterialX's graph ``standard_surface_to_open_pbr_surface``.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ _MEDIUM = {
     "transmission_scatter_anisotropy": Row("transmission_scatter_anisotropy", 0.0, driven=False),
     "nested_priority": Row("dielectric_priority", 0.0, driven=False),
 }
-"""The medium inside, which standard_surface and open_pbr_surface describe by the same inputs."""
+"""Inputs of the interior medium, which standard_surface and open_pbr_surface share."""
 
 MODELS: dict[str, Model] = {
     "standard_surface": Model(
@@ -189,7 +189,7 @@ MODELS: dict[str, Model] = {
 
 
 def layers_of(model: str, inputs: LayerInputs) -> dict[str, Any]:
-    """Parameters of a shading model that plain textures cannot drive."""
+    """Returns the parameters of a shading model that plain textures cannot drive."""
     known = MODELS[model]
     inputs.ignored(*known.ignored)
     found = {name: _read(row, inputs) for name, row in known.layers.items()}
@@ -205,7 +205,7 @@ def layers_of(model: str, inputs: LayerInputs) -> dict[str, Any]:
 
 
 def _free_paths(model: str, i: LayerInputs) -> Colour:
-    """Mean free paths of subsurface scattering, by channel."""
+    """Returns the mean free paths of subsurface scattering, by channel."""
     if model == "standard_surface":
         scale, by_channel = i.number("subsurface_scale", 1.0), i.colour("subsurface_radius", WHITE)
     else:
@@ -224,7 +224,9 @@ def _read(row: Row, inputs: LayerInputs) -> Any:
 def _standard_surface(i: LayerInputs, found: dict[str, Any]) -> dict[str, Any]:
     specular = found["specular_weight"]
     if specular < 1.0 and i.number("metalness", 0.0) >= 1.0:
-        specular = 1.0  # dims only the edge of a metal; OpenPBR's weight would dim all of it
+        # In Standard Surface this dims only the edge tint of a metal; OpenPBR's weight would dim
+        # all of it.
+        specular = 1.0
     return {"specular_weight": specular, "film_weight": float(found["film_thickness"] > 0)}
 
 
@@ -288,7 +290,7 @@ class SurfaceReader:
         report: LoadReport,
         values: Mapping[str, Any] | None = None,
     ) -> None:
-        """``values``: constants that replace inputs of the surface shader."""
+        """Creates a reader; ``values`` holds constants that replace inputs of the shader."""
         self.values = values or {}
         self.material = material
         self.time = time
@@ -308,10 +310,10 @@ class SurfaceReader:
 
 
 class MaterialXReader(SurfaceReader):
-    """Reads a standard_surface, open_pbr_surface or gltf_pbr."""
+    """Reader of standard_surface, open_pbr_surface and gltf_pbr shaders."""
 
     def read(self, shader: UsdShade.Shader, model_name: str) -> Surface:
-        """The surface: parameters that textures may drive, and layers."""
+        """Returns the surface of a shader whose shading model is ``model_name``."""
         model = MODELS[model_name]
         self.parameters["presence"] = True
         for parameter, row in model.textured.items():
@@ -330,7 +332,8 @@ class MaterialXReader(SurfaceReader):
         inputs = LayerInputs(self, shader, model_name)
         layers = self.parameters["openpbr"] = layers_of(model_name, inputs)
         if layers["anisotropy"] or any("anisotropy" in name for name in inputs.driven):
-            self.drivers.networks.uv_names.append("st")  # the direction of brushing
+            # Anisotropy needs UVs for the direction of the tangent.
+            self.drivers.networks.uv_names.append("st")
         drive_layers(model_name, layers, inputs.driven, self.drivers)
         for name in inputs.driven:
             self.missing(f"MaterialX {model_name} input {name} by a node (one value for all)")
@@ -339,7 +342,7 @@ class MaterialXReader(SurfaceReader):
     def _value(
         self, shader: UsdShade.Shader, parameter: str, name: str, default: float | Colour
     ) -> Value:
-        """The value of an input of the surface shader, or its default."""
+        """Returns the value of an input of the surface shader, or its default."""
         if name in self.values:
             value = self.values[name]
             return numbers(*value) if isinstance(value, tuple) else numbers(float(value))
@@ -363,11 +366,11 @@ class LayerInputs:
         self.driven: dict[str, Value] = {}
 
     def number(self, name: str, default: float) -> float:
-        """A number, or the default where nothing is authored."""
+        """Returns a number, or the default if nothing is authored."""
         return number(self.constant(name, "number"), default)
 
     def colour(self, name: str, default: Colour) -> Colour:
-        """A colour, or the default where nothing is authored."""
+        """Returns a colour, or the default if nothing is authored."""
         return colour(self.constant(name, "any_color"), default)
 
     def ignored(self, *names: str) -> None:
@@ -382,7 +385,7 @@ class LayerInputs:
         self._reader.missing(f"{what}: approximated")
 
     def constant(self, name: str, parameter: str) -> Any:
-        """The value of an input; the mean of a driven one; None where nothing is authored."""
+        """Returns the value of an input, or its mean if a node drives it; None if unauthored."""
         if name in self._reader.values:
             return self._reader.values[name]
         source = source_of(self._shader, name, self._reader.time)
