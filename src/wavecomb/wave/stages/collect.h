@@ -195,8 +195,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     }
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
     if (notes_hits)
-      wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,
-                               surface);
+      wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(),
+                               {.inst = inst, .geom = geom, .material = material}, surface);
     if (notes_hits && wave.aovs.wants_motion()) [[unlikely]]
       wave.aovs.move<F>(
           slot,
