@@ -101,6 +101,17 @@ void check_values(const GridBricks& b) {
                 "' has a background that is negative or not finite; fix the file");
 }
 
+/// Throws Error unless the arrays of a grid have sizes that match.
+void check_layout(const GridBricks& b, const std::string& name) {
+  const size_t count = b.origins.size() / 3;
+  if (b.components != 1 && b.components != 3)
+    throw Error(name + " has " + std::to_string(b.components) + " components; it must be 1 or 3");
+  if (count == 0) throw Error(name + " has no voxels; leave it out");
+  if (b.origins.size() % 3 != 0 ||
+      b.floats.size() + b.halves.size() != count * kInner * b.components)
+    throw Error(name + " does not have 8 x 8 x 8 voxels for each brick");
+}
+
 }  // namespace
 
 size_t VolumeGrid::words_per_brick() const {
@@ -112,14 +123,8 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
       is_half_(!b.halves.empty()),
       background_(b.background),
       is_signed_(b.is_signed) {
-  const size_t count = b.origins.size() / 3;
   const std::string name = "grid '" + b.name + "'";
-  if (b.components != 1 && b.components != 3)
-    throw Error(name + " has " + std::to_string(b.components) + " components; it must be 1 or 3");
-  if (count == 0) throw Error(name + " has no voxels; leave it out");
-  if (b.origins.size() % 3 != 0 ||
-      b.floats.size() + b.halves.size() != count * kInner * b.components)
-    throw Error(name + " does not have 8 x 8 x 8 voxels for each brick");
+  check_layout(b, name);
   check_values(b);
   std::array<int64_t, 3> lo{}, hi{};
   for (size_t i = 0; i < b.origins.size(); ++i) {
