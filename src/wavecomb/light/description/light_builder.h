@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/tree/light_tree.h"
 #include "wavecomb/texture/texture.h"
 
