@@ -44,9 +44,12 @@ struct Lights {
   }
   void build(const std::vector<Light>& lights, const std::vector<EmissiveTriangle>& triangles = {},
              float scene_radius = 10.f) {
-    set = build_lights(
-        lights, triangles.size(), [&triangles](size_t i) { return triangles[i]; }, {0, 0, 0},
-        scene_radius, textures, nullptr, profiles);
+    set = build_lights({.lights = lights,
+                        .triangle_count = triangles.size(),
+                        .triangle = [&triangles](size_t i) { return triangles[i]; },
+                        .scene_radius = scene_radius,
+                        .textures = textures,
+                        .profiles = profiles});
   }
   LightView view() const { return set.view({records.data(), uses.data(), views.data()}); }
 };

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/kinds/kinds.h"
 
 namespace wavecomb {

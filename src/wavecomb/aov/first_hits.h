@@ -59,18 +59,18 @@ class PathFirstHits {
                               active);
   }
 
-  /// Records a camera ray that hits geometry `geom` of instance `inst` at `p`.
+  /// Records a camera ray that hits `surface` at `p`.
   template <typename F>
   void hit_surface(const CameraSetup& camera, const UInt<F>& slot, const Vec3<F>& p, const F& time,
-                   const UInt<F>& inst, const UInt<F>& geom, const UInt<F>& material,
-                   const Mask<F>& active) const {
+                   const FirstSurface<F>& surface, const Mask<F>& active) const {
     const F depth = camera_depth<F>(camera, p, time, active);
     store_depth<F>(slot, depth, active);
     if (hits_)
-      store_row<FirstHitRow, F>(hits_.rows, slot,
-                                {p, names_->template object<F>(inst, geom, active), material, inst,
-                                 depth, camera_distance<F>(camera, p, time, active)},
-                                active);
+      store_row<FirstHitRow, F>(
+          hits_.rows, slot,
+          {p, names_->template object<F>(surface.inst, surface.geom, active), surface.material,
+           surface.inst, depth, camera_distance<F>(camera, p, time, active)},
+          active);
   }
 
   bool wants_motion() const { return bool(motion_); }
@@ -100,7 +100,9 @@ class PathFirstHits {
   /// Records the transmittance `through` of volumes along the camera ray; 0 if the path scattered.
   template <typename F>
   void pass(const UInt<F>& slot, const Color<F>& through, const Mask<F>& active) const {
-    scatter_words<F>(end_.rows, through, slot * uint32_t{kRowWords<RayEndRow>} + 2u, active);
+    scatter_words<F>(end_.rows, through,
+                     slot * uint32_t{kRowWords<RayEndRow>} + word_of(&RayEndRow<float>::through),
+                     active);
   }
 
  protected:

@@ -237,6 +237,27 @@ class PathAovs : public PathFirstHits, public PathCostRows {
  private:
   using Block = SlotRows;
 
+  /// Slots of the paths of one pixel.
+  struct SlotRange {
+    uint32_t begin, end;
+    template <typename Each>
+    void for_each(const Each& each) const {
+      for (uint32_t slot = begin; slot < end; ++slot) each(slot);
+    }
+  };
+  // Parts of resolve(): how camera rays end; values of vertices and first hits; radiance by source;
+  // bounces and costs.
+  void resolve_ends(AovFilm& film, size_t pixel, const SlotRange& slots,
+                    const float* radiance) const;
+  void resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const;
+  void resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots,
+                     const float* radiance) const;
+  void resolve_work(AovFilm& film, size_t pixel, const SlotRange& slots) const;
+  /// Calls put(aov, words) for each AOV of vertices of this kind that is kept. `words` holds its
+  /// first word in the row of slot 0.
+  template <typename Put>
+  void for_each_vertex_aov(AovKind kind, const Put& put) const;
+
   std::array<const Block*, 8> blocks() const {
     return {&vertex_, &parts_[0], &parts_[1],      &early_links_,
             &groups_, &guides_,   &light_samples_, &bounces_};

@@ -27,6 +27,13 @@ struct VolumeSeen {
   Mask<F> in_mesh;
 };
 
+/// Geometry and material that a camera ray hits first.
+template <typename F>
+struct FirstSurface {
+  UInt<F> inst, geom;  ///< geom: geometry within the instance's group
+  UInt<F> material;
+};
+
 /// End of a camera ray.
 template <typename F>
 struct RayEndRow {

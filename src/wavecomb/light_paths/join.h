@@ -31,6 +31,7 @@
 #include "wavecomb/light_paths/connection.h"
 #include "wavecomb/path/steps/interact.h"
 #include "wavecomb/path/steps/note_events.h"
+#include "wavecomb/path/steps/vertex_context.h"
 
 namespace wavecomb {
 
@@ -75,6 +76,7 @@ struct JointVertex {
   }
 };
 
+/// Computes the state of R at the vertex, before its bounce.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE JointVertex<F> joint_vertex(const Vertex<F, kFeatures>& v, const Interaction& at,
                                             const Frame<F>& frame) {
@@ -129,30 +131,33 @@ WAVECOMB_INLINE void leave_point(const Vertex<F, kFeatures>& v, const Interactio
 /// to that vertex, the offer has the factors on the camera's side of the contribution
 ///   T f(w, l) |cos| |g w| / |g l| T_light f_light  v / d^2
 /// and of its weight v (light_vertex.h). Uses no random numbers.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
-WAVECOMB_INLINE void offer_connection(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                      const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                                      const JointVertex<F>& joint) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void offer_connection(const VertexContext<Bsdf, F, kFeatures>& context) {
+  const Vertex<F, kFeatures>& v = context.vertex;
+  const auto& at = context.at;
   ConnectionOffer<F>& offer = *v.offer;
   const Mask<F> wanted = offer.wanted & v.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || none(wanted)) return;
   const Connection<F> c = connect_to_point<F>(at, offer.to);
   const Vec3<F>& w = c.d;
-  const Vec3<F> wi = frame.to_local(w);
-  const BsdfEval<F> e = at.bsdf.eval(seen, wi);
+  const Vec3<F> wi = context.frame.to_local(w);
+  const BsdfEval<F> e = at.bsdf.eval(context.view, wi);
   const Mask<F> shown = wanted & c.valid & at.is_consistent(w, wi);
   const Color<F> light = at.throughput * e.f_cos * offer.vertices;
   offer.row = {c.o, e.pdf, select<F>(shown, clean<F>(light, 0.f), Color<F>(F(0.f))),
-               joint.template towards<Bsdf>(v, at, wo, w, wi, shown)};
+               context.joint.template towards<Bsdf>(v, at, context.wo, w, wi, shown)};
   if (v.wants_events()) [[unlikely]]
-    offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, wo, wi);
+    offer.note = note_event<std::remove_cvref_t<decltype(at.bsdf)>, F>(at.bsdf, context.wo, wi);
 }
 
 /// Sets R after the bounce `b` along `world`, and whether the path awaits a merge.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE void next_ratio(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                const JointVertex<F>& joint, const Vec3<F>& wo,
-                                const Vec3<F>& world, const BsdfSample<F>& b, PathState<F>& next) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void next_ratio(const VertexContext<Bsdf, F, kFeatures>& c, const Vec3<F>& world,
+                                const BsdfSample<F>& b, PathState<F>& next) {
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
+  const Vec3<F>& wo = c.wo;
+  const JointVertex<F>& joint = c.joint;
   const Mask<F> by_pdf = not_(b.is_delta) & (b.pdf > 0.f);
   const F by_density = joint.template towards<Bsdf>(v, at, wo, world, b.wi, by_pdf) /
                        select(b.pdf > 0.f, b.pdf, F(1.f));

@@ -42,21 +42,21 @@ SplatParts split_splat(const BackwardAutomaton& automaton, const LightWayRow<flo
 
 }  // namespace
 
-void LightPathAovs::show(Film& film, const SplatFilter& filter, uint32_t slot, uint32_t depth,
-                         uint32_t light, float x, float y, const Color<float>& c) const {
+void LightPathAovs::show(Film& film, const SplatFilter& filter, const LightSplat& splat) const {
   SplatParts parts;
   if (backward_)
-    parts = split_splat(*backward_, load_row<LightWayRow, float>(ways_.rows, slot, true), c);
-  const uint32_t scattered = depth == 0 ? places_.direct : places_.indirect;
+    parts = split_splat(*backward_, load_row<LightWayRow, float>(ways_.rows, splat.slot, true),
+                        splat.c);
+  const uint32_t scattered = splat.depth == 0 ? places_.direct : places_.indirect;
   uint32_t group = SplatPlaces::kNowhere;
-  if (places_.first_group != SplatPlaces::kNowhere && tables_->kept_group[light] != kNoGroup)
-    group = places_.first_group + tables_->kept_group[light];
-  filter.spread(film, x, y, [&](size_t pixel, float weight) {
+  if (places_.first_group != SplatPlaces::kNowhere && tables_->kept_group[splat.light] != kNoGroup)
+    group = places_.first_group + tables_->kept_group[splat.light];
+  filter.spread(film, splat.x, splat.y, [&](size_t pixel, float weight) {
     const auto add = [&](uint32_t place, const Color<float>& v) {
       film.aovs().add_splat(pixel, place, v.x * weight, v.y * weight, v.z * weight);
     };
-    if (scattered != SplatPlaces::kNowhere) add(scattered, c);
-    if (group != SplatPlaces::kNowhere) add(group, c);
+    if (scattered != SplatPlaces::kNowhere) add(scattered, splat.c);
+    if (group != SplatPlaces::kNowhere) add(group, splat.c);
     for (uint32_t left = parts.found; left != 0; left &= left - 1) {
       const auto e = static_cast<uint32_t>(std::countr_zero(left));
       add(places_.first_expression + e, parts.light[e]);

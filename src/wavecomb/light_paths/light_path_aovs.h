@@ -53,6 +53,15 @@ struct LinkRow {
   WAVECOMB_FIELDS(states, event, diffuse, seen_states, seen_event, seen_diffuse)
 };
 
+/// Contribution of a vertex of a light path to the film.
+struct LightSplat {
+  uint32_t slot;   ///< of the path
+  uint32_t depth;  ///< of the vertex
+  uint32_t light;  ///< that the path left
+  float x, y;      ///< position on the film, pixels
+  Color<float> c;
+};
+
 /// AOV values of the light paths of a wave.
 ///
 /// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
@@ -159,11 +168,9 @@ class LightPathAovs {
     });
   }
 
-  /// Adds the contribution `c` of the vertex at `depth` of the path in `slot`, which started at
-  /// `light`, at position (x, y) of the film. The sums are integers, so that the order does not
-  /// matter.
-  void show(Film& film, const SplatFilter& filter, uint32_t slot, uint32_t depth, uint32_t light,
-            float x, float y, const Color<float>& c) const;
+  /// Adds a light splat to the layers of the film. The sums are integers, so that the order does
+  /// not matter.
+  void show(Film& film, const SplatFilter& filter, const LightSplat& splat) const;
 
  private:
   SplatPlaces places_;

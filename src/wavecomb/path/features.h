@@ -14,10 +14,12 @@ enum Feature : uint32_t {
   kMeshLights = 8,    ///< mesh lights, and lights that only light sampling finds
   kNotes = 16,        ///< AOVs of vertices, path histories
   kExperiments = 32,  ///< cosine sampling, Schlick's approximation
+  kJoined = 64,       ///< MIS between camera paths and light paths
   kBelow = 128,       ///< subsurface scattering
   kInside = 256,      ///< nested dielectrics
-  kJoined = 64,       ///< MIS between camera paths and light paths
 };
-inline constexpr uint32_t kPlain = kNotes, kEverything = 511;
+inline constexpr uint32_t kPlain = kNotes;
+inline constexpr uint32_t kEverything =
+    kMotion | kCurves | kLinks | kMeshLights | kNotes | kExperiments | kJoined | kBelow | kInside;
 
 }  // namespace wavecomb

@@ -35,6 +35,15 @@ struct HistoryRow {
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
 
+/// Shaded vertex that a path arrived at and leaves. Valid while its references are.
+template <typename F>
+struct ShadedVertex {
+  const PathState<F>& path;  ///< on arrival
+  const F& t;                ///< length of the ray that arrived
+  const UInt<F>& material;
+  const VertexResult<F>& result;
+};
+
 /// Stored vertices of the paths of a wave.
 ///
 /// Contract: owned by one wave, or one reference integrator. Slots must be below the capacity.
@@ -56,22 +65,22 @@ class PathHistory {
     if (most_ > 0) std::memset(counts_.uints(0), 0, slots * sizeof(uint32_t));
   }
 
-  /// Stores a shaded vertex of the path in each active lane's slot. The path arrived as `path` with
-  /// a ray of length `t` and leaves as `v`; `radiance` holds the RadianceRow of each slot
-  /// (PathPool::radiance).
+  /// Stores a shaded vertex of the path in each active lane's slot. `radiance` holds the
+  /// RadianceRow of each slot (PathPool::radiance).
   template <typename F>
   [[gnu::noinline, gnu::cold]] void vertex(uint32_t depth, const UInt<F>& slot,
-                                           const PathState<F>& path, const F& t,
-                                           const UInt<F>& material, const VertexResult<F>& v,
-                                           const float* radiance, const Mask<F>& active) {
+                                           const ShadedVertex<F>& at, const float* radiance,
+                                           const Mask<F>& active) {
     if (depth >= most_) return;
+    const PathState<F>& path = at.path;
+    const VertexResult<F>& v = at.result;
     const Color<F> brought = load_row<RadianceRow, F>(radiance, slot, active).sum;
     const Vec3<F> none(F(0.f));
     store_row<HistoryRow, F>(rows_.floats(0), slot * most_ + depth,
-                             {fma(path.dir, t, path.o), select<F>(v.alive, v.next.dir, none),
+                             {fma(path.dir, at.t, path.o), select<F>(v.alive, v.next.dir, none),
                               select<F>(v.alive, v.next.throughput, none),
                               select(v.alive & not_(v.next.enters_body), v.next.pdf, F(0.f)),
-                              brought, material, v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
+                              brought, at.material, v.axis, select(v.alive, v.bsdf_pdf, F(0.f))},
                              active);
     scatter<UInt<F>>(counts_.uints(0), UInt<F>(depth + 1), slot, Mask<UInt<F>>(active));
   }

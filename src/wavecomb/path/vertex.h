@@ -61,7 +61,7 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
   if (v.has_links()) [[unlikely]]
     out.next.link = at.link_class(v);
 
-  const auto seen = at.bsdf.view(wo);
+  const auto view = at.bsdf.view(wo);
   const GuidePlace<F> place = guide_place<Bsdf, F>(v, at, frame, wo);
   JointVertex<F> joint{};
   if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
@@ -72,22 +72,28 @@ WAVECOMB_INLINE VertexResult<F> take_steps(const Vertex<F, kFeatures>& v) {
 
   const Sample4<F> r_light =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
-  LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
-  sample_light<Bsdf, F>(v, at, frame, wo, seen, r_light, place, joint, receiver, out);
+  const LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
+  const VertexContext<Bsdf, F, kFeatures> context{.vertex = v,
+                                                  .at = at,
+                                                  .frame = frame,
+                                                  .wo = wo,
+                                                  .view = view,
+                                                  .guide = place,
+                                                  .joint = joint,
+                                                  .receiver = receiver};
+  sample_light(context, r_light, out);
   if constexpr (V::has(kJoined) && Bsdf::kOnSurface)
     if (v.offer) [[unlikely]]
-      offer_connection<Bsdf, F>(v, at, frame, wo, seen, joint);
+      offer_connection(context);
   const Sample4<F> r_bsdf =
       sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
-  scatter<Bsdf, F>(v, at, frame, wo, seen, r_bsdf, place, joint, receiver, out);
+  scatter(context, r_bsdf, out);
   survive<F>(v, place, luminance(at.throughput), r_light.w, out);
   if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits)
     if (v.knows_inside()) [[unlikely]]
       out.crossed = crossed_at<F>(v, frame, wo, out);
   if (v.wants_events()) [[unlikely]]
-    note_events<std::remove_cvref_t<decltype(at.bsdf)>, F>(v.scene.lights, at.bsdf, frame, wo,
-                                                           out.shadow_d, out.next.dir, out.next.pdf,
-                                                           out.has_shadow, *v.aovs);
+    note_events(context, out);
   return out;
 }
 

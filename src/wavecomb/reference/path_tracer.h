@@ -149,7 +149,8 @@ class PathTracer {
       if constexpr (Media::kStreams)
         if (came_out && on_surface) material = media_.exit_material();
       if (depth == 0 && on_surface)
-        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time, hit.inst, hit.geom, material, true);
+        aovs_.hit_surface<F>(*context_.camera, kSlot, p, time,
+                             {.inst = hit.inst, .geom = hit.geom, .material = material}, true);
       if (depth == 0 && on_surface && aovs_.wants_motion())
         aovs_.move<F>(
             kSlot,
@@ -185,7 +186,10 @@ class PathTracer {
       if (aovs.wants_events && (v.alive || v.has_shadow))
         aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
       aovs_.vertex<F>(depth, kSlot, aovs, path, true);
-      if (history_) history_.vertex<F>(depth, kSlot, path, hit.t, material, v, radiance(), true);
+      if (history_)
+        history_.vertex<F>(depth, kSlot,
+                           {.path = path, .t = hit.t, .material = material, .result = v},
+                           radiance(), true);
       aovs_.end_depth(depth, radiance(), 1);
       bool is_free = false;
       if (v.has_shadow) {
@@ -219,20 +223,24 @@ class PathTracer {
     if constexpr (Media::kStreams) {
       PresenceKeys keys = rays_.keys();
       keys.object = &object;
-      return media_.walk(key, depth, settings_.sampler, keys, rays_.time(), path, hit, came_out);
+      return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, came_out);
     }
     return true;
+  }
+
+  /// Returns the ray segment of a path to `hit`. It refers to the path and the hit.
+  Passage<F> passage_of(const SampleKey<F>& key, uint32_t depth, const PathState<F>& path,
+                        const SingleHit& hit) const {
+    return {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()};
   }
 
   /// Samples the free flight of a path along its ray segment to `hit`.
   Flight<F> fly(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
     if constexpr (Media::kStreams)
       if (context_.knows_inside())
-        return media_.fly_inside(key, depth, settings_.sampler, rays_.keys(), rays_.time(), path,
-                                 hit, inside_);
-    return media_.template fly<F>(
-        {settings_.sampler, key, depth, path.o, path.dir, hit.t, rays_.time()}, path.throughput,
-        true);
+        return media_.fly_inside(passage_of(key, depth, path, hit), rays_.keys(), path, hit,
+                                 inside_);
+    return media_.template fly<F>(passage_of(key, depth, path, hit), path.throughput, true);
   }
 
   void note_choice(const VertexResult<F>& v, const VertexAovs<F>& aovs, F brought) {

@@ -252,6 +252,16 @@ class SceneBuilder {
   /// empty if neither the group nor the node moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
+  /// Flattens all groups to instances, without those of singular transforms, and checks counts.
+  void flatten_groups(SceneGeometry& geometry);
+  /// Adds the materials that no caller adds: for meshes without one, for collisions in volumes and
+  /// media, and for exit points of random walks. Returns the index of the first, which is grey.
+  uint32_t add_implicit_materials(SceneGeometry& geometry);
+  /// Gives instances without a material the grey one. Throws Error for materials that were never
+  /// added.
+  void bind_materials(SceneGeometry& geometry, uint32_t grey) const;
+  /// Moves everything but materials, graphs and lights to `geometry`.
+  void move_parts(SceneGeometry& geometry);
   void make_records(SceneGeometry& geometry, uint32_t grey) const;
 
   uint32_t threads_;

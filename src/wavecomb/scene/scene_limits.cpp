@@ -6,7 +6,7 @@
 #include "wavecomb/core/error.h"
 #include "wavecomb/geometry/mesh/mesh.h"
 #include "wavecomb/geometry/mesh/motion.h"
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/material/description/openpbr_inputs.h"
 #include "wavecomb/scene/names.h"
 #include "wavecomb/scene/scene_parts.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "wavecomb/geometry/curve/bezier.h"
+#include "wavecomb/geometry/curve/points_at.h"
 #include "wavecomb/geometry/curve/segment.h"
 #include "wavecomb/geometry/curve/sub_segments.h"
 #include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
@@ -18,33 +19,6 @@ using namespace curve_math;
 uint32_t first_point(const Mesh& mesh, uint32_t prim) {
   return mesh.indices[prim] & kCurveFirstPoint;
 }
-
-/// Points and normals of a mesh at a given time; bit-identical to detail::MovingRows.
-class PointsAt {
- public:
-  PointsAt(const Mesh& mesh, float time) : mesh_(mesh), place_(time, mesh.steps - 1) {}
-
-  Vec3<float> position(size_t point) const { return at(mesh_.positions, point); }
-  Vec3<float> normal(size_t point) const { return at(mesh_.normals, point); }
-
- private:
-  WAVECOMB_INLINE Vec3<float> at(std::span<const float> values, size_t point) const {
-    if (mesh_.deforms()) [[unlikely]]
-      return between(values, point);
-    return {values[3 * point], values[3 * point + 1], values[3 * point + 2]};
-  }
-
-  [[gnu::noinline]] Vec3<float> between(std::span<const float> values, size_t point) const {
-    const size_t stride = values.size() / mesh_.steps;
-    const float* p = &values[place_.before * stride + 3 * point];
-    const float* q = p + stride;
-    const Vec3<float> a(p[0], p[1], p[2]), b(q[0], q[1], q[2]);
-    return (b - a) * place_.part + a;
-  }
-
-  const Mesh& mesh_;
-  const BetweenSteps<float> place_;
-};
 
 /// Intersection of a ray with one segment.
 class SegmentTest {

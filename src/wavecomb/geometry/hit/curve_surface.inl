@@ -100,13 +100,21 @@ inline void set_uv(const MeshReader<F>& mesh, const InstanceMaps<F>& maps, const
   s.uv_per_length = sqrt(density2);
 }
 
+/// Control points that a packet of hits reads, by lane.
+template <typename F>
+struct ControlPoints {
+  UInt<F> first;    ///< index of control point 0
+  Mask<F> strands;  ///< lanes with a second point, unlike spheres and splats
+  Mask<F> ribbons;  ///< lanes with normals
+};
+
 /// Moves control points, ribbon normals and instance transforms to the time of the hits. Returns a
 /// bound of all terms of world positions.
 template <typename F>
 [[gnu::noinline, gnu::cold]] F move_segment(const SceneView& scene, const MeshHit<F>& hit,
-                                            const UInt<F>& first, const Mask<F>& strands,
-                                            const Mask<F>& ribbons, const Mask<F>& active,
+                                            const ControlPoints<F>& from, const Mask<F>& active,
                                             CurveSegment<F>& s, InstanceMaps<F>& maps) {
+  const auto& [first, strands, ribbons] = from;
   const MovingRows<F> points(scene, hit.mesh, hit.time, &MeshRecord::positions,
                              &MeshMotion::positions, active);
   const MovingRows<F> normals(scene, hit.mesh, hit.time, &MeshRecord::normals, &MeshMotion::normals,
@@ -147,7 +155,8 @@ __attribute__((noinline)) void setup_curved(const SceneView& scene, const MeshHi
   }
   F moved_size(0.f);
   if (scene.has_motion)
-    moved_size = move_segment(scene, hit, first, strands, ribbons, active, s, maps);
+    moved_size = move_segment<F>(
+        scene, hit, {.first = first, .strands = strands, .ribbons = ribbons}, active, s, maps);
 
   CurvedPoint<F> c = tube_point<F>(s, hit.u, hit.v);
   if (any(ribbons)) merge(c, ribbon_point<F>(s, hit.u, hit.v), ribbons);

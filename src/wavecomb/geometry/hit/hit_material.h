@@ -14,8 +14,10 @@ inline UInt<F> hit_material(const SceneView& scene, const UInt<F>& inherited, co
                             const UInt<F>& prim, const Mask<F>& active) {
   using U = UInt<F>;
   const Mask<U> on(active);
-  static_assert(offsetof(MeshRecord, face_materials) == 32 && offsetof(MeshRecord, material) == 40);
-  const auto row = load_rows<4, F>(scene.meshes, mesh * 16u + 8u, active);
+  constexpr uint32_t kWords = sizeof(MeshRecord) / 4;
+  constexpr uint32_t kFaceMaterials = offsetof(MeshRecord, face_materials) / 4;
+  static_assert(offsetof(MeshRecord, material) / 4 == kFaceMaterials + 2);
+  const auto row = load_rows<4, F>(scene.meshes, mesh * kWords + kFaceMaterials, active);
   const U lo = float_bits<F>(row[0]), hi = float_bits<F>(row[1]);
   U material = float_bits<F>(row[2]);
   const Mask<U> by_face = on & Mask<U>((lo | hi) != U(0u));

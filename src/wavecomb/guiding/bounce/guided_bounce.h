@@ -12,6 +12,7 @@
 #include "wavecomb/guiding/lookup.h"
 #include "wavecomb/path/steps/bounce_sampling.h"
 #include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/vertex_context.h"
 
 namespace wavecomb {
 
@@ -55,12 +56,12 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidePlace<F>& 
 /// Turns `b`, a bounce sampled from the BSDF, into a sample of the mixture. r.w selects the
 /// technique. The ray cone always uses the roughness of the sampled BSDF lobe. Writes the training
 /// data of the bounce to `out`.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
-WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                  const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                                  const Sample4<F>& r, const GuidePlace<F>& place, BsdfSample<F>& b,
-                                  VertexResult<F>& out) {
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void guide_bounce(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
+                                  BsdfSample<F>& b, VertexResult<F>& out) {
   if constexpr (kGuided<Bsdf>) {
+    const Vertex<F, kFeatures>& v = c.vertex;
+    const GuidePlace<F>& place = c.guide;
     if (!v.guide) [[likely]]
       return;
     out.axis = place.axis;
@@ -73,17 +74,17 @@ WAVECOMB_INLINE void guide_bounce(const Vertex<F, kFeatures>& v, const Interacti
     Color<F> f_cos = b.weight * b.pdf;
     F p_bsdf = b.pdf;
     if (any(by_guide)) {
-      const Vec3<F> wi = frame.to_local(sample_guide<F>(*v.guide, place, r.y, r.z, by_guide));
-      const BsdfEval<F> e = at.bsdf.eval(seen, wi);
-      const Mask<F> there = F(wi.z * wo.z) > 0.f;
+      const Vec3<F> wi = c.frame.to_local(sample_guide<F>(*v.guide, place, r.y, r.z, by_guide));
+      const BsdfEval<F> e = c.at.bsdf.eval(c.view, wi);
+      const Mask<F> there = F(wi.z * c.wo.z) > 0.f;
       b.wi = select<F>(by_guide, wi, b.wi);
       f_cos = select<F>(by_guide, select<F>(there, e.f_cos, Color<F>(F(0.f))), f_cos);
-      const F unguided = bounce_pdf(v, at.bsdf, wo, seen, wi, e);
+      const F unguided = bounce_pdf(v, c.at.bsdf, c.wo, c.view, wi, e);
       p_bsdf = select(by_guide, select(there, unguided, F(0.f)), p_bsdf);
       b.is_delta = b.is_delta & not_(by_guide);
       b.eta = select(by_guide, F(1.f), b.eta);
     }
-    const F mixed = mixed_pdf<Bsdf, F>(v, place, frame.to_world(b.wi), b.wi, wo, p_bsdf);
+    const F mixed = mixed_pdf<Bsdf, F>(v, place, c.frame.to_world(b.wi), b.wi, c.wo, p_bsdf);
     // The pdf of a delta lobe is its selection probability.
     const F pdf = select(b.is_delta, F(a * p_bsdf), mixed);
     b.weight = select<F>(guided, f_cos * F(1.f / select(pdf > 0.f, pdf, F(1.f))), b.weight);

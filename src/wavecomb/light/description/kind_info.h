@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/light/description/light.h"
 #include "wavecomb/light/description/light_builder.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/description/light_table.h"
 #include "wavecomb/light/tree/light_cluster.h"
 #include "wavecomb/scene/scene_parts.h"
@@ -19,7 +19,7 @@ namespace wavecomb {
 /// Inputs of a light kind for making records, and the set that receives its additional data.
 struct LightMaking {
   LightSet& set;           ///< receives densities, portals and shapings
-  const LightSet* before;  ///< as in build_lights
+  const LightSet* before;  ///< as in LightInputs
   double scene_radius;
   std::span<const TexturePtr> textures;
   std::span<const IesProfile> profiles;

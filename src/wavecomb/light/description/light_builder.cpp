@@ -120,28 +120,27 @@ void check_light_count(uint64_t count) {
                 " can be numbered; give meshes that emit fewer triangles or instances");
 }
 
-LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
-                      const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const TexturePtr> textures, const LightSet* before,
-                      std::span<const IesProfile> profiles,
-                      std::span<const PlacedMeshLight> mesh_lights, size_t most_picked,
-                      TreeTime tree_time, std::span<const LightFilter> filters) {
-  (void)centre;  // unused: directions of infinite lights do not depend on the centre
+LightSet build_lights(const LightInputs& inputs) {
+  const std::span<const Light> lights = inputs.lights;
+  const std::span<const PlacedMeshLight> mesh_lights = inputs.mesh_lights;
+  const size_t triangle_count = inputs.triangle_count;
   check_light_count(lights.size() + triangle_count);
   SceneCounts counts{.lights = lights.size() + mesh_lights.size()};
   for (const Light& light : lights) counts.lights += light.portals.size();
-  for (const IesProfile& p : profiles)
+  for (const IesProfile& p : inputs.profiles)
     counts.profile_values += p.vertical.size() + p.horizontal.size() + p.candela.size();
   check_counts(counts);
+  const float radius = inputs.scene_radius;
   const double scene_radius = std::isfinite(radius) && radius > 0 ? double{radius} : 1.0;
   LightSet set;
   std::vector<double> powers;
   set.records.reserve(lights.size() + mesh_lights.size());
   powers.reserve(lights.size() + triangle_count);
   set.of_input.resize(lights.size());
-  put_profiles(set, profiles);
-  for (const LightFilter& filter : filters) set.filters.push_back(make_light_filter(filter));
-  LightMaking making{set, before, scene_radius, textures, profiles, filters};
+  put_profiles(set, inputs.profiles);
+  for (const LightFilter& filter : inputs.filters) set.filters.push_back(make_light_filter(filter));
+  LightMaking making{set,           inputs.before, scene_radius, inputs.textures, inputs.profiles,
+                     inputs.filters};
   for (const bool infinite : {true, false}) {
     for (size_t i = 0; i < lights.size(); ++i) {
       if (info_of(lights[i].kind).has(light_trait::kInfinite) != infinite) continue;
@@ -157,10 +156,10 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
   for (const PlacedMeshLight& placed : mesh_lights)
     set.records.push_back(make_mesh_light(placed, making));
   powers.resize(lights.size() + triangle_count);
-  make_triangles(set, triangle_count, triangle, powers.data() + lights.size());
+  make_triangles(set, triangle_count, inputs.triangle, powers.data() + lights.size());
 
   for (const double power : powers) set.total_power += power;
-  if (powers.size() <= most_picked) {
+  if (powers.size() <= inputs.most_picked) {
     std::vector<uint32_t> numbers;
     set.pick = build_pick_table(powers, set.first_triangle(), set.pick_bins, numbers);
     const auto pdf = [&](size_t i) { return static_cast<float>(numbers[i]) * 0x1p-24f; };
@@ -169,7 +168,7 @@ LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
       set.triangles[i].pick_pdf = pdf(set.first_triangle() + i);
   }
   set.tree = outline_light_tree(set, powers);
-  if (tree_time == TreeTime::kNow || set.pick_bins.empty() ||
+  if (inputs.tree_time == TreeTime::kNow || set.pick_bins.empty() ||
       pays_as_tree(set.tree.effective_lights))
     set.tree = build_light_tree(set, powers);
   else

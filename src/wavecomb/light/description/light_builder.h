@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/tree/light_tree.h"
 #include "wavecomb/texture/texture.h"
 
@@ -100,7 +100,29 @@ enum class TreeTime { kNow, kWhenChosen };
 /// Function that returns emissive triangle i. It is called from several threads at once.
 using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 
-/// Packs all lights; the `triangle_count` triangles in parallel.
+/// Lights of a scene, and how to build their sampling structures.
+struct LightInputs {
+  std::span<const Light> lights = {};  ///< each has passed check_light
+  size_t triangle_count = 0;
+  TriangleSource triangle = {};  ///< may be empty without triangles
+  /// Radius of the scene's bounding sphere; 0 or less counts as 1. The power of an infinite light
+  /// is the power that it sends through this sphere.
+  float scene_radius = 0;
+  std::span<const TexturePtr> textures = {};
+  /// Light set with the same textures, from which sampling densities of domes are reused where they
+  /// match; may be null.
+  const LightSet* before = nullptr;
+  std::span<const IesProfile> profiles = {};
+  std::span<const PlacedMeshLight> mesh_lights = {};  ///< each has passed check_mesh_light
+  /// For more lights no table for selection by power is built.
+  size_t most_picked = kMaxPicked;
+  /// The light tree takes as much memory as everything else. With kWhenChosen it is built only if
+  /// LightSelection::kAuto selects by tree.
+  TreeTime tree_time = TreeTime::kNow;
+  std::span<const LightFilter> filters = {};
+};
+
+/// Packs all lights, the triangles in parallel.
 ///
 /// Emission follows UsdLux. `color` is radiance L; with `normalize` it is divided by the size of
 /// the light:
@@ -113,22 +135,10 @@ using TriangleSource = std::function<EmissiveTriangle(size_t i)>;
 /// normalized sphere of shrinking radius. Rects and disks emit to the side to which their transform
 /// maps -z, even if the transform mirrors. Negative colours count as 0.
 ///
-/// `radius` is the radius of the scene's bounding sphere (0 or less counts as 1); the power of an
-/// infinite light is the power that it sends through this sphere. `before`, or null, is a light set
-/// with the same textures, from which sampling densities of domes are reused where they match. For
-/// more than `most_picked` lights no table for selection by power is built. The light tree takes as
-/// much memory as everything else; with kWhenChosen it is built only if LightSelection::kAuto
-/// selects by tree. Throws Error for more than kMaxLights lights.
+/// Throws Error for more than kMaxLights lights.
 ///
-/// Contract: each light has passed check_light, each mesh light check_mesh_light
-/// (light/description/light_table.h).
-LightSet build_lights(std::span<const Light> lights, size_t triangle_count,
-                      const TriangleSource& triangle, const Vec3<float>& centre, float radius,
-                      std::span<const TexturePtr> textures, const LightSet* before = nullptr,
-                      std::span<const IesProfile> profiles = {},
-                      std::span<const PlacedMeshLight> mesh_lights = {},
-                      size_t most_picked = kMaxPicked, TreeTime tree_time = TreeTime::kNow,
-                      std::span<const LightFilter> filters = {});
+/// Contract: the checks are those of light/description/light_table.h.
+LightSet build_lights(const LightInputs& inputs);
 
 /// Builds the sampling density of a latlong texture times `color`: piecewise constant on a grid of
 /// at most 1024 x 512 cells, proportional to the mean bilinear luminance of the cell times the sine

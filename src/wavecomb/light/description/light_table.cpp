@@ -109,14 +109,11 @@ LightParameter choice(LightParameter p, std::vector<const char*> choices) {
   return p;
 }
 
-std::vector<LightParameter> common_rows() {
+/// Returns the parameters of shape and emission.
+std::vector<LightParameter> shape_rows() {
   using L = Light;
-  using S = Shaping;
   using enum LightGroup;
   using namespace light_trait;
-  constexpr auto kS = &L::shaping;
-  using H = ShadowLook;
-  constexpr auto kH = &L::shadow;
   return {
       all(kEmission, positive(row<&L::color>("color", "colour", "color",
                                              "Emitted radiance, W / (m^2 sr): colour * intensity * "
@@ -160,6 +157,16 @@ std::vector<LightParameter> common_rows() {
                        "specular", "specular", "specular",
                        "Factor of its contribution to the specular response of materials."),
                    2)),
+  };
+}
+
+/// Returns the parameters of the dependence on direction.
+std::vector<LightParameter> shaping_rows() {
+  using S = Shaping;
+  using enum LightGroup;
+  using namespace light_trait;
+  constexpr auto kS = &Light::shaping;
+  return {
       with(kShaped, kShaping,
            usually(row<kS, &S::focus>(
                        "focus", "focus", "shaping:focus",
@@ -188,6 +195,16 @@ std::vector<LightParameter> common_rows() {
       with(kShaped, kShaping,
            row<kS, &S::ies_normalize>("ies_normalize", "IES normalize", "shaping:ies:normalize",
                                       "Divides the profile by its mean over directions.")),
+  };
+}
+
+/// Returns the parameters of linking and shadows.
+std::vector<LightParameter> shadow_rows() {
+  using L = Light;
+  using H = ShadowLook;
+  using enum LightGroup;
+  constexpr auto kH = &L::shadow;
+  return {
       all(kResponse,
           id(row<&L::light_link>("light_link", "light link", "",
                                  "Geometry set that it illuminates; all geometry if not given."),
@@ -214,6 +231,15 @@ std::vector<LightParameter> common_rows() {
                                       "shadow:falloffGamma",
                                       "Exponent of the shadow strength where shadows fade."),
                    4)),
+  };
+}
+
+/// Returns the parameters that refer to filters, motion, portals and materials.
+std::vector<LightParameter> other_rows() {
+  using L = Light;
+  using enum LightGroup;
+  using namespace light_trait;
+  return {
       with(kFiltered, kEmission,
            id(row<&L::filter>("filter", "filter", "",
                               "Filter of add_light_filter that modifies its emission."),
@@ -238,7 +264,9 @@ std::vector<LightParameter> common_rows() {
 }
 
 std::vector<LightParameter> make_light_parameters() {
-  std::vector<LightParameter> table = common_rows();
+  std::vector<LightParameter> table;
+  for (const auto& rows : {shape_rows(), shaping_rows(), shadow_rows(), other_rows()})
+    table.insert(table.end(), rows.begin(), rows.end());
   const std::span<const LightKindInfo> kinds = light_kinds();
   for (const LightKindInfo& kind : kinds)
     table.insert(table.end(), kind.own.begin(), kind.own.end());

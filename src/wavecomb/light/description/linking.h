@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 
 namespace wavecomb {
 

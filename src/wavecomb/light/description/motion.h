@@ -10,7 +10,7 @@
 
 #include <span>
 
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 
 namespace wavecomb {
 

@@ -37,6 +37,28 @@ void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint
   }
 }
 
+/// Distributes random numbers in `counts`: one to each light that emits, and `free` more by
+/// `shares`, which become their running sums.
+void count_numbers(std::span<const double> weights, std::span<double> shares, size_t free,
+                   std::span<uint32_t> counts) {
+  double running = 0;
+  for (double& share : shares) share = running += share;
+  const double all = running;
+  // Rounding the running sum makes the total exact.
+  const auto up_to = [&](double part) {
+    return static_cast<uint32_t>(
+        std::nearbyint(std::min(1.0, part / all) * static_cast<double>(free)));
+  };
+  parallel_bands(counts.size(), kBand, [&](size_t begin, size_t end) {
+    uint32_t before = begin > 0 ? up_to(shares[begin - 1]) : 0;
+    for (size_t i = begin; i < end; ++i) {
+      const uint32_t to = up_to(shares[i]);
+      counts[i] = weights[i] > 0 ? 1 + to - before : 0;
+      before = to;
+    }
+  });
+}
+
 }  // namespace
 
 PickTable build_pick_table(std::span<const double> weights, size_t first_triangle,
@@ -102,23 +124,7 @@ PickTable build_pick_table(std::span<const double> weights, size_t first_triangl
     if (numbers_of[g] == 0) continue;
     const std::span<uint32_t> counts(numbers.data() + (g == 0 ? 0 : first_triangle),
                                      groups[g].size());
-    double running = 0;
-    for (double& share : shares_of[g]) share = running += share;
-    const double all = running;
-    // Each light gets one number, and the rest by probability. Rounding the running sum makes the
-    // total exact.
-    const auto free = static_cast<double>(numbers_of[g] - lit_of[g]);
-    const auto up_to = [&](double part) {
-      return static_cast<uint32_t>(std::nearbyint(std::min(1.0, part / all) * free));
-    };
-    parallel_bands(counts.size(), kBand, [&](size_t begin, size_t end) {
-      uint32_t before = begin > 0 ? up_to(shares_of[g][begin - 1]) : 0;
-      for (size_t i = begin; i < end; ++i) {
-        const uint32_t to = up_to(shares_of[g][i]);
-        counts[i] = groups[g][i] > 0 ? 1 + to - before : 0;
-        before = to;
-      }
-    });
+    count_numbers(groups[g], shares_of[g], numbers_of[g] - lit_of[g], counts);
 
     uint32_t shift = unit;
     while (numbers_of[g] >> shift < counts.size()) --shift;

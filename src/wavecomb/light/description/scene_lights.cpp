@@ -138,11 +138,16 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
     const EmissiveMesh& source = *std::prev(next);
     return emissive_triangle(geometry, materials, source, i - source.first);
   };
-  const Bounds& b = geometry.bounds;
-  const Vec3<float> centre = b.empty() ? Vec3<float>{0, 0, 0} : (b.lo + b.hi) * 0.5f;
-  set = build_lights(lights, triangle_count, triangle, centre, geometry.radius, geometry.textures,
-                     before ? &before->set : nullptr, geometry.profiles, placed, kMaxPicked,
-                     TreeTime::kWhenChosen, geometry.filters);
+  set = build_lights({.lights = lights,
+                      .triangle_count = triangle_count,
+                      .triangle = triangle,
+                      .scene_radius = geometry.radius,
+                      .textures = geometry.textures,
+                      .before = before ? &before->set : nullptr,
+                      .profiles = geometry.profiles,
+                      .mesh_lights = placed,
+                      .tree_time = TreeTime::kWhenChosen,
+                      .filters = geometry.filters});
   // So far entries count from the first triangle and the first mesh light; make them light ids.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)

@@ -44,35 +44,43 @@ inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>
 
 }  // namespace detail
 
-/// Returns the radiance that a path along `dir` receives from meshes with mesh light records
-/// `record` (kNoLight for other meshes), before MIS. `glow` is the emission of the material.
-/// `is_seen` marks hits from a camera or a mirror. Other hits are bounces that light sampling can
-/// also produce, with the diffuse fraction `share`.
+/// Ray that hits an emissive mesh, and the bounce that started it.
+template <typename F>
+struct MeshLightRay {
+  Vec3<F> dir;
+  UInt<F> link;      ///< link class of the surface that the ray left
+  Mask<F> is_delta;  ///< of delta bounces and camera rays, which no light sample matches
+  bool from_camera;
+  Color<F> diffuse;  ///< diffuse fraction of the bounce, by colour
+};
+
+/// Returns the radiance that a path receives along `ray` from meshes with mesh light records
+/// `record` (kNoLight for other meshes), before MIS. `emission` is that of the material.
 template <typename F>
 inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
-                                    const Color<F>& glow, const Vec3<F>& dir, const UInt<F>& link,
-                                    const Mask<F>& is_seen, bool from_camera, const Color<F>& share,
+                                    const Color<F>& emission, const MeshLightRay<F>& ray,
                                     const Mask<F>& active) {
   using U = UInt<F>;
   using R = LightRecord;
   const Mask<F> known = active & Mask<F>(record != U(kNoLight));
-  if (none(known)) return glow;
+  if (none(known)) return emission;
   const detail::LightReader<F> light(view.lights, record, known);
   const U sync = light[&R::sync];
-  const Mask<F> shows_glow =
-      is_seen & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
-  const Mask<F> given = known & not_(shows_glow);
-  if (none(given)) return glow;
-  Color<F> radiance = glow * light.radiance();
-  if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -dir, radiance, given);
+  const Mask<F> shows_material =
+      ray.is_delta & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
+  const Mask<F> given = known & not_(shows_material);
+  if (none(given)) return emission;
+  Color<F> radiance = emission * light.radiance();
+  if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -ray.dir, radiance, given);
   const Mask<F> sampled_only = Mask<F>(light[&R::sampled_only] != U(0u));
-  radiance = radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular],
-                                                 sampled_only, is_seen, from_camera, share);
+  radiance =
+      radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular], sampled_only,
+                                          ray.is_delta, ray.from_camera, ray.diffuse);
   if (view.links.members) {
     const U set = light[&R::light_link];
-    radiance = radiance * select(is_linked<F>(view.links, link, set, given), F(1.f), F(0.f));
+    radiance = radiance * select(is_linked<F>(view.links, ray.link, set, given), F(1.f), F(0.f));
   }
-  return select<F>(given, radiance, glow);
+  return select<F>(given, radiance, emission);
 }
 
 /// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh lights are

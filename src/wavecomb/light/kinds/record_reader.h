@@ -7,7 +7,7 @@
 #include "wavecomb/core/rows/record_reader.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/core/warp.h"
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 
 namespace wavecomb {
 

@@ -64,8 +64,9 @@ template <typename F>
   if (any(partly)) {
     const UInt<F> instance =
         gather_member<F>(view.triangle_uvs, &TriangleUvs::instance, index, partly);
-    const F opacity = opacity_at<F>(view.materials, view.meshes, view.instances, material, instance,
-                                    place, uv, partly);
+    const F opacity = opacity_at<F>(
+        view.materials, view.meshes, view.instances,
+        {.material = material, .instance = instance, .place = place, .uv = uv}, partly);
     radiance = radiance * select(partly, opacity, F(1.f));
   }
   return radiance;

@@ -30,21 +30,30 @@ inline F infinite_emission_density(const LightView& view, uint32_t light, const 
 
 }  // namespace detail
 
-/// Returns radiance times MIS weight of infinite light `light` for a ray from `from` along `dir`
-/// that leaves the scene: one term of escaped_radiance.
+/// Ray that leaves the scene, and the bounce that started it.
 template <typename F>
-inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, const Vec3<F>& from,
-                                        const Vec3<F>& dir, const F& bsdf_pdf,
-                                        const Mask<F>& bsdf_is_delta, const Mask<F>& active,
-                                        bool from_camera = false, const UInt<F>& link = UInt<F>(0u),
-                                        const F& ratio = F(0.f), const F& time = F(0.5f),
-                                        const Color<F>& share = Color<F>(F(0.f))) {
+struct EscapedRay {
+  Vec3<F> from, dir;
+  F bsdf_pdf{0.f};          ///< density of the bounce, per sr
+  Mask<F> is_delta{false};  ///< of delta bounces and camera rays, which no light sample matches
+  bool from_camera = false;
+  UInt<F> link{0u};          ///< link class of the surface that the ray left
+  F ratio{0.f};              ///< PathState::ratio; adds light paths to the MIS weight
+  F time{0.5f};              ///< shutter time in [0, 1]
+  Color<F> diffuse{F(0.f)};  ///< diffuse fraction of the bounce, by colour
+};
+
+/// Returns radiance times MIS weight of infinite light `light` for an escaped ray: one term of
+/// escaped_radiance.
+template <typename F>
+inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
+                                        const EscapedRay<F>& ray, const Mask<F>& active) {
   const LightRecord& record = view.lights[light];
-  Vec3<F> seen_from = from, along = dir;
+  Vec3<F> seen_from = ray.from, along = ray.dir;
   if (view.motions) [[unlikely]] {
-    const LightPose<F> pose = light_pose<F>(view, UInt<F>(light), time, active);
-    seen_from = pose.point_to_rest(from);
-    along = pose.to_rest(dir);
+    const LightPose<F> pose = light_pose<F>(view, UInt<F>(light), ray.time, active);
+    seen_from = pose.point_to_rest(ray.from);
+    along = pose.to_rest(ray.dir);
   }
   detail::KindHit<F> hit = visit(record.kind, [&]<typename Kind>(Kind) {
     return Kind::template escape<F>({view, record, seen_from, along, active});
@@ -52,36 +61,28 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -along, hit.radiance, active);
   const F light_pdf = hit.pdf * infinite_pick_pdf(view, light);
-  F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, light_pdf));
+  F weight = select(ray.is_delta, F(1.f), balance_weight<F>(ray.bsdf_pdf, light_pdf));
   if (view.sends_paths()) [[unlikely]]
-    weight = joint_bounce_weight<F>(
-        bsdf_pdf, light_pdf, bsdf_is_delta,
-        F(ratio * detail::infinite_emission_density<F>(view, light, from, dir, active)));
+    weight = joint_bounce_weight<F>(ray.bsdf_pdf, light_pdf, ray.is_delta,
+                                    F(ray.ratio * detail::infinite_emission_density<F>(
+                                                      view, light, ray.from, ray.dir, active)));
   if (view.has_effects) [[unlikely]]
-    hit.radiance =
-        hit.radiance *
-        LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera, share);
+    hit.radiance = hit.radiance * LightEffect<F>(view, UInt<F>(light), active)
+                                      .of_hit(ray.is_delta, ray.from_camera, ray.diffuse);
   if (view.links.members)
-    weight = select(shines_on<F>(view, link, UInt<F>(light), active), weight, F(0.f));
+    weight = select(shines_on<F>(view, ray.link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
 }
 
-/// Returns the sum over all infinite lights of radiance times MIS weight for a ray from `from`
-/// along `dir` that leaves the scene. The weight is the balance heuristic of `bsdf_pdf` and the pdf
-/// of light sampling, or 1 for delta bounces and camera rays. `share` is the diffuse fraction of
-/// the bounce, by colour. `ratio` is PathState::ratio; it adds light paths to the weight if the
-/// render has any.
+/// Returns the sum over all infinite lights of radiance times MIS weight for an escaped ray. The
+/// weight is the balance heuristic of the densities of bounce and light sampling, or 1 for delta
+/// bounces and camera rays.
 template <typename F>
-inline Color<F> escaped_radiance(const LightView& view, const Vec3<F>& from, const Vec3<F>& dir,
-                                 const F& bsdf_pdf, const Mask<F>& bsdf_is_delta,
-                                 const Mask<F>& active, bool from_camera = false,
-                                 const UInt<F>& link = UInt<F>(0u), const F& ratio = F(0.f),
-                                 const F& time = F(0.5f),
-                                 const Color<F>& share = Color<F>(F(0.f))) {
+inline Color<F> escaped_radiance(const LightView& view, const EscapedRay<F>& ray,
+                                 const Mask<F>& active) {
   Color<F> sum(F(0.f));
   for (uint32_t i = 0; i < view.infinite_count; ++i)
-    sum += infinite_light_radiance<F>(view, i, from, dir, bsdf_pdf, bsdf_is_delta, active,
-                                      from_camera, link, ratio, time, share);
+    sum += infinite_light_radiance<F>(view, i, ray, active);
   return select<F>(active, sum, Color<F>(F(0.f)));
 }
 

@@ -8,7 +8,7 @@
 #pragma once
 
 #include "wavecomb/core/vec.h"
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/kinds/mesh_light.h"
 #include "wavecomb/light/sampling/linking.h"
 #include "wavecomb/light/sampling/receiver.h"

@@ -133,10 +133,9 @@ LightSample<F> sample_light(const LightView& view, const LightReceiver<F>& to, c
         Vec3<F> from = p;
         if (view.motions) [[unlikely]]
           from = light_pose<F>(view, index, to.time, lanes).point_to_rest(p);
-        detail::KindSample<F> s =
-            visit(kind, [&]<typename Kind>(Kind) {
-              return Kind::template sample<F>({view, index, light, from, u, v, lanes});
-            });
+        detail::KindSample<F> s = visit(kind, [&]<typename Kind>(Kind) {
+          return Kind::template sample<F>({view, index, light, from, u, v, lanes});
+        });
         if (view.shapings)
           s.radiance =
               detail::shaped<F>(view, light.shaping(), -s.wi, s.radiance, lanes & (s.pdf > 0.f));

@@ -18,7 +18,7 @@
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/core/vec.h"
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/sampling/receiver.h"
 
 namespace wavecomb {

@@ -2,7 +2,7 @@
 /// Bounds of a set of lights for the light tree: position, emission directions and intensity.
 #pragma once
 
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 
 namespace wavecomb {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "wavecomb/core/settings.h"
-#include "wavecomb/light/description/light.h"
+#include "wavecomb/light/description/light_records.h"
 
 namespace wavecomb {
 

@@ -81,8 +81,13 @@ class LightTracer {
     }
     add_splat(context_, splats_, sample, out.x, out.y, out.v.direct);
     if (light_aovs_)
-      light_aovs_.show(*context_.film, *context_.splat_filter, kOnlySlot, depth, light, out.x,
-                       out.y, out.v.direct);
+      light_aovs_.show(*context_.film, *context_.splat_filter,
+                       {.slot = kOnlySlot,
+                        .depth = depth,
+                        .light = light,
+                        .x = out.x,
+                        .y = out.y,
+                        .c = out.v.direct});
   }
 
   void keep(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit, uint32_t mesh,

@@ -64,7 +64,9 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
     if (wave.light_aovs) [[unlikely]] {
       const auto light =
           gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
-      wave.light_aovs.show(*context.film, *context.splat_filter, q.slot[i], depth, light, x, y, c);
+      wave.light_aovs.show(
+          *context.film, *context.splat_filter,
+          {.slot = q.slot[i], .depth = depth, .light = light, .x = x, .y = y, .c = c});
     }
   }
   if (context.lessons) return;

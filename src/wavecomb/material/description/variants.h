@@ -22,7 +22,8 @@ enum Part : uint32_t {
   kFilms = 128,    ///< openpbr: a thin film
   kBrushes = 256,  ///< openpbr: anisotropy and its rotation
 };
-inline constexpr uint32_t kAllParts = 511;
+inline constexpr uint32_t kAllParts =
+    kVaries | kGlows | kMetals | kCoats | kPasses | kBacks | kFuzzes | kFilms | kBrushes;
 
 /// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
 /// variant that has all of its parts. CMake reads this list as well and makes a compile unit for

@@ -56,17 +56,24 @@ template <typename F>
   return at;
 }
 
-/// Returns the opacity of `material` at a point of a mesh of `instance` with texture coordinates
-/// `uv`.
+/// Point of an instanced mesh whose opacity is looked up.
+template <typename F>
+struct OpacityQuery {
+  UInt<F> material;
+  UInt<F> instance;
+  MeshPlace<F> place;
+  Vec2<F> uv;  ///< texture coordinates
+};
+
+/// Returns the opacity of the material at a point.
 template <typename F>
 inline F opacity_at(const MaterialView& view, const MeshRecord* meshes,
-                    const InstanceRecord* instances, const UInt<F>& material,
-                    const UInt<F>& instance, const MeshPlace<F>& place, const Vec2<F>& uv,
+                    const InstanceRecord* instances, const OpacityQuery<F>& at,
                     const Mask<F>& active) {
   const auto point = [&](const Mask<F>& lanes) {
-    return point_at_rest<F>(meshes, instances, instance, place, uv, lanes);
+    return point_at_rest<F>(meshes, instances, at.instance, at.place, at.uv, lanes);
   };
-  return fetch_opacity<F>(view, material, uv, F(0.f), point, active);
+  return fetch_opacity<F>(view, at.material, at.uv, F(0.f), point, active);
 }
 
 }  // namespace wavecomb

@@ -101,6 +101,35 @@ void check_values(const GridBricks& b) {
                 "' has a background that is negative or not finite; fix the file");
 }
 
+/// Throws Error unless the arrays of a grid have sizes that match.
+void check_layout(const GridBricks& b, const std::string& name) {
+  const size_t count = b.origins.size() / 3;
+  if (b.components != 1 && b.components != 3)
+    throw Error(name + " has " + std::to_string(b.components) + " components; it must be 1 or 3");
+  if (count == 0) throw Error(name + " has no voxels; leave it out");
+  if (b.origins.size() % 3 != 0 ||
+      b.floats.size() + b.halves.size() != count * kInner * b.components)
+    throw Error(name + " does not have 8 x 8 x 8 voxels for each brick");
+}
+
+/// Smallest and largest origins of bricks, in voxels.
+struct BrickExtent {
+  std::array<int64_t, 3> lo{}, hi{};
+};
+/// Returns the extent of a grid; throws Error if an origin is invalid.
+BrickExtent extent_of(const GridBricks& b, const std::string& name) {
+  BrickExtent extent;
+  for (size_t i = 0; i < b.origins.size(); ++i) {
+    const int64_t x = b.origins[i];
+    if (x % kBrickEdge != 0 || std::abs(x) > (int64_t{1} << 24))
+      throw Error(name + " has bricks that are not at multiples of 8, or beyond 2^24");
+    const size_t k = i % 3;
+    extent.lo[k] = i < 3 ? x : std::min(extent.lo[k], x);
+    extent.hi[k] = i < 3 ? x : std::max(extent.hi[k], x);
+  }
+  return extent;
+}
+
 }  // namespace
 
 size_t VolumeGrid::words_per_brick() const {
@@ -112,24 +141,10 @@ VolumeGrid::VolumeGrid(const GridBricks& b)
       is_half_(!b.halves.empty()),
       background_(b.background),
       is_signed_(b.is_signed) {
-  const size_t count = b.origins.size() / 3;
   const std::string name = "grid '" + b.name + "'";
-  if (b.components != 1 && b.components != 3)
-    throw Error(name + " has " + std::to_string(b.components) + " components; it must be 1 or 3");
-  if (count == 0) throw Error(name + " has no voxels; leave it out");
-  if (b.origins.size() % 3 != 0 ||
-      b.floats.size() + b.halves.size() != count * kInner * b.components)
-    throw Error(name + " does not have 8 x 8 x 8 voxels for each brick");
+  check_layout(b, name);
   check_values(b);
-  std::array<int64_t, 3> lo{}, hi{};
-  for (size_t i = 0; i < b.origins.size(); ++i) {
-    const int64_t x = b.origins[i];
-    if (x % kBrickEdge != 0 || std::abs(x) > (int64_t{1} << 24))
-      throw Error(name + " has bricks that are not at multiples of 8, or beyond 2^24");
-    const size_t k = i % 3;
-    lo[k] = i < 3 ? x : std::min(lo[k], x);
-    hi[k] = i < 3 ? x : std::max(hi[k], x);
-  }
+  const auto [lo, hi] = extent_of(b, name);
   uint64_t cells = 1;
   for (size_t k = 0; k < 3; ++k) {
     // One more cell at the lower end, for interpolation between the background and the first

@@ -156,10 +156,17 @@ class Interiors {
   template <typename F>
   size_t advance(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
                  Rays<F>& r, size_t left) const;
+  /// State of rays that end, at a surface, at a collision or outside the scene.
+  template <typename F>
+  struct SegmentEnd {
+    InsideRow<F> inside;
+    UInt<F> material;    ///< of the event, or Flights::kNoEvent
+    Mask<F> terminated;  ///< lanes whose path ends here
+  };
+  /// Stores hit, event and path of the rays in the lanes `done`.
   template <typename F>
   void finish(const InteriorRays& all, const HitSpan& hits, const InteriorEvents& events,
-              const Rays<F>& r, const InsideRow<F>& inside, const UInt<F>& material,
-              const Mask<F>& died, const Mask<F>& done) const;
+              const Rays<F>& r, const SegmentEnd<F>& end, const Mask<F>& done) const;
   /// Advances shadow rays.
   template <typename F>
   size_t advance_shadow(const InteriorRays& all, float* const (&product)[3], Rays<F>& r,

@@ -81,8 +81,10 @@ inline LampWay<F> Interiors::draw_by_lamps(Rays<F>& r, const InteriorMedium<F>& 
   const Color<F> e = medium.absorption + medium.scattering;
   const Sample4<F> n = walk_numbers<F>(r.s.seed, U(r.s.number + 0x40000000u));
   const F angle = walk_numbers<F>(r.s.seed, U(r.s.number + 0x50000000u)).x;
-  const LampWay<F> lamp =
-      lamp_way<F>(scene_.lights, r.s.o, r.s.d, F(0.f), far, min(e.x, min(e.y, e.z)), n, lanes);
+  const LampWay<F> lamp = lamp_way<F>(
+      scene_.lights,
+      {.o = r.s.o, .d = r.s.d, .begin = F(0.f), .end = far, .extinction = min(e.x, min(e.y, e.z))},
+      n, lanes);
   const Color<F>& b = medium.scattering;
   const F own = select(r.s.hero == U(0u), b.x, select(r.s.hero == U(1u), b.y, b.z));
   const F u = min(F(F(r.s.rest * (1.f / kFar)) - 1.f), F(1.f));
@@ -202,7 +204,8 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
     const U by_event =
         select(Mask<U>(event), U(scene_.interiors.event_material), U(uint32_t{Flights::kNoEvent}));
     const U material = select(Mask<U>(stopped), limit.material, by_event);
-    finish<F>(all, hits, events, r, row, material, died, done);
+    finish<F>(all, hits, events, r, {.inside = row, .material = material, .terminated = died},
+              done);
   }
   return put<F>(all, r, goes_on, left);
 }
@@ -210,18 +213,17 @@ inline size_t Interiors::advance(const InteriorRays& all, const HitSpan& hits,
 template <typename F>
 inline void Interiors::finish(const InteriorRays& all, const HitSpan& hits,
                               const InteriorEvents& events, const Rays<F>& r,
-                              const InsideRow<F>& inside, const UInt<F>& material,
-                              const Mask<F>& died, const Mask<F>& done) const {
+                              const SegmentEnd<F>& end, const Mask<F>& done) const {
   using U = UInt<F>;
   const U slot = gather<U>(all.slot, r.who, Mask<U>(done));
-  store_row<InsideRow, F>(all.inside, slot, inside, done);
+  store_row<InsideRow, F>(all.inside, slot, end.inside, done);
   const Mask<F> walked = done & Mask<F>((r.s.flags & U(kWalked)) != U(0u));
   if (any(walked)) {
     const auto column = [&](const float* x) { return gather<F>(x, r.who, walked); };
     PathRow<F> path = load_row<PathRow, F>(all.paths, slot, walked);
     path.o = {column(all.o[0]), column(all.o[1]), column(all.o[2])};
     path.d = r.s.d;
-    path.throughput = select<F>(died, Color<F>(F(0.f)), r.s.throughput);
+    path.throughput = select<F>(end.terminated, Color<F>(F(0.f)), r.s.throughput);
     path.pdf = F(0.f);
     path.receiver = U(0u);
     store_row<PathRow, F>(all.paths, slot, path, walked);
@@ -229,7 +231,7 @@ inline void Interiors::finish(const InteriorRays& all, const HitSpan& hits,
   const auto real = [&](float* to, const F& x) { scatter<F>(to, x, r.who, done); };
   const auto number = [&](uint32_t* to, const U& x) { scatter<U>(to, x, r.who, Mask<U>(done)); };
   real(events.t, r.s.start);
-  number(events.material, material);
+  number(events.material, end.material);
   number(events.hero, select(Mask<U>(walked), U(uint32_t{Flights::kNoHero}), r.s.hero));
   const Color<F>&ratio = r.l.ratio, &absorbed = r.l.absorbed;
   const F* const from[6] = {&ratio.x, &ratio.y, &ratio.z, &absorbed.x, &absorbed.y, &absorbed.z};
@@ -243,7 +245,7 @@ inline void Interiors::finish(const InteriorRays& all, const HitSpan& hits,
   real(hits.v, h.v);
   number(hits.prim, h.prim);
   number(hits.geom, h.geom);
-  number(hits.inst, select(Mask<U>(died), U(kNoHit), h.inst));
+  number(hits.inst, select(Mask<U>(end.terminated), U(kNoHit), h.inst));
 }
 
 template <typename F>

@@ -49,12 +49,20 @@ struct LampWay {
   }
 };
 
-/// Returns the distribution for the part between `begin` and `end` of o + x d. `extinction` is that
-/// of the least attenuated channel. The sample values `r` select the light and the point on it.
+/// Part of a ray in a homogeneous medium: points o + x d with begin < x < end.
 template <typename F>
-inline LampWay<F> lamp_way(const LightView& lights, const Vec3<F>& o, const Vec3<F>& d,
-                           const F& begin, const F& end, const F& extinction, const Sample4<F>& r,
-                           const Mask<F>& active) {
+struct MediumSegment {
+  Vec3<F> o, d;
+  F begin, end;
+  F extinction;  ///< of the least attenuated channel, per unit of length
+};
+
+/// Returns the distribution for a segment. The sample values `r` select the light and the point on
+/// it.
+template <typename F>
+inline LampWay<F> lamp_way(const LightView& lights, const MediumSegment<F>& segment,
+                           const Sample4<F>& r, const Mask<F>& active) {
+  const auto& [o, d, begin, end, extinction] = segment;
   LampWay<F> way;
   const Mask<F> some = active & (begin < end) & (end < F(kFarAway));
   if (none(some)) return way;

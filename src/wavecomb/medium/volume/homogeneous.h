@@ -29,11 +29,11 @@ struct EvenWays {
   F begin, end;
   Mask<F> meets;
 
-  EvenWays(const VolumeRecord& v, const Ways& ways, const float* most, size_t k,
-           const Mask<F>& lanes, VolumeCounts& counts)
+  EvenWays(const VolumeRecord& v, const Ways& ways, size_t k, const Mask<F>& lanes,
+           VolumeCounts& counts)
       : o(load<F>(ways.ox + k), load<F>(ways.oy + k), load<F>(ways.oz + k)),
         d(load<F>(ways.dx + k), load<F>(ways.dy + k), load<F>(ways.dz + k)) {
-    const BrickWalk<F> walk(v.density, o, d, load<F>(most + k), lanes);
+    const BrickWalk<F> walk(v.density, o, d, load<F>(ways.most + k), lanes);
     meets = walk.on();
     begin = walk.x();
     end = walk.leave();
@@ -44,12 +44,12 @@ struct EvenWays {
 
 }  // namespace detail
 
-/// Samples free flights through a homogeneous volume, including by lights (equiangular.h). `most`
-/// is the original length of each segment, before any volume stopped it, so that repeated calls
-/// sample the lights for the same part. kStops samples where flights stop; kRatios computes the
-/// weights after all volumes were sampled.
+/// Samples free flights through a homogeneous volume, including by lights (equiangular.h).
+/// `ways.most` is the original length of each segment, before any volume stopped it, so that
+/// repeated calls sample the lights for the same part. kStops samples where flights stop; kRatios
+/// computes the weights after all volumes were sampled.
 template <typename F>
-inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways, const float* most,
+inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways,
                        const Flights& flights, FlightKeeps keeps, const LightView& lamps,
                        VolumeCounts& counts) {
   using U = UInt<F>;
@@ -62,7 +62,7 @@ inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways, 
     const U hero = load<U>(flights.hero + k);
     const Mask<F> lanes =
         first_lanes<F>(ways.count - k) & Mask<F>(hero != U(uint32_t{Flights::kNoHero}));
-    const detail::EvenWays<F> w(v, ways, most, k, lanes, counts);
+    const detail::EvenWays<F> w(v, ways, k, lanes, counts);
     if (none(w.meets)) continue;
     const auto of_hero = [&](const F(&x)[3]) {
       return select(hero == U(0u), x[0], select(hero == U(1u), x[1], x[2]));
@@ -72,8 +72,9 @@ inline void fly_evenly(const VolumeView& volumes, uint32_t i, const Ways& ways, 
     const F first = i == 0 ? load<F>(ways.first + k) : numbers.next(lanes);
     const F chooses = numbers.next(lanes), angle = numbers.next(lanes);
     const F x = numbers.next(lanes), y = numbers.next(lanes), z = numbers.next(lanes);
-    const LampWay<F> lamp =
-        lamp_way<F>(lamps, w.o, w.d, w.begin, w.end, least, {x, y, z, F(0.f)}, w.meets);
+    const LampWay<F> lamp = lamp_way<F>(
+        lamps, {.o = w.o, .d = w.d, .begin = w.begin, .end = w.end, .extinction = least},
+        {x, y, z, F(0.f)}, w.meets);
     const F stop = load<F>(flights.t + k);
     if (keeps == FlightKeeps::kStops) {
       const F own = of_hero(extinction);
@@ -113,7 +114,7 @@ template <typename F>
 inline void pass_evenly(const VolumeRecord& v, const Ways& ways, float* const (&product)[3],
                         VolumeCounts& counts) {
   for (size_t k = 0; k < ways.count; k += kWidth<F>) {
-    const detail::EvenWays<F> w(v, ways, ways.most, k, first_lanes<F>(ways.count - k), counts);
+    const detail::EvenWays<F> w(v, ways, k, first_lanes<F>(ways.count - k), counts);
     const F length = select(w.meets, F(w.end - w.begin), F(0.f));
     for (size_t c = 0; c < 3; ++c)
       store(product[c] + k, load<F>(product[c] + k) * exp(F(length * -v.extinction[c])));

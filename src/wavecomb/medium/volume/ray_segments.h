@@ -11,6 +11,14 @@
 
 namespace wavecomb {
 
+/// Ray segment in each lane: points o + x d with 0 < x < length.
+template <typename F>
+struct RaySegment {
+  Vec3<F> o, d;
+  F length;     ///< infinite if the ray leaves the scene
+  F time{0.f};  ///< shutter time, if volumes move
+};
+
 /// Columns of ray segments: points o + x d with 0 < x < most.
 struct Ways {
   const float *ox, *oy, *oz, *dx, *dy, *dz;

@@ -159,9 +159,11 @@ template <typename F>
 inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
                          float* scratch, const LightView* lamps, VolumeCounts& counts) {
   std::copy_n(flights.t, ways.count, scratch);
+  Ways original = ways;
+  original.most = scratch;
   for (uint32_t i = 0; i < volumes.count; ++i)
     if (lamps && is_drawn_by_lamps(volumes.volumes[i]))
-      fly_evenly<F>(volumes, i, ways, scratch, flights, FlightKeeps::kStops, *lamps, counts);
+      fly_evenly<F>(volumes, i, original, flights, FlightKeeps::kStops, *lamps, counts);
     else
       detail::fly_in<F>(volumes, i, ways, flights, FlightKeeps::kStops, counts);
 }
@@ -172,11 +174,12 @@ inline void stop_flights(const VolumeView& volumes, const Ways& ways, const Flig
 template <typename F>
 inline void weigh_flights(const VolumeView& volumes, const Ways& ways, const Flights& flights,
                           float* scratch, const LightView* lamps, VolumeCounts& counts) {
-  Ways once_more = ways;
+  Ways original = ways, once_more = ways;
+  original.most = scratch;
   once_more.most = scratch + ways.count;
   for (uint32_t i = 0; i < volumes.count; ++i) {
     if (lamps && is_drawn_by_lamps(volumes.volumes[i])) {
-      fly_evenly<F>(volumes, i, ways, scratch, flights, FlightKeeps::kRatios, *lamps, counts);
+      fly_evenly<F>(volumes, i, original, flights, FlightKeeps::kRatios, *lamps, counts);
       continue;
     }
     if (volumes.volumes[i].is_grey) continue;
@@ -296,12 +299,13 @@ inline void transmittance_through(const VolumeView& volumes, const Ways& ways,
   }
 }
 
-/// Returns the transmittance of one ray segment in each lane, at shutter time `time`.
+/// Returns the transmittance of one ray segment in each lane, with the random numbers of `way`.
 template <typename F>
 inline Color<F> transmittance_through(const VolumeView& volumes, const Way<F>& way,
-                                      const Vec3<F>& o, const Vec3<F>& d, const F& most,
-                                      const F& time, const Mask<F>& active, VolumeCounts& counts) {
-  const PacketWays<F> packet(o, d, most, way.seed, way.r.z, time, active);
+                                      const RaySegment<F>& segment, const Mask<F>& active,
+                                      VolumeCounts& counts) {
+  const PacketWays<F> packet(segment.o, segment.d, segment.length, way.seed, way.r.z, segment.time,
+                             active);
   alignas(64) float product[3][kWidth<F>];
   for (auto& one : product) store(one, F(1.f));
   float* const columns[3] = {product[0], product[1], product[2]};

@@ -8,14 +8,15 @@ namespace wavecomb {
 
 /// Estimates the radiance that one volume emits along a ray segment, by one point on it. The point
 /// is sampled in proportion to the grid's largest value in each cell, and the estimate includes the
-/// transmittance of all volumes up to the point. `time` is the shutter time.
+/// transmittance of all volumes up to the point.
 template <typename F>
 inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way<F>& way,
-                            const Vec3<F>& o, const Vec3<F>& d, const F& most, const F& time,
-                            const Mask<F>& active, VolumeCounts& counts) {
+                            const RaySegment<F>& segment, const Mask<F>& active,
+                            VolumeCounts& counts) {
   const VolumeRecord& v = volumes.volumes[index];
   const auto each_cell = [&](const auto& visit) {
-    for (BrickWalk<F> walk(glow_cells(v), o, d, most, active); any(walk.on());) {
+    for (BrickWalk<F> walk(glow_cells(v), segment.o, segment.d, segment.length, active);
+         any(walk.on());) {
       visit(walk, F(walk.most() * (walk.leave() - walk.x())));
       walk.next_cell(walk.on());
     }
@@ -41,11 +42,13 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index, const Way
     p = select<F>(here, walk.at(at), p);
     before = select(walk.on(), F(before + share), before);
   });
-  const Color<F> value = glow_at<F>(v, p, time, shines);
+  const Color<F> value = glow_at<F>(v, p, segment.time, shines);
   const F weight = total / select(shines & (greatest > 0.f), greatest, F(1.f));
   const Color<F> emission{F(v.emission[0]), F(v.emission[1]), F(v.emission[2])};
+  RaySegment<F> to_point = segment;
+  to_point.length = x;
   const Color<F> through =
-      transmittance_through<F>(volumes, way.branch(index), o, d, x, time, shines, counts);
+      transmittance_through<F>(volumes, way.branch(index), to_point, shines, counts);
   return select<F>(shines, value * emission * weight * through, Color<F>(F(0.f)));
 }
 

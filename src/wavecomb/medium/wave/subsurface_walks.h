@@ -28,19 +28,18 @@ class WalksBelow {
   /// Returns whether the scene has subsurface scattering.
   bool has_walks() const { return context_.scene.walks.media != nullptr; }
   /// Runs the walk of the reference integrator for a path whose ray has entered a subsurface body
-  /// and hit `hit`. `keys` are those of the ray and include the object. If the walk leaves the
-  /// body, sets `came_out`, and `path` and `hit` describe a ray that views the exit point from
-  /// outside. Returns false if the walk was terminated inside. If the ray does not hit the object,
-  /// returns true with `path` and `hit` unchanged, except that path.pdf becomes 0, since no light
-  /// sample competes with the path.
+  /// and hit `hit`. The passage leads to the hit. `keys` are those of the ray and include the
+  /// object. If the walk leaves the body, sets `came_out`, and `path` and `hit` describe a ray that
+  /// views the exit point from outside. Returns false if the walk was terminated inside. If the ray
+  /// does not hit the object, returns true with `path` and `hit` unchanged, except that path.pdf
+  /// becomes 0, since no light sample competes with the path.
   template <typename Hit>
-  bool walk(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
-            const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
+  bool walk(const Passage<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
             bool& came_out) const {
     Walkers walkers(walks_);
-    walkers.add<float>(begin_walk<float>(sampler, key, depth, path.o, path.dir, path.throughput,
-                                         path.entry.normal),
-                       0u, 0u, time, true);
+    walkers.add<float>(begin_walk<float>(p.sampler, p.key, p.depth, path.o, path.dir,
+                                         path.throughput, path.entry.normal),
+                       0u, 0u, p.time, true);
     enter<float>(walkers, keys, 1, [](bool, uint32_t) {});
     if (walkers.size() == 0) {
       path.pdf = 0.f;

@@ -36,12 +36,11 @@ class Volumes : public WalksBelow {
                    context.settings->equiangular && has_lamps(context.scene.lights)) {}
 
   /// Samples the free flight of the reference integrator in scenes with nested dielectrics, for the
-  /// path `path` with medium stack `inside`, whose ray with `keys` has hit `hit`. May change both
-  /// the path and the hit.
+  /// path `path` with medium stack `inside`, whose ray with `keys` has hit `hit`. The passage leads
+  /// to the hit. May change both the path and the hit.
   template <typename Hit>
-  Flight<float> fly_inside(const SampleKey<float>& key, uint32_t depth, SamplerKind sampler,
-                           const PresenceKeys& keys, float time, PathState<float>& path, Hit& hit,
-                           InsideRow<float>& inside) const;
+  Flight<float> fly_inside(const Passage<float>& p, const PresenceKeys& keys,
+                           PathState<float>& path, Hit& hit, InsideRow<float>& inside) const;
   /// Returns the transmittance of media inside meshes along a shadow ray of the reference
   /// integrator.
   Color<float> pass_inside(const PresenceKeys& keys, float time, const InsideRow<float>& inside,
@@ -54,7 +53,7 @@ class Volumes : public WalksBelow {
   template <typename F>
   Color<F> transmittance(const Passage<F>& p, const Mask<F>& active) const {
     const Way<F> way(p, VertexSet::kShadow);
-    return transmittance_through<F>(volumes_, way, p.o, p.d, p.t, p.time, active, counts_.volumes);
+    return transmittance_through<F>(volumes_, way, segment_of(p), active, counts_.volumes);
   }
 
   bool shines() const { return volumes_.emits; }
@@ -62,9 +61,10 @@ class Volumes : public WalksBelow {
   Color<F> emission(const Passage<F>& p, const Mask<F>& active) const {
     Color<F> sum(F(0.f));
     const Way<F> way(p, VertexSet::kFlight);
+    const RaySegment<F> segment = segment_of(p);
     for (uint32_t i = 0; i < volumes_.count; ++i)
       if (volumes_.volumes[i].emits)
-        sum += emission_of<F>(volumes_, i, way, p.o, p.d, p.t, p.time, active, counts_.volumes);
+        sum += emission_of<F>(volumes_, i, way, segment, active, counts_.volumes);
     return sum;
   }
 
@@ -150,6 +150,10 @@ class Volumes : public WalksBelow {
   }
 
  private:
+  template <typename F>
+  static RaySegment<F> segment_of(const Passage<F>& p) {
+    return {.o = p.o, .d = p.d, .length = p.t, .time = p.time};
+  }
   /// Traces the rays of a wave through media inside meshes.
   template <typename F>
   void fly_inside_all(Wave& wave, uint32_t depth, SamplerKind sampler) const {

@@ -20,19 +20,24 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
                 F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
-/// Returns the radiance of emissive surfaces before MIS in scenes with mesh lights. `glow` is the
-/// emission of their materials.
+/// Returns the radiance of emissive surfaces before MIS in scenes with mesh lights. `emission` is
+/// that of their materials.
 template <typename F>
 [[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
-                                               const UInt<F>& geom, const Color<F>& glow,
+                                               const UInt<F>& geom, const Color<F>& emission,
                                                const PathState<F>& path, bool from_camera,
                                                const Mask<F>& active) {
   using U = UInt<F>;
   const U place = placed_geometry<F>(scene, inst, geom, active);
   const U record =
       select(Mask<U>(active), gather<U>(scene.mesh_lights, place, Mask<U>(active)), U(kNoLight));
-  return mesh_light_radiance<F>(scene.lights, record, glow, path.dir, path.link,
-                                not_(path.pdf > 0.f), from_camera, path.diffuse, active);
+  return mesh_light_radiance<F>(scene.lights, record, emission,
+                                {.dir = path.dir,
+                                 .link = path.link,
+                                 .is_delta = not_(path.pdf > 0.f),
+                                 .from_camera = from_camera,
+                                 .diffuse = path.diffuse},
+                                active);
 }
 
 /// Returns the emission of textures and graphs at their finest level in `lanes`, as light samples

@@ -11,6 +11,7 @@
 #include "wavecomb/core/path_expressions/path_expression.h"
 #include "wavecomb/light/sampling/light_sample.h"
 #include "wavecomb/path/path_state.h"
+#include "wavecomb/path/steps/vertex_context.h"
 
 namespace wavecomb {
 
@@ -48,32 +49,61 @@ template <typename Bsdf, typename F>
   return detail::note_scattering<Bsdf, F>(bsdf, w, l, F(1.f), F(1.f));
 }
 
-/// Records in `aovs` how the light sample along `to_light` and the bounce along `next` scatter at a
-/// point with `bsdf` that is viewed from `wo`. The arguments are passed by value, so that shading
-/// can keep them in registers.
+namespace detail {
+
+/// Directions that light takes at a vertex: to the light sample and along the bounce. Copies, so
+/// that shading can keep the originals in registers.
 template <typename Bsdf, typename F>
-[[gnu::noinline, gnu::cold]] void note_events(const LightView& lights, const Bsdf bsdf,
-                                              const Frame<F> frame, const Vec3<F> wo,
-                                              const Vec3<F> to_light, const Vec3<F> next,
-                                              const F pdf, const Mask<F> has_shadow,
-                                              VertexAovs<F>& aovs) {
+struct VertexDirections {
+  Bsdf bsdf;
+  Frame<F> frame;
+  Vec3<F> wo;          ///< in `frame`
+  Vec3<F> to_light;    ///< in world space
+  Mask<F> has_shadow;  ///< lanes with a light sample
+  Vec3<F> bounce;      ///< in world space
+  F bounce_pdf;        ///< 0 for a delta bounce
+};
+
+/// Records in `aovs` how the light sample and the bounce scatter.
+template <typename Bsdf, typename F>
+[[gnu::noinline, gnu::cold]] void note_directions(const LightView& lights,
+                                                  const VertexDirections<Bsdf, F> at,
+                                                  VertexAovs<F>& aovs) {
   F diffuse(1.f), specular(1.f);
-  if (lights.has_effects && any(has_shadow)) {
-    const LightEffect<F> effect(lights, aovs.lit_by, has_shadow);
+  if (lights.has_effects && any(at.has_shadow)) {
+    const LightEffect<F> effect(lights, aovs.lit_by, at.has_shadow);
     diffuse = select(effect.applies, effect.diffuse, diffuse);
     specular = select(effect.applies, effect.specular, specular);
   }
   const F all(1.f);
   aovs.lit =
-      detail::note_scattering<Bsdf, F>(bsdf, wo, frame.to_local(to_light), diffuse, specular);
-  aovs.bounce = detail::note_scattering<Bsdf, F>(bsdf, wo, frame.to_local(next), all, all);
-  aovs.bounce.is_delta = not_(Mask<F>(pdf > 0.f));
+      note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.to_light), diffuse, specular);
+  aovs.bounce = note_scattering<Bsdf, F>(at.bsdf, at.wo, at.frame.to_local(at.bounce), all, all);
+  aovs.bounce.is_delta = not_(Mask<F>(at.bounce_pdf > 0.f));
   if constexpr (Bsdf::kWalks) {
     using U = UInt<F>;
-    const Mask<F> enters = bsdf.enters(wo, frame.to_local(next));
+    const Mask<F> enters = at.bsdf.enters(at.wo, at.frame.to_local(at.bounce));
     aovs.bounce.event =
         select(Mask<U>(enters), U(static_cast<uint32_t>(PathEvent::kBelow)), aovs.bounce.event);
   }
+}
+
+}  // namespace detail
+
+/// Records in the AOVs of the vertex how its light sample and its bounce in `out` scatter.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void note_events(const VertexContext<Bsdf, F, kFeatures>& c,
+                                 const VertexResult<F>& out) {
+  using Scattering = typename VertexContext<Bsdf, F, kFeatures>::Scattering;
+  detail::note_directions<Scattering, F>(c.vertex.scene.lights,
+                                         {.bsdf = c.at.bsdf,
+                                          .frame = c.frame,
+                                          .wo = c.wo,
+                                          .to_light = out.shadow_d,
+                                          .has_shadow = out.has_shadow,
+                                          .bounce = out.next.dir,
+                                          .bounce_pdf = out.next.pdf},
+                                         *c.vertex.aovs);
 }
 
 }  // namespace wavecomb

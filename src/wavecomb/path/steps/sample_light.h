@@ -16,6 +16,7 @@
 #include "wavecomb/light_paths/join.h"
 #include "wavecomb/path/steps/bounce_sampling.h"
 #include "wavecomb/path/steps/interact.h"
+#include "wavecomb/path/steps/vertex_context.h"
 
 namespace wavecomb {
 
@@ -36,24 +37,26 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
   return receiver;
 }
 
-/// Returns the MIS weight of the light sample `l` of `light` against bounces with density
-/// `p_bounce` and light paths (join.h). If R includes this vertex with p_light in place of
-/// p_bounce,
+/// Returns the MIS weight of the light sample of `to_light` against bounces with density `p_bounce`
+/// and light paths (join.h). `wi` is its direction in the frame of the vertex. If R includes this
+/// vertex with p_light in place of p_bounce,
 ///   w = 1 / (1 + p_bounce / p_light + R D / p_light);
 /// for a point light the last term has p_light d^2 in place of p_light.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE F joint_light_weight(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                     const JointVertex<F>& joint, const Vec3<F>& wo,
-                                     const LightSample<F>& l, const Vec3<F>& wi, const F& p_bounce,
-                                     const UInt<F>& light, const Vec3<F>& from) {
-  const LightView& lights = v.scene.lights;
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE F joint_light_weight(const VertexContext<Bsdf, F, kFeatures>& c,
+                                     const LightConnection<F>& to_light, const Vec3<F>& wi,
+                                     const F& p_bounce) {
+  const LightView& lights = c.vertex.scene.lights;
+  const LightSample<F>& l = to_light.light;
   const F pdf = select(l.pdf > 0.f, l.pdf, F(1.f));
   const F by_bounce = select(l.is_delta, F(0.f), F(p_bounce / pdf));
   if (!lights.sends_paths()) return 1.f / F(1.f + by_bounce);
-  const F density = emission_density<F>(lights, light, from, l.wi, l.distance, l.valid);
+  const F density =
+      emission_density<F>(lights, l.light, to_light.origin, l.wi, l.distance, l.valid);
   const Mask<F> point = l.is_delta & (l.distance < kFarAway);
   const F nee = select(point, F(pdf * F(l.distance * l.distance)), pdf);
-  const F by_path = F(joint.template towards<Bsdf>(v, at, wo, l.wi, wi, l.valid) * density) / nee;
+  const F by_path =
+      F(c.joint.template towards<Bsdf>(c.vertex, c.at, c.wo, l.wi, wi, l.valid) * density) / nee;
   return 1.f / F(F(1.f + by_bounce) + min(by_path, F(kMostRatio)));
 }
 
@@ -73,20 +76,23 @@ struct LightCandidate {
   ShadowReach<F> reach;  ///< for lights with shadow attributes
 };
 
-/// Returns the light sample for the sample values `r`.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
-WAVECOMB_INLINE LightCandidate<F> light_candidate(
-    const Vertex<F, kFeatures>& v, const Interaction& at, const Frame<F>& frame, const Vec3<F>& wo,
-    const View& seen, const Sample4<F>& r, const GuidePlace<F>& place, const JointVertex<F>& joint,
-    const LightReceiver<F>& receiver, const UInt<F>& link, const Mask<F>& lit) {
+/// Returns the light sample for the sample values `r` in the lanes `lit`. `receiver` is that of the
+/// context with its position, and `link` the link class of the surface.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE LightCandidate<F> light_candidate(const VertexContext<Bsdf, F, kFeatures>& c,
+                                                  const LightReceiver<F>& receiver,
+                                                  const Sample4<F>& r, const UInt<F>& link,
+                                                  const Mask<F>& lit) {
   using U = UInt<F>;
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
   const LightView& lights = v.scene.lights;
-  const LightConnection<F> c = connect_to_light<Bsdf, F>(v, at, receiver, r, lit);
-  const LightSample<F>& l = c.light;
-  const Vec3<F> wi = frame.to_local(l.wi);
-  const BsdfEval<F> e = at.bsdf.eval(seen, wi);
+  const LightConnection<F> to_light = connect_to_light<Bsdf, F>(v, at, receiver, r, lit);
+  const LightSample<F>& l = to_light.light;
+  const Vec3<F> wi = c.frame.to_local(l.wi);
+  const BsdfEval<F> e = at.bsdf.eval(c.view, wi);
   const F p_bounce =
-      mixed_pdf<Bsdf, F>(v, place, l.wi, wi, wo, bounce_pdf(v, at.bsdf, wo, seen, wi, e));
+      mixed_pdf<Bsdf, F>(v, c.guide, l.wi, wi, c.wo, bounce_pdf(v, at.bsdf, c.wo, c.view, wi, e));
   F w = select(l.is_delta, F(1.f), F(l.pdf / max(F(l.pdf + p_bounce), F(1e-30f))));
   Color<F> f_cos = e.f_cos;
   const U& light = l.light;
@@ -94,11 +100,11 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
   const bool has_effects = v.has(kMeshLights) && lights.has_effects;
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     if (v.joins_light()) [[unlikely]]
-      w = joint_light_weight<Bsdf, F>(v, at, joint, wo, l, wi, p_bounce, light, c.origin);
+      w = joint_light_weight(c, to_light, wi, p_bounce);
   ShadowReach<F> reach{F(kFarAway), Color<F>(F(0.f))};
   if (has_effects) [[unlikely]] {
     const LightEffect<F> effect(lights, light, lit);
-    const Color<F> diffuse = at.bsdf.diffuse_f_cos(seen, wi);
+    const Color<F> diffuse = at.bsdf.diffuse_f_cos(c.view, wi);
     f_cos = select<F>(effect.applies,
                       fma(f_cos - diffuse, effect.specular, diffuse * effect.diffuse), f_cos);
     w = select(effect.sampled_only, F(1.f), w);
@@ -112,9 +118,9 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
   Mask<F> valid = lit & l.valid & at.is_consistent(l.wi, wi);
   // The random walk finds light that enters a subsurface body (medium/subsurface/random_walk.h).
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks)
-    valid = valid & not_(at.bsdf.enters(wo, wi));
-  return {c.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
-          light,    set,  reach};
+    valid = valid & not_(at.bsdf.enters(c.wo, wi));
+  return {to_light.origin, l.wi, l.distance, at.throughput * f_cos * l.weight * w, w, valid,
+          light,           set,  reach};
 }
 
 /// Number of light samples that a vertex on a fibre evaluates.
@@ -173,19 +179,18 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
 }  // namespace detail
 
 /// Samples a point on a light, and sets up its shadow ray. `out.next.link` must be set.
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
-WAVECOMB_INLINE void sample_light(const Vertex<F, kFeatures>& v, const Interaction& at,
-                                  const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                                  const Sample4<F>& r, const GuidePlace<F>& place,
-                                  const JointVertex<F>& joint, LightReceiver<F>& receiver,
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
                                   VertexResult<F>& out) {
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
   const LightView& lights = v.scene.lights;
   const Mask<F> lit = v.active & at.bsdf.has_non_delta();
   if (!Bsdf::kHasNonDelta || lights.count == 0 || none(lit)) return;
+  LightReceiver<F> receiver = c.receiver;
   receiver.p = at.origin(-v.path.dir);
   const auto candidate = [&](const Sample4<F>& u) {
-    return detail::light_candidate<Bsdf, F>(v, at, frame, wo, seen, u, place, joint, receiver,
-                                            out.next.link, lit);
+    return detail::light_candidate(c, receiver, u, out.next.link, lit);
   };
   detail::LightCandidate<F> one = candidate(r);
   if constexpr (Bsdf::kOnFibre)

@@ -4,7 +4,7 @@
 ///   T_{k+1} = T_k f(wo, wi) |cos theta_i| / p(wi)
 ///
 /// where p is the density of the BSDF, or of its mixture with the guiding distribution
-/// (guided_bounce.h).
+/// (guiding/bounce/guided_bounce.h).
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -27,36 +27,36 @@ WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen, const
   return {share(diffuse.x, b.weight.x), share(diffuse.y, b.weight.y), share(diffuse.z, b.weight.z)};
 }
 
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
-WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& at,
-                             const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                             const Sample4<F>& r, const GuidePlace<F>& place,
-                             const JointVertex<F>& joint, const LightReceiver<F>& receiver,
+/// Samples the bounce with the sample values `r`, and sets up the next path segment.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void scatter(const VertexContext<Bsdf, F, kFeatures>& c, const Sample4<F>& r,
                              VertexResult<F>& out) {
+  const Vertex<F, kFeatures>& v = c.vertex;
+  const auto& at = c.at;
   const PathState<F>& path = v.path;
-  BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, seen, r);
-  guide_bounce<Bsdf, F>(v, at, frame, wo, seen, r, place, b, out);
-  const Vec3<F> d = normalize(frame.to_world(b.wi));
+  BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, c.wo, c.view, r);
+  guide_bounce(c, r, b, out);
+  const Vec3<F> d = normalize(c.frame.to_world(b.wi));
   out.next.dir = d;
   out.next.throughput = at.throughput * b.weight;
   out.next.pdf = select(b.is_delta, F(0.f), b.pdf);
   out.next.eta_scale = path.eta_scale * b.eta * b.eta;
-  out.next.receiver = receiver.normal;
+  out.next.receiver = c.receiver.normal;
   out.next.cone_width = path.cone_width;
   if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
-    out.next.diffuse = diffuse_share<F>(at.bsdf, seen, b);
+    out.next.diffuse = diffuse_share<F>(at.bsdf, c.view, b);
   if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
     // For medium/subsurface/random_walk.h.
-    out.next.enters_body = at.bsdf.enters(wo, b.wi) & (out.next.pdf > 0.f);
+    out.next.enters_body = at.bsdf.enters(c.wo, b.wi) & (out.next.pdf > 0.f);
     out.next.entry = {object_of(v.hit.inst, v.hit.mesh),
-                      pack_normal<F>(select<F>(wo.z < 0.f, -frame.n, frame.n))};
+                      pack_normal<F>(select<F>(c.wo.z < 0.f, -c.frame.n, c.frame.n))};
   }
   // A rough bounce widens the ray cone: the half width of the lobe is about alpha = roughness^2.
   out.next.cone_spread = max(path.cone_spread, F(b.roughness * b.roughness * 0.25f));
   out.next.o = at.origin(d);
   if constexpr ((kFeatures & kJoined) != 0 && Bsdf::kOnSurface)
     if (v.joins_light()) [[unlikely]]
-      next_ratio<Bsdf, F>(v, at, joint, wo, d, b, out.next);
+      next_ratio(c, d, b, out.next);
   const F largest = max_component(out.next.throughput);
   out.alive =
       v.active & (b.pdf > 0.f) & at.is_consistent(d, b.wi) & (largest > 0.f) & is_finite(largest);

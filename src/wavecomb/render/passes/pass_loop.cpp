@@ -9,21 +9,34 @@
 #include "wavecomb/render/passes/pixel_order.h"
 
 namespace wavecomb {
+namespace {
 
-PassLoop::PassLoop(const Settings& settings, uint32_t step, PassState pass,
-                   LightPathShare light_share, Film& film, PassRunner& runner, RenderCosts& costs,
-                   Watch& watch, std::function<void()> before_lights)
-    : settings_(settings),
-      rules_{settings.spp, settings.min_spp,     settings.is_adaptive(), settings.time_limit > 0,
-             step,         settings.progressive, pilot_samples(settings)},
+PassRules pass_rules(const RenderPlan& plan) {
+  const Settings& settings = plan.settings;
+  return {.spp = settings.spp,
+          .min_spp = settings.min_spp,
+          .adaptive = settings.is_adaptive(),
+          .timed = settings.time_limit > 0,
+          .step = plan.pass_samples,
+          .progressive = settings.progressive,
+          .pilot = pilot_samples(settings)};
+}
+
+}  // namespace
+
+PassLoop::PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunner& runner,
+                   RenderCosts& costs, Watch& watch, std::function<void()> before_lights)
+    : settings_(plan.settings),
+      rules_(pass_rules(plan)),
       pass_(std::move(pass)),
-      light_share_(light_share),
+      light_share_(plan.light_share),
       film_(film),
       runner_(runner),
       costs_(costs),
       watch_(watch),
       before_lights_(std::move(before_lights)),
-      order_(morton_pixel_order(settings.rendered())) {
+      order_(morton_pixel_order(plan.settings.rendered())) {
+  const Settings& settings = plan.settings;
   if (!pass_.allotment.counts.empty()) {
     const auto& counts = pass_.allotment.counts;
     const auto [least, most] = std::minmax_element(counts.begin(), counts.end());

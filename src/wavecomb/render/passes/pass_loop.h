@@ -14,6 +14,7 @@
 #include "wavecomb/render/passes/allotment.h"
 #include "wavecomb/render/passes/pass_plan.h"
 #include "wavecomb/render/passes/pass_runner.h"
+#include "wavecomb/render/render_plan.h"
 #include "wavecomb/render/render_status.h"
 #include "wavecomb/render/statistics/render_costs.h"
 #include "wavecomb/render/watch.h"
@@ -26,13 +27,10 @@ namespace wavecomb {
 /// samples depend on film, settings and pass only, unless there is a time limit.
 class PassLoop {
  public:
-  /// `pass` is the state that belongs to the film, if both come from a checkpoint. `step` is the
-  /// number of samples per pixel that a pass adds if the render is not adaptive, and `light_share`
-  /// the number of light paths, if there are any. Each pass calls `before_lights` between its
-  /// camera paths and its light paths; it may be null.
-  PassLoop(const Settings& settings, uint32_t step, PassState pass, LightPathShare light_share,
-           Film& film, PassRunner& runner, RenderCosts& costs, Watch& watch,
-           std::function<void()> before_lights = nullptr);
+  /// `pass` is the state that belongs to the film, if both come from a checkpoint. Each pass calls
+  /// `before_lights` between its camera paths and its light paths; it may be null.
+  PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunner& runner,
+           RenderCosts& costs, Watch& watch, std::function<void()> before_lights = nullptr);
 
   void run();
   RenderStatus status() const;

@@ -72,19 +72,20 @@ double teach(WaveContext context, const WaveSetup& waves, std::span<const uint32
   return cost_of(*integrator, waves, context.accel->has_list(), context.guide != nullptr);
 }
 
-Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const WaveSetup& waves, std::span<const uint32_t> pixels, uint32_t samples,
-              const GuideGrid& grid, const std::function<bool()>& stopped) {
+Trial try_out(WaveContext context, Settings settings, const WaveSetup& waves,
+              const PilotRenderPlan& plan, const std::function<bool()>& stopped) {
+  const std::span<const uint32_t> pixels = plan.pixels;
+  const uint32_t samples = plan.samples;
   Trial trial;
   trial.samples = samples;
   trial.differences.resize(pixels.size());
   context.settings = &settings;
-  context.guide = guide;
+  context.guide = plan.guide;
   for (const uint32_t seed : kTrialSeeds) {
     settings.seed = seed;
     Lessons lessons;
-    const LessonPlan plan{0, samples, 0, grid, {}, nullptr, {}, 1};
-    trial.cost += teach(context, waves, pixels, plan, lessons, stopped);
+    const LessonPlan lesson_plan{0, samples, 0, plan.grid, {}, nullptr, {}, 1};
+    trial.cost += teach(context, waves, pixels, lesson_plan, lessons, stopped);
     if (stopped()) return trial;
     const double sign = (seed == kTrialSeeds[0] ? 1.0 : -1.0) / samples;
     for (size_t i = 0; i < pixels.size(); ++i)

@@ -43,11 +43,17 @@ struct Trial {
   }
 };
 
-/// Renders `samples` samples of each pixel twice, with `settings` except for the seed. `guide` is
-/// the field to use, or null for none.
-Trial try_out(WaveContext context, Settings settings, const GuideView* guide,
-              const WaveSetup& waves, std::span<const uint32_t> pixels, uint32_t samples,
-              const GuideGrid& grid, const std::function<bool()>& stopped);
+/// Work of a pilot render of some pixels.
+struct PilotRenderPlan {
+  std::span<const uint32_t> pixels;
+  uint32_t samples;        ///< per pixel, in each of two images
+  const GuideView* guide;  ///< guiding field to use, or null for none
+  const GuideGrid& grid;   ///< of the guiding field
+};
+
+/// Renders the pixels twice, with `settings` except for the seed.
+Trial try_out(WaveContext context, Settings settings, const WaveSetup& waves,
+              const PilotRenderPlan& plan, const std::function<bool()>& stopped);
 
 /// Returns the mean squared difference of the two images, relative to the brightness of the image.
 /// Leaves out the pixels that differ most, since fireflies say little about other pixels. Contract:

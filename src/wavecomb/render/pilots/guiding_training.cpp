@@ -177,8 +177,10 @@ class Trainer {
   }
 
   Trial trial(const GuideView* guide) const {
-    return try_out(context_, trial_settings_, guide, waves_, trial_pixels_, trial_samples_, grid_,
-                   [this] { return ended(); });
+    return try_out(
+        context_, trial_settings_, waves_,
+        {.pixels = trial_pixels_, .samples = trial_samples_, .guide = guide, .grid = grid_},
+        [this] { return ended(); });
   }
 
   GuideView view() const {
@@ -279,8 +281,10 @@ class Trainer {
     GuideView taught = field.view();
     tiles_->apply(taught);
     const auto few = some_pixels(order_, budget_ / kSpreadShare / (2 * kSpreadSamples));
-    const Trial trial = try_out(context_, settings_, &taught, waves_, few, kSpreadSamples, grid_,
-                                [this] { return ended(); });
+    const Trial trial =
+        try_out(context_, settings_, waves_,
+                {.pixels = few, .samples = kSpreadSamples, .guide = &taught, .grid = grid_},
+                [this] { return ended(); });
     return 0.5 * kSpreadSamples * error_of(trial, few, *tiles_);
   }
 

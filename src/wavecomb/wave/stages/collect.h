@@ -181,8 +181,10 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
 
     const U prim = load<U>(hits.prim + i);
     const U geom = load<U>(hits.geom + i);
-    static_assert(offsetof(InstanceRecord, geometry) == 48);
-    const auto row = load_rows<2, F>(scene.instances, inst * 16u + 12u, surface);
+    constexpr uint32_t kWords = sizeof(InstanceRecord) / 4;
+    constexpr uint32_t kGeometry = offsetof(InstanceRecord, geometry) / 4;
+    static_assert(offsetof(InstanceRecord, material) / 4 == kGeometry + 1);
+    const auto row = load_rows<2, F>(scene.instances, inst * kWords + kGeometry, surface);
     const U first = float_bits<F>(row[0]), inherited = float_bits<F>(row[1]);
     const U mesh = gather<U>(scene.geometry_mesh, first + geom, Mask<U>(surface));
     U material = hit_material<F>(scene, inherited, mesh, prim, surface);
@@ -195,8 +197,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     }
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
     if (notes_hits)
-      wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(), inst, geom, material,
-                               surface);
+      wave.aovs.hit_surface<F>(*context.camera, slot, fma(d, t, o), time(),
+                               {.inst = inst, .geom = geom, .material = material}, surface);
     if (notes_hits && wave.aovs.wants_motion()) [[unlikely]]
       wave.aovs.move<F>(
           slot,

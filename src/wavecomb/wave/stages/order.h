@@ -80,9 +80,12 @@ inline PacketEstimate estimate_packets(std::span<const uint32_t> program, size_t
   return e;
 }
 
+/// Largest number of policies between which a render chooses.
+inline constexpr size_t kMostPolicies = 16;
+
 /// Policy that was used, as feedback for the chooser.
 struct OrderChoice {
-  size_t arm = 0;
+  size_t arm = 0;  ///< index in WaveContext::policies
   Work work;
   double prepare_ns = 0;
 };
@@ -102,10 +105,11 @@ OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth
   if (chooses) {
     start = Clock::now();
     const PacketEstimate packets = estimate_packets(program, kWidth<F>);
-    std::array<Work, 16> work;
+    std::array<Work, kMostPolicies> work;
     const auto records = static_cast<double>(queue.size);
     for (size_t arm = 0; arm < context.policies.size(); ++arm)
-      work[arm] = {arm == 0 ? packets.arrival : packets.grouped, records};
+      work[arm] = {context.policies[arm]->keeps_arrival_order() ? packets.arrival : packets.grouped,
+                   records};
     choice.arm = wave.policy_chooser.choose(depth, {work.data(), context.policies.size()});
     choice.work = work[choice.arm];
   }

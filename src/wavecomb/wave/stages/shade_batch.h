@@ -100,7 +100,9 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     if (is_watched) {
       if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
       if (wave.history)
-        wave.history.template vertex<F>(depth, slot, state, t, material, v, pool.radiance, active);
+        wave.history.template vertex<F>(depth, slot,
+                                        {.path = state, .t = t, .material = material, .result = v},
+                                        pool.radiance, active);
     }
     packet.note(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
     if (any(v.has_shadow))
