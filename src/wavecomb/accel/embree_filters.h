@@ -29,8 +29,8 @@ inline constexpr float kSlack = 1.f + 0x1p-20f;
 
 /// Returns whether the ray of path `slot` hits a surface point, given by Embree ids: its object and
 /// visibility match, it is present, and for shadow rays it casts a shadow from their light.
-bool is_met(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
-            uint32_t prim, float u, float v, uint32_t slot);
+bool accepts_hit(const QueryContext& context, unsigned hit_inst, unsigned geom, uint32_t mesh,
+                 uint32_t prim, float u, float v, uint32_t slot);
 
 /// Filter function of geometries with hits that may be rejected; see filtered_meshes(). The user
 /// pointer holds the mesh index.
@@ -39,9 +39,9 @@ void presence_filter(const RTCFilterFunctionNArguments* args);
 void closest_filter(const RTCFilterFunctionNArguments* args);
 
 /// Converts a bounding box to Embree's type.
-void put_bounds(const Bounds& b, RTCBounds& out);
+void store_bounds(const Bounds& b, RTCBounds& out);
 
-// Callbacks for light shapes other than parallelograms; the user pointer is a PlacedShape.
+// Callbacks for light shapes other than parallelograms; the user pointer is a LightGeometry.
 void light_box(const RTCBoundsFunctionArguments* args);
 /// Keeps the closest hit by the rule of closest_filter.
 void intersect_lights(const RTCIntersectFunctionNArguments* args);

@@ -38,7 +38,7 @@ inline bool is_of_object(const PresenceKeys& keys, uint32_t instance, uint32_t m
 
 /// Returns whether the ray of a slot hits triangle `prim` at (u, v): the object and ray visibility
 /// match, it is present, and for shadow rays it casts a shadow from their light.
-bool is_met(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh, uint32_t prim,
-            float u, float v, uint32_t slot, const PresenceKeys& keys);
+bool accepts_hit(const SceneView& scene, uint32_t instance, uint32_t geom, uint32_t mesh,
+                 uint32_t prim, float u, float v, uint32_t slot, const PresenceKeys& keys);
 
 }  // namespace wavecomb

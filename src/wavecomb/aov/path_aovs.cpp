@@ -32,8 +32,8 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
   const auto for_each_vertex_aov = [&](AovKind kind, const auto& one) {
     for (const AovRow& row : kAovs)
       if (row.kind == kind && row.source == AovSource::kVertex &&
-          vertex_at_[place_of(row.aov)] != kNotKept)
-        one(row.aov, vertex_.rows + vertex_at_[place_of(row.aov)]);
+          vertex_at_[aov_index(row.aov)] != kNoWords)
+        one(row.aov, vertex_.rows + vertex_at_[aov_index(row.aov)]);
   };
   for_each_vertex_aov(AovKind::kMean, [&](Aov aov, const float* rows) {
     for_each_slot([&](uint32_t slot) { film.add(aov, pixel, rows + slot * vertex_.words); });
@@ -75,8 +75,8 @@ void PathAovs::resolve(AovFilm& film, size_t pixel, size_t begin, size_t end,
       add_difference(emission, emitted, none);
       add_difference(direct, with_direct, emitted);
       add_difference(indirect, radiance + row, with_direct);
-      if (!early_links_) return;
-      const float* links = early_links_.rows + row;
+      if (!early_connections_) return;
+      const float* links = early_connections_.rows + row;
       add_difference(direct, none, links);
       add_difference(indirect, links, none);
     });

@@ -8,16 +8,16 @@
 namespace wavecomb {
 
 enum Feature : uint32_t {
-  kMotion = 1,        ///< moving meshes or instances
-  kCurves = 2,        ///< curves and points
-  kLinks = 4,         ///< light linking
-  kMeshLights = 8,    ///< mesh lights, and lights that only light sampling finds
-  kNotes = 16,        ///< AOVs of vertices, path histories
-  kExperiments = 32,  ///< cosine sampling, Schlick's approximation
-  kBelow = 128,       ///< subsurface scattering
-  kInside = 256,      ///< nested dielectrics
-  kJoined = 64,       ///< MIS between camera paths and light paths
+  kMotion = 1,         ///< moving meshes or instances
+  kCurves = 2,         ///< curves and points
+  kLinks = 4,          ///< light linking
+  kMeshLights = 8,     ///< mesh lights, and lights that only light sampling finds
+  kRecordsAovs = 16,   ///< AOVs of vertices, path histories
+  kExperiments = 32,   ///< cosine sampling, Schlick's approximation
+  kSubsurface = 128,   ///< subsurface scattering
+  kNestedMedia = 256,  ///< nested dielectrics
+  kJoined = 64,        ///< MIS between camera paths and light paths
 };
-inline constexpr uint32_t kPlain = kNotes, kEverything = 511;
+inline constexpr uint32_t kPlain = kRecordsAovs, kEverything = 511;
 
 }  // namespace wavecomb

@@ -23,7 +23,7 @@ enum class LightKind : uint8_t;
 /// Kind of the lights that belong to meshes, LightKind::kTriangle.
 inline constexpr LightKind kMeshLight = LightKind{6};
 /// Maximum number of parameters specific to one kind of light.
-inline constexpr size_t kMaxOwnParameters = 4;
+inline constexpr size_t kMaxSpecificParameters = 4;
 inline constexpr uint32_t kNoLight = 0xffffffffu;
 inline constexpr uint32_t kNoShaping = 0xffffffffu;
 inline constexpr uint32_t kNoIes = 0xffffffffu;
@@ -48,7 +48,7 @@ struct Shaping {
 };
 
 /// UsdLuxShadowAPI: adjustments of a light's shadows that are not physically based.
-struct ShadowLook {
+struct ShadowAttributes {
   Vec3<float> color{0, 0, 0};  ///< fraction of the light that arrives in shadow
   /// Maximum world-space distance of an occluder from the shaded surface; less than 0: unlimited.
   float distance = -1;
@@ -57,6 +57,7 @@ struct ShadowLook {
 
   bool is_plain() const { return color.x == 0 && color.y == 0 && color.z == 0 && distance < 0; }
 };
+using ShadowLook [[deprecated("use ShadowAttributes")]] = ShadowAttributes;
 
 /// Light filter that modifies the emission of a light (light/filters/filter.h).
 struct LightFilter {
@@ -132,7 +133,7 @@ struct Light {
   /// Ids of SceneBuilder::add_geometry_set: the objects that the light illuminates, and those that
   /// cast shadows from it.
   uint32_t light_link = kNoSet, shadow_link = kNoSet;
-  ShadowLook shadow;
+  ShadowAttributes shadow;
   /// Id of SceneBuilder::add_light_filter; ignored for infinite lights.
   uint32_t filter = kNoFilter;
   bool visible = true;  ///< whether camera and bounce rays can hit its shape
@@ -140,7 +141,7 @@ struct Light {
   /// dome is sampled. The -z side of a portal receives the light.
   std::vector<Affine> portals;
   /// Values of the parameters specific to the kind (LightKindInfo::own), if given.
-  std::array<std::optional<float>, kMaxOwnParameters> own;
+  std::array<std::optional<float>, kMaxSpecificParameters> own;
   /// For mesh lights (kind kMeshLight), whose `to_world` maps to the space of the mesh's group.
   MaterialSync sync = MaterialSync::kGlowTintsLight;
 };
@@ -164,7 +165,7 @@ struct alignas(64) LightRecord {
   float area;
   float radius;
   float one_minus_cos;
-  float pick_pdf;  ///< probability of selection by power
+  float selection_pdf;  ///< probability of selection by power
   uint32_t kind;
   uint32_t texture;
   /// Index into LightView::distributions for a dome or rect with a texture; kNoDistribution for a
@@ -199,8 +200,8 @@ struct alignas(32) LightMotion {
 static_assert(sizeof(LightMotion) == 32);
 /// Pose of a moving light at one step.
 struct alignas(32) LightStep {
-  float turn[4] = {0, 0, 0, 1};  ///< rotation from mid-shutter, a unit quaternion x y z w
-  float place[3] = {0, 0, 0};    ///< position of the pivot
+  float turn[4] = {0, 0, 0, 1};   ///< rotation from mid-shutter, a unit quaternion x y z w
+  float position[3] = {0, 0, 0};  ///< position of the pivot
   float pad = 0;
   bool operator==(const LightStep&) const = default;
 };
@@ -220,14 +221,14 @@ struct alignas(64) ShapingRecord {
 };
 static_assert(sizeof(ShapingRecord) == 128);
 
-/// Packed ShadowLook.
-struct alignas(32) ShadowLookRecord {
+/// Packed ShadowAttributes.
+struct alignas(32) ShadowRecord {
   float color[3];
   float distance;  ///< kFarAway if unlimited
   float falloff;
   float inverse_gamma;
 };
-static_assert(sizeof(ShadowLookRecord) == 32);
+static_assert(sizeof(ShadowRecord) == 32);
 
 /// Packed LightFilter.
 struct alignas(64) FilterRecord {
@@ -257,8 +258,8 @@ struct alignas(64) TriangleLight {
   /// kOpacity, which says what varies; the material that determines it; and the index of its
   /// TriangleUvs.
   float radiance[3];
-  float m[3];      ///< unit geometric normal times the area
-  float pick_pdf;  ///< probability of selection by power
+  float m[3];           ///< unit geometric normal times the area
+  float selection_pdf;  ///< probability of selection by power
   /// The emission and opacity of the material vary.
   static constexpr float kEmission = -1.f;
   /// Only the opacity of the material varies. It scales the radiance of a mesh light that ignores
@@ -284,8 +285,8 @@ static_assert(sizeof(TriangleUvs) == 48);
 /// stays in the cache, and one line of 32 values.
 struct Distribution2D {
   static constexpr uint32_t kCounts = 65536;
-  static constexpr uint32_t kLine = 32;             ///< values in a cache line
-  static constexpr uint32_t kMost = kLine * kLine;  ///< maximum number of intervals in a row
+  static constexpr uint32_t kLine = 32;            ///< values in a cache line
+  static constexpr uint32_t kMax = kLine * kLine;  ///< maximum number of intervals in a row
   /// Padding after the last value of a row. It is not less than any value, since kCounts itself is
   /// never stored.
   static constexpr uint16_t kPad = kCounts - 1;
@@ -309,7 +310,7 @@ struct Distribution2D {
 /// Integer alias tables that map a random number k in [0, 2^24) to a light. Numbers below `split`
 /// select a record, the others a triangle, so that looking up one of a few strong lights does not
 /// touch the table of millions of triangles. Each bin of a table covers 2^shift random numbers.
-struct PickTable {
+struct PowerTable {
   /// Bins of both groups. Random number r of the 2^shift of bin b selects light b of the group if r
   /// < bin mod 2^shift, and light bin >> shift otherwise.
   const uint32_t* bins = nullptr;
@@ -381,9 +382,9 @@ struct LightView {
   const LightRecord* lights = nullptr;
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
-  PickTable pick;
+  PowerTable power_table;
   /// Selection probability of each light if `pick` does not use those of the records; else null.
-  const float* pick_pdf = nullptr;
+  const float* selection_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< select lights by `tree` instead of `pick`
   uint32_t count = 0;    ///< number of records and triangles
@@ -400,7 +401,7 @@ struct LightView {
   const FilterRecord* filters = nullptr;  ///< null if no light has a filter
   const LightMotion* motions = nullptr;   ///< by record; null if no light moves
   const LightStep* motion_steps = nullptr;
-  const ShadowLookRecord* shadows = nullptr;  ///< null if all shadows are plain
+  const ShadowRecord* shadows = nullptr;  ///< null if all shadows are plain
   /// Record of the mesh light of each triangle, or kNoLight. Null if there are no mesh lights.
   const uint32_t* mesh_lights = nullptr;
   bool has_effects = false;      ///< some record is sampled_only or has multipliers
@@ -412,7 +413,7 @@ struct LightView {
   /// `reach` before its centre, outside all light shapes. Radius 0 means that no light paths start.
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
-  bool sends_paths() const { return radius > 0; }
+  bool emits_paths() const { return radius > 0; }
   const LightAim* aim = nullptr;  ///< target spheres of light paths; null for none
   // Geometry for opacity graphs that read positions; null for a light set without geometry.
   const MeshRecord* meshes = nullptr;

@@ -14,9 +14,9 @@ namespace detail {
 /// Returns the radiance of samples `s` on triangles `light`, with tint and shaping of their mesh
 /// lights. Constant radiance was tinted when the scene was built.
 template <typename F>
-inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
-                              const TriangleReader<F>& triangle, const KindSample<F>& s,
-                              const Mask<F>& active) {
+inline Color<F> mesh_light_sample_radiance(const LightView& view, const UInt<F>& light,
+                                           const TriangleReader<F>& triangle,
+                                           const KindSample<F>& s, const Mask<F>& active) {
   const UInt<F> record = record_of<F>(view, light, active);
   const Mask<F> known = active & (s.pdf > 0.f) & Mask<F>(record != UInt<F>(kNoLight));
   if (none(known)) return s.radiance;
@@ -29,50 +29,54 @@ inline Color<F> of_mesh_light(const LightView& view, const UInt<F>& light,
 
 /// Returns the factor for emission that a path hits, for a light with these multipliers. `share` is
 /// the diffuse fraction of the path's last bounce; the rest is specular. Cameras see the light
-/// without multipliers. `is_seen` marks paths that light sampling cannot produce.
+/// without multipliers. `is_specular_view` marks paths that light sampling cannot produce.
 template <typename F>
 inline Color<F> factor_of_hit(const F& diffuse, const F& specular, const Mask<F>& sampled_only,
-                              const Mask<F>& is_seen, bool from_camera, const Color<F>& share) {
+                              const Mask<F>& is_specular_view, bool from_camera,
+                              const Color<F>& share) {
   Color<F> factor(F(1.f));
   if (!from_camera) {
     const F more = diffuse - specular;
     factor = {fma(more, share.x, specular), fma(more, share.y, specular),
               fma(more, share.z, specular)};
   }
-  return select<F>(sampled_only & not_(is_seen), Color<F>(F(0.f)), factor);
+  return select<F>(sampled_only & not_(is_specular_view), Color<F>(F(0.f)), factor);
 }
 
 }  // namespace detail
 
 /// Returns the radiance that a path along `dir` receives from meshes with mesh light records
-/// `record` (kNoLight for other meshes), before MIS. `glow` is the emission of the material.
-/// `is_seen` marks hits from a camera or a mirror. Other hits are bounces that light sampling can
-/// also produce, with the diffuse fraction `share`.
+/// `record` (kNoLight for other meshes), before MIS. `material_emission` is the emission of the
+/// material. `is_specular_view` marks hits from a camera or a mirror. Other hits are bounces that
+/// light sampling can also produce, with the diffuse fraction `share`.
 template <typename F>
 inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record,
-                                    const Color<F>& glow, const Vec3<F>& dir, const UInt<F>& link,
-                                    const Mask<F>& is_seen, bool from_camera, const Color<F>& share,
+                                    const Color<F>& material_emission, const Vec3<F>& dir,
+                                    const UInt<F>& link, const Mask<F>& is_specular_view,
+                                    bool from_camera, const Color<F>& share,
                                     const Mask<F>& active) {
   using U = UInt<F>;
   using R = LightRecord;
   const Mask<F> known = active & Mask<F>(record != U(kNoLight));
-  if (none(known)) return glow;
+  if (none(known)) return material_emission;
   const detail::LightReader<F> light(view.lights, record, known);
   const U sync = light[&R::sync];
-  const Mask<F> shows_glow =
-      is_seen & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
-  const Mask<F> given = known & not_(shows_glow);
-  if (none(given)) return glow;
-  Color<F> radiance = glow * light.radiance();
-  if (view.shapings) radiance = detail::shaped<F>(view, light.shaping(), -dir, radiance, given);
+  const Mask<F> shows_material =
+      is_specular_view & Mask<F>(sync != U(static_cast<uint32_t>(MaterialSync::kNoResponse)));
+  const Mask<F> uses_light = known & not_(shows_material);
+  if (none(uses_light)) return material_emission;
+  Color<F> radiance = material_emission * light.radiance();
+  if (view.shapings)
+    radiance = detail::shaped<F>(view, light.shaping(), -dir, radiance, uses_light);
   const Mask<F> sampled_only = Mask<F>(light[&R::sampled_only] != U(0u));
-  radiance = radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular],
-                                                 sampled_only, is_seen, from_camera, share);
+  radiance =
+      radiance * detail::factor_of_hit<F>(light[&R::diffuse], light[&R::specular], sampled_only,
+                                          is_specular_view, from_camera, share);
   if (view.links.members) {
     const U set = light[&R::light_link];
-    radiance = radiance * select(is_linked<F>(view.links, link, set, given), F(1.f), F(0.f));
+    radiance = radiance * select(is_linked<F>(view.links, link, set, uses_light), F(1.f), F(0.f));
   }
-  return select<F>(given, radiance, glow);
+  return select<F>(uses_light, radiance, material_emission);
 }
 
 /// Kind of mesh lights in WAVECOMB_LIGHT_KINDS (light/kinds/kinds.h). Records of mesh lights are
@@ -80,7 +84,7 @@ inline Color<F> mesh_light_radiance(const LightView& view, const UInt<F>& record
 struct TriangleKind : FlatKind {
   static LightKindInfo describe();
   template <typename F>
-  static detail::KindHit<F> hit(const detail::LightMeeting<F>& /*meeting*/) {
+  static detail::KindHit<F> hit(const detail::LightHitQuery<F>& /*query*/) {
     return detail::dark<F>();
   }
   template <typename F>
@@ -92,7 +96,7 @@ struct TriangleKind : FlatKind {
     return {};
   }
   template <typename F>
-  static F emission_density(const detail::LightMeeting<F>& /*meeting*/) {
+  static F emission_density(const detail::LightHitQuery<F>& /*query*/) {
     return F(0.f);
   }
 };

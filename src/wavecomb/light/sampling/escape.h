@@ -20,12 +20,12 @@ inline F infinite_emission_density(const LightView& view, uint32_t light, const 
   const LightRecord& record = view.lights[light];
   if (record.camera_only != 0) return F(0.f);
   const LightReader<F> reader(record, active);
-  const float pick = view.pick_pdf ? view.pick_pdf[light] : record.pick_pdf;
+  const float selection_pdf = view.selection_pdf ? view.selection_pdf[light] : record.selection_pdf;
   F density = visit(record.kind, [&]<typename Kind>(Kind) {
     return Kind::template emission_density<F>({view, reader, from, dir, F(0.f), active});
   });
-  if (view.aim) density = density * aim_from_afar<F>(view, from, dir);
-  return select(is_finite(density), F(density * pick), F(0.f));
+  if (view.aim) density = density * aim_density_infinite<F>(view, from, dir);
+  return select(is_finite(density), F(density * selection_pdf), F(0.f));
 }
 
 }  // namespace detail
@@ -40,20 +40,20 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
                                         const F& ratio = F(0.f), const F& time = F(0.5f),
                                         const Color<F>& share = Color<F>(F(0.f))) {
   const LightRecord& record = view.lights[light];
-  Vec3<F> seen_from = from, along = dir;
+  Vec3<F> local_from = from, along = dir;
   if (view.motions) [[unlikely]] {
     const LightPose<F> pose = light_pose<F>(view, UInt<F>(light), time, active);
-    seen_from = pose.point_to_rest(from);
+    local_from = pose.point_to_rest(from);
     along = pose.to_rest(dir);
   }
   detail::KindHit<F> hit = visit(record.kind, [&]<typename Kind>(Kind) {
-    return Kind::template escape<F>({view, record, seen_from, along, active});
+    return Kind::template escape<F>({view, record, local_from, along, active});
   });
   if (record.shaping != kNoShaping) [[unlikely]]
     hit.radiance = detail::shaped<F>(view, UInt<F>(record.shaping), -along, hit.radiance, active);
-  const F light_pdf = hit.pdf * infinite_pick_pdf(view, light);
+  const F light_pdf = hit.pdf * infinite_selection_pdf(view, light);
   F weight = select(bsdf_is_delta, F(1.f), balance_weight<F>(bsdf_pdf, light_pdf));
-  if (view.sends_paths()) [[unlikely]]
+  if (view.emits_paths()) [[unlikely]]
     weight = joint_bounce_weight<F>(
         bsdf_pdf, light_pdf, bsdf_is_delta,
         F(ratio * detail::infinite_emission_density<F>(view, light, from, dir, active)));
@@ -62,7 +62,7 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light, c
         hit.radiance *
         LightEffect<F>(view, UInt<F>(light), active).of_hit(bsdf_is_delta, from_camera, share);
   if (view.links.members)
-    weight = select(shines_on<F>(view, link, UInt<F>(light), active), weight, F(0.f));
+    weight = select(illuminates<F>(view, link, UInt<F>(light), active), weight, F(0.f));
   return hit.radiance * weight;
 }
 

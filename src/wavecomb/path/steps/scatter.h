@@ -17,25 +17,25 @@ namespace wavecomb {
 
 /// Returns the diffuse fraction of the bounce `b`, by colour; 0 for specular bounces.
 template <typename F, typename Bsdf, typename View>
-WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& seen, const BsdfSample<F>& b) {
-  const Color<F> diffuse = bsdf.diffuse_f_cos(seen, b.wi);
+WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& view, const BsdfSample<F>& b) {
+  const Color<F> diffuse = bsdf.diffuse_f_cos(view, b.wi);
   const auto share = [&](const F& part, const F& weight) {
     const F whole = weight * b.pdf;
-    const Mask<F> good = not_(b.is_delta) & (whole > 0.f);
-    return select(good, clamp(F(part / select(good, whole, F(1.f))), F(0.f), F(1.f)), F(0.f));
+    const Mask<F> valid = not_(b.is_delta) & (whole > 0.f);
+    return select(valid, clamp(F(part / select(valid, whole, F(1.f))), F(0.f), F(1.f)), F(0.f));
   };
   return {share(diffuse.x, b.weight.x), share(diffuse.y, b.weight.y), share(diffuse.z, b.weight.z)};
 }
 
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction, typename View>
 WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& at,
-                             const Frame<F>& frame, const Vec3<F>& wo, const View& seen,
-                             const Sample4<F>& r, const GuidePlace<F>& place,
+                             const Frame<F>& frame, const Vec3<F>& wo, const View& view,
+                             const Sample4<F>& r, const GuidingLookup<F>& guiding,
                              const JointVertex<F>& joint, const LightReceiver<F>& receiver,
                              VertexResult<F>& out) {
   const PathState<F>& path = v.path;
-  BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, seen, r);
-  guide_bounce<Bsdf, F>(v, at, frame, wo, seen, r, place, b, out);
+  BsdfSample<F> b = sample_bounce<Bsdf, F>(v, at.bsdf, wo, view, r);
+  guided_bounce<Bsdf, F>(v, at, frame, wo, view, r, guiding, b, out);
   const Vec3<F> d = normalize(frame.to_world(b.wi));
   out.next.dir = d;
   out.next.throughput = at.throughput * b.weight;
@@ -44,8 +44,8 @@ WAVECOMB_INLINE void scatter(const Vertex<F, kFeatures>& v, const Interaction& a
   out.next.receiver = receiver.normal;
   out.next.cone_width = path.cone_width;
   if (v.has(kMeshLights) && v.scene.lights.has_multipliers) [[unlikely]]
-    out.next.diffuse = diffuse_share<F>(at.bsdf, seen, b);
-  if constexpr ((kFeatures & kBelow) != 0 && Bsdf::kWalks) {
+    out.next.diffuse = diffuse_share<F>(at.bsdf, view, b);
+  if constexpr ((kFeatures & kSubsurface) != 0 && Bsdf::kHasSubsurface) {
     // For medium/subsurface/random_walk.h.
     out.next.enters_body = at.bsdf.enters(wo, b.wi) & (out.next.pdf > 0.f);
     out.next.entry = {object_of(v.hit.inst, v.hit.mesh),
