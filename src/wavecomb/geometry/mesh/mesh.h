@@ -38,7 +38,8 @@ enum class Primitive : uint8_t {
   kLinearRibbon,
   kCubicRibbon,
   kSphere,
-  kGaussianSplat
+  kGaussianSplat,
+  kSplat [[deprecated("use kGaussianSplat")]] = kGaussianSplat
 };
 
 /// Shape and opacity of a Gaussian splat, made by geometry/gaussian_splat/gaussian_splat.h; centre
